@@ -1,0 +1,81 @@
+"""The canonical body: 22 joints in SMPL order, its bone lengths, and its upper and lower parts.
+
+Frame of the rest pose: x right, y forward, z up, metres, the pelvis above the origin. The proportions are this project's
+own, rounded from the medians of the training sources; other statures are made by scaling.
+"""
+
+import numpy as np
+
+__all__ = [
+    "JOINTS", "PARENTS", "UPPER", "LOWER", "MIRROR", "END_EFFECTORS", "OFFSETS", "REST", "STANDING_PELVIS", "TOE_HEIGHT",
+    "STATURE", "SEAT_TO_PELVIS", "joint",
+]
+
+JOINTS = (
+    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle", "spine3",
+    "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder", "right_shoulder",
+    "left_elbow", "right_elbow", "left_wrist", "right_wrist",
+)
+PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19)
+UPPER = (0, 3, 6, 9, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21)
+LOWER = (1, 2, 4, 5, 7, 8, 10, 11)
+END_EFFECTORS = {"head": 15, "hand_left": 20, "hand_right": 21}
+
+_INDEX = {name: i for i, name in enumerate(JOINTS)}
+
+
+def joint(name: str) -> int:
+    """Index of a joint by its name in ``JOINTS``."""
+    return _INDEX[name]
+
+
+def _swap(name: str) -> str:
+    if name.startswith("left_"):
+        return "right_" + name[5:]
+    if name.startswith("right_"):
+        return "left_" + name[6:]
+    return name
+
+
+MIRROR = tuple(joint(_swap(name)) for name in JOINTS)
+"""Joint order of the body seen in a mirror."""
+
+_HALF = {  # parent to joint, left side written once; the rest pose is a T-pose
+    "spine1": (0, -0.02, 0.11), "spine2": (0, 0.0, 0.13), "spine3": (0, 0.01, 0.09), "neck": (0, -0.02, 0.20),
+    "head": (0, 0.03, 0.09), "left_collar": (-0.06, -0.01, 0.12), "left_shoulder": (-0.12, -0.01, 0.03),
+    "left_elbow": (-0.26, 0, 0), "left_wrist": (-0.25, 0, 0), "left_hip": (-0.09, 0, -0.07), "left_knee": (0, 0, -0.41),
+    "left_ankle": (0, 0, -0.41), "left_foot": (-0.02, 0.13, -0.06),
+}
+
+
+def _offsets() -> np.ndarray:
+    table = np.zeros((22, 3))
+    for name, offset in _HALF.items():
+        table[joint(name)] = offset
+        table[joint(_swap(name))] = np.where([name.startswith("left_"), False, False], -1.0, 1.0) * offset
+    return table
+
+
+OFFSETS = _offsets()
+"""(22, 3) rest offset of every joint from its parent; zero for the pelvis."""
+
+TOE_HEIGHT = 0.02
+"""Height of a planted toe base over the floor (metres)."""
+STANDING_PELVIS = TOE_HEIGHT + 0.06 + 0.41 + 0.41 + 0.07
+"""Height of the pelvis in the rest pose (metres)."""
+STATURE = 1.75
+"""Height of the canonical body, crown to sole (metres)."""
+SEAT_TO_PELVIS = 0.12
+"""Height of the pelvis joint over a hard seat's top (metres)."""
+
+
+def _rest() -> np.ndarray:
+    rest = np.zeros((22, 3))
+    rest[0] = (0, 0, STANDING_PELVIS)
+    for j in range(1, 22):
+        rest[j] = rest[PARENTS[j]] + OFFSETS[j]
+    return rest
+
+
+REST = _rest()
+"""(22, 3) joints of the rest pose, standing on the floor."""

@@ -1,0 +1,65 @@
+"""What goes into a generation besides the scene (``Controls``) and what comes out of it (``Take``)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .root import RootPath
+
+__all__ = ["MODES", "Controls", "Take"]
+
+MODES = ("FREE", "EE", "FULL")
+
+
+@dataclass(frozen=True)
+class Controls:
+    """What the animator asks of the character, frame by frame. World: z up, metres.
+
+    ``fps``: frames a second of every array here. ``root`` (T, 4, 4): x right, y forward, z up, on the ground under the pelvis.
+    ``mode``: FREE, EE or FULL, one word or one for each frame. ``head``, ``hand_left``, ``hand_right`` (T, 3): targets of the
+    head and wrist joints, NaN where free; the matching ``…_rotation`` (T, 3, 3) turn head and hands (y where the face looks
+    or the fingers point, z the crown or the back of the hand), NaN where free. ``upper_body`` (T, 14, 3): the joints
+    ``skeleton.UPPER`` for FULL. ``scale``: the character's size over the canonical body of 1.75 m.
+    """
+
+    fps: float
+    root: np.ndarray
+    mode: str | Sequence[str] = "FREE"
+    head: np.ndarray | None = None
+    hand_left: np.ndarray | None = None
+    hand_right: np.ndarray | None = None
+    upper_body: np.ndarray | None = None
+    head_rotation: np.ndarray | None = None
+    hand_left_rotation: np.ndarray | None = None
+    hand_right_rotation: np.ndarray | None = None
+    scale: float = 1.0
+
+    def __len__(self) -> int:
+        return len(self.root)
+
+
+@dataclass(frozen=True)
+class Take:
+    """One generated motion at the controls' frame rate.
+
+    ``joints`` (T, 22, 3): world, metres, constant bone lengths. ``rotations`` (T, 22, 4): quaternions w x y z of each joint's
+    frame in its parent's, the pelvis' in the world; the identity everywhere is the rest pose (a T-pose that looks along +y);
+    signs are continuous in time. ``root`` (T, 4, 4): the smoothed root. ``action`` (T, 10): action probabilities.
+    ``scale``: the character's size. ``poses`` (N, 66) and ``path``: the model's own poses at 30 fps, canonical size, in the
+    frames of ``path``: what resuming needs. ``seconds``: time spent by stage. ``warnings``: sentences for the user.
+    """
+
+    fps: float
+    joints: np.ndarray
+    rotations: np.ndarray
+    root: np.ndarray
+    action: np.ndarray
+    scale: float
+    poses: np.ndarray
+    path: RootPath
+    seconds: dict[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.joints)
