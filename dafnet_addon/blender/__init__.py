@@ -1,0 +1,1 @@
+"""The only readers and writers of Blender data. Lengths are metres here; Blender's own units stay at the outermost edge."""

@@ -1,0 +1,89 @@
+"""From the scene to keyframes: the one code path under the operator, the command line and batches.
+
+A job knows objects by name only and looks them up at each stage, since they may be deleted or undone while it runs.
+"""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING, TypeVar
+
+import bpy
+
+from .. import generate_steps, load_weights
+from ..core.take import Take
+from .baker import bake
+from .properties import Settings, find_object, settings_of, weights_path
+from .scene_reader import read_steps
+
+if TYPE_CHECKING:
+    from ..core.weights import Weights
+
+__all__ = ["Result", "Settings", "settings_of", "steps", "run"]
+
+_T = TypeVar("_T")
+
+_READ, _GENERATED = 0.1, 0.98
+"""Progress after the scene is read and after the take is generated."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A baked take: its new ``action`` (assigned to the armature), the ``take``, sentences for the user in ``warnings``, and
+    ``seconds`` by stage: ``reading``, those of ``Take.seconds`` (``conditions``, ``sampling``, …) and ``baking``.
+    """
+
+    action: bpy.types.Action
+    take: Take
+    warnings: tuple[str, ...]
+    seconds: dict[str, float]
+
+
+def steps(
+    context: bpy.types.Context, settings: Settings, weights: "Weights | None" = None,
+) -> Generator[float, None, Result]:
+    """Read the scene, generate, bake; yields progress in [0, 1] and returns the ``Result``.
+
+    ``settings`` comes from ``settings_of(armature, scene, **overrides)``. Without ``weights`` those of the preferences, else
+    the shipped ones, are loaded. The current frame is as it was at every yield, and until the last stage nothing in the
+    scene is changed: an error (``InputError``, ``WeightsError``) or ``close()`` leaves it untouched.
+    """
+    if weights is None:
+        weights = load_weights(weights_path(context))
+    started = perf_counter()
+    read = yield from _scaled(read_steps(context, settings), 0.0, _READ)
+    seconds = {"reading": perf_counter() - started}
+
+    take = yield from _scaled(
+        generate_steps(
+            read.scene, read.controls, weights,
+            seed=settings.seed, lower_seed=settings.lower_seed, temperature=settings.temperature,
+        ),
+        _READ, _GENERATED,
+    )
+    started = perf_counter()
+    armature = find_object(settings.armature, "character")
+    action = bake(take, armature, settings.frame_start, f"{armature.name} take")
+    seconds |= take.seconds | {"baking": perf_counter() - started}
+    yield 1.0
+    return Result(action, take, read.warnings + take.warnings, seconds)
+
+
+def run(context: bpy.types.Context, settings: Settings, weights: "Weights | None" = None) -> Result:
+    """``steps`` drained."""
+    job = steps(context, settings, weights)
+    while True:
+        try:
+            next(job)
+        except StopIteration as done:
+            return done.value
+
+
+def _scaled(stage: Generator[float, None, _T], start: float, end: float) -> Generator[float, None, _T]:
+    """A stage whose progress is mapped from [0, 1] to [start, end]."""
+    while True:
+        try:
+            progress = next(stage)
+        except StopIteration as done:
+            return done.value
+        yield start + (end - start) * progress
