@@ -1,0 +1,222 @@
+"""Root paths of people who walk, sit down, rest and get up again, made from a few points on the floor.
+
+The profiles are those measured on captured sit-downs and stand-ups: people do not stop before a seat, they turn round
+while they go the last metre, slow down evenly (0.7 m/s²) until they sit, and their heading has settled a quarter of a
+metre before that; they rise with 0.9 m/s² along the direction they sat in and turn away after 0.2 m. Yaw is as in
+``core.root``.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import InputError
+from .root import RootPath
+
+__all__ = ["Stop", "Rest", "Route", "facing", "route"]
+
+Point = tuple[float, float]
+
+_STEP = 0.005  # metres between samples along a leg
+_START, _HALT, _SIT, _RISE = 1.4, 1.2, 0.7, 0.9  # accelerations, m/s²
+_CORNER_RATE = np.radians(90.0)  # turning rate, a second, that slows a walker who looks along the path in a corner
+_SIDEWAYS = 2.0  # acceleration to the side that slows a walker who does not, m/s²
+_CORNER_CUT, _CORNER_SPEED = 0.45, 0.3  # metres of a straight that a rounded corner may use; slowest speed in a corner
+_BEFORE_SEAT, _AFTER_SEAT = 0.55, 0.45  # metres straight before and after a seat, less the rounding
+_SETTLED, _TURN_AWAY = 0.25, 0.20  # metres before a seat where the heading has settled, after it where it lets go
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A place to rest: ``position`` (x, y) of the pelvis, the ``yaw`` it faces, ``seconds`` of rest; seated or standing."""
+
+    position: Point
+    yaw: float
+    seconds: float = 3.0
+    seated: bool = False
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Frames ``first`` to ``last`` (both included) in which the root stands still at ``stop``."""
+
+    stop: Stop
+    first: int
+    last: int
+
+
+@dataclass(frozen=True)
+class Route:
+    """A root ``path`` and its ``rests``, in order of time."""
+
+    path: RootPath
+    rests: tuple[Rest, ...]
+
+
+def facing(direction: Sequence[float]) -> float:
+    """Yaw of a horizontal direction (x, y), radians; 0 looks along +y."""
+    return float(np.arctan2(-direction[0], direction[1]))
+
+
+def _forward(yaw: float) -> np.ndarray:
+    return np.array([-np.sin(yaw), np.cos(yaw)])
+
+
+def _wrapped(angle: float) -> float:
+    return float((angle + np.pi) % (2 * np.pi) - np.pi)
+
+
+def _turn_seconds(turn: float) -> float:
+    """How long people take to turn by ``turn`` radians: measured 0.8 s for 30 degrees, 1.2 s for 90, 1.7 s for 180."""
+    return 0.6 + 1.1 * abs(turn) / np.pi
+
+
+def _blend(u: np.ndarray) -> np.ndarray:
+    u = np.clip(u, 0.0, 1.0)
+    return u * u * (3.0 - 2.0 * u)
+
+
+def _rounded(points: np.ndarray) -> tuple[np.ndarray, float, list[tuple[float, float]]]:
+    """Polyline (N, 2) with rounded corners, evenly sampled; its length; where each corner starts and ends along it."""
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    pieces, corners, travelled = [points[:1]], [], 0.0
+
+    def append(piece: np.ndarray) -> None:
+        nonlocal travelled
+        travelled += float(np.linalg.norm(np.diff(np.concatenate([pieces[-1][-1:], piece]), axis=0), axis=1).sum())
+        pieces.append(piece)
+
+    for i in range(1, len(points) - 1):
+        before, after = points[i - 1] - points[i], points[i + 1] - points[i]
+        free_before, free_after = (0.8 if i == 1 else 0.5), (0.8 if i == len(points) - 2 else 0.5)
+        cut = min(_CORNER_CUT, free_before * lengths[i - 1], free_after * lengths[i])
+        a, b = points[i] + before / lengths[i - 1] * cut, points[i] + after / lengths[i] * cut
+        append(a[None])
+        u = np.linspace(0.0, 1.0, 65)[1:, None]
+        start = travelled
+        append((1 - u) ** 2 * a + 2 * u * (1 - u) * points[i] + u * u * b)
+        corners.append((start, travelled))
+    append(points[-1:])
+    dense = np.concatenate(pieces)
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(dense, axis=0), axis=1))])
+    grid = np.linspace(0.0, arc[-1], max(2, int(np.ceil(arc[-1] / _STEP)) + 1))
+    return np.stack([np.interp(grid, arc, dense[:, k]) for k in range(2)], axis=1), float(arc[-1]), corners
+
+
+def _speeds(
+    arc: np.ndarray, tangent: np.ndarray, heading: np.ndarray, cruise: float, start: float, end: float
+) -> np.ndarray:
+    """Fastest speeds along a curve within ``cruise``, what its corners allow and the accelerations at both ends."""
+    step = float(arc[1])
+    bend, turn = (np.maximum(np.abs(np.gradient(angle, step)), 1e-6) for angle in (tangent, heading))
+    limit = np.minimum(cruise, np.maximum(_CORNER_SPEED, np.minimum(_CORNER_RATE / turn, np.sqrt(_SIDEWAYS / bend))))
+    squared = limit**2
+    squared[0] = squared[-1] = 0.0
+    for i in range(1, len(arc)):
+        squared[i] = min(squared[i], squared[i - 1] + 2.0 * start * step)
+    for i in range(len(arc) - 2, -1, -1):
+        squared[i] = min(squared[i], squared[i + 1] + 2.0 * end * step)
+    return np.sqrt(squared)
+
+
+def _leg(origin: Stop, via: Sequence[Point], goal: Stop, cruise: float, fps: float) -> RootPath:
+    """From rest at ``origin`` to rest at ``goal``: from one frame after the one to the first frame at the other."""
+    points: list[np.ndarray] = [np.asarray(origin.position, float)]
+    if origin.seated:
+        points.append(points[0] + _AFTER_SEAT * _forward(origin.yaw))
+    points += [np.asarray(p, float) for p in via]
+    if goal.seated:
+        points.append(np.asarray(goal.position, float) + _BEFORE_SEAT * _forward(goal.yaw))
+    points.append(np.asarray(goal.position, float))
+    gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if not np.isfinite(gaps).all() or (gaps < 0.05).any():
+        raise InputError("Two neighbouring points of the root's path are less than 5 cm apart; move or remove one.")
+
+    curve, length, corners = _rounded(np.array(points))
+    step = np.diff(curve, axis=0)
+    arc = np.linspace(0.0, length, len(curve))
+    tangent = np.unwrap(np.arctan2(-step[:, 0], step[:, 1]))
+    tangent = np.concatenate([tangent, tangent[-1:]])
+    # The short straights at a seat are taken forwards and backwards: they say nothing about where the walker looks.
+    first = corners[0][1] if origin.seated else 0.0
+    last = corners[-1][0] if goal.seated else length
+    heading = np.interp(np.clip(arc, first, last), arc, tangent)
+    start, end = (_RISE if origin.seated else _START), (_SIT if goal.seated else _HALT)
+    speed = _speeds(arc, tangent, heading, cruise, start, end)
+    clock = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(arc) / (speed[1:] + speed[:-1]))])
+
+    def at(distance: float) -> float:
+        return float(np.interp(distance, arc, clock))
+
+    def walked(time: float) -> float:
+        return float(np.interp(time, clock, heading))
+
+    leave_turn = _wrapped(heading[0] - origin.yaw)
+    wait = 0.0 if origin.seated else 0.5 * (_turn_seconds(leave_turn) - 0.6)
+    leave = at(_TURN_AWAY) if origin.seated else -wait
+    for _ in range(3):  # the turn's length depends on the heading at its end
+        leave_end = leave + _turn_seconds(leave_turn)
+        leave_turn = _wrapped(walked(leave_end) - origin.yaw)
+    arrive_turn = _wrapped(goal.yaw - heading[-1])
+    linger = 0.0 if goal.seated else 0.5 * (_turn_seconds(arrive_turn) - 0.6)
+    arrive_end = at(arc[-1] - _SETTLED) if goal.seated else clock[-1] + linger
+    for _ in range(3):
+        arrive = arrive_end - _turn_seconds(arrive_turn)
+        arrive_turn = _wrapped(goal.yaw - walked(arrive))
+
+    frames = int(np.ceil((clock[-1] + wait + linger) * fps))
+    time = np.arange(1, frames + 1) / fps - wait
+    distance = np.interp(time, clock, arc)
+    position = np.stack([np.interp(distance, arc, curve[:, k]) for k in range(2)] + [np.zeros(frames)], axis=1)
+    walking = np.interp(time, clock, heading)
+    # Both turns are offsets from the walker's heading that fade out and in, so they may overlap on a short leg.
+    leaving = 1.0 - _blend((time - leave) / (leave_end - leave))
+    arriving = _blend((time - arrive) / (arrive_end - arrive))
+    from_origin = _wrapped(origin.yaw - walked(leave_end)) + walked(leave_end)
+    to_goal = walked(arrive) + arrive_turn
+    yaw = walking + leaving * (from_origin - walking) + arriving * (to_goal - walking)
+    return RootPath(position, yaw)
+
+
+def route(start: Stop, *places: Point | Stop, speed: float = 1.1, fps: float = 30.0, floor: float = 0.0) -> Route:
+    """Root path that rests at ``start``, passes the points and rests at every ``Stop``; it must end at a stop.
+
+    ``speed``: of walking, metres a second. ``floor``: height of the floor (metres). Raises InputError where points
+    coincide or the path does not end at a stop.
+    """
+    if not places or not isinstance(places[-1], Stop):
+        raise InputError("A root path has to end at a stop; add one as its last place.")
+    if speed <= _CORNER_SPEED or fps <= 0:
+        raise InputError(f"Walking needs a speed above {_CORNER_SPEED} m/s and a positive frame rate.")
+    positions: list[np.ndarray] = []
+    yaws: list[np.ndarray] = []
+    rests: list[Rest] = []
+    count = 0
+
+    def rest(stop: Stop, yaw: float) -> None:
+        nonlocal count
+        frames = max(1, round(stop.seconds * fps))
+        positions.append(np.broadcast_to([*stop.position, 0.0], (frames, 3)))
+        yaws.append(np.full(frames, yaw))
+        rests.append(Rest(stop, count, count + frames - 1))
+        count += frames
+
+    rest(start, start.yaw)
+    via: list[Point] = []
+    origin = start
+    for place in places:
+        if not isinstance(place, Stop):
+            via.append(place)
+            continue
+        leg = _leg(origin, via, place, speed, fps)
+        turns = round((float(yaws[-1][-1]) - float(leg.yaw[0])) / (2 * np.pi))
+        positions.append(leg.position)
+        yaws.append(leg.yaw + 2 * np.pi * turns)
+        count += len(leg)
+        rest(place, float(yaws[-1][-1]))
+        origin, via = place, []
+    position = np.concatenate(positions)
+    position[:, 2] = floor
+    return Route(RootPath(position, np.concatenate(yaws)), tuple(rests))
