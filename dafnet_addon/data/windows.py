@@ -1,0 +1,173 @@
+"""Draws training windows: a captured piece of motion, augmented, with furniture fitted to it and the sensor read.
+
+Paper, section 5.2. Each draw picks a clip, may move a seat's height, mirror, reverse or re-time it, may roughen or smooth its
+root path as an animator would, and furnishes the room anew.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.root import RootPath, root_from_joints, smoothed, to_root, velocities
+from ..core.rotations import normalised
+from ..core.skeleton import MIRROR, joint
+from . import boxes as box_module
+from .canonical import pose_legs
+from .furniture import Rest, probes, resting, scattered, seat_for
+
+__all__ = ["HISTORY", "LENGTH", "Motion", "Window", "motion_of", "draw", "mirrored", "at_seat_height"]
+
+HISTORY, LENGTH = 10, 70
+_FRAMES = HISTORY + LENGTH
+_MARGIN = 24
+_HOLD = 45
+_LOWEST, _HIGHEST = 0.40, 0.82  # resting pelvis, metres: seats of 0.28 to 0.70
+_LEGS = [joint(s + n) for s in ("left_", "right_") for n in ("ankle", "foot")]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A clip on the canonical body: ``joints`` (T, 22, 3), frames that may be used, and its seated episodes."""
+
+    name: str
+    source: str
+    subject: str
+    category: str
+    joints: np.ndarray
+    valid: np.ndarray
+    rests: tuple[Rest, ...]
+
+
+@dataclass(frozen=True)
+class Window:
+    """``poses`` (80, 66) in each frame's root, ``velocity`` (80, 3), ``occupancy`` (70, 2640) uint8 of the last 70 frames."""
+
+    poses: np.ndarray
+    velocity: np.ndarray
+    occupancy: np.ndarray
+
+
+def _held(joints: np.ndarray) -> np.ndarray:
+    """The clip with its first and last pose held for a while, where it is at rest there: stillness is otherwise rare."""
+    if len(joints) < 3:
+        return joints
+    speed = np.linalg.norm(np.diff(joints, axis=0), axis=-1).max(1) * 30
+    parts = [joints]
+    if speed[:3].max() < 0.35:
+        parts.insert(0, np.repeat(joints[:1], _HOLD, axis=0))
+    if speed[-3:].max() < 0.35:
+        parts.append(np.repeat(joints[-1:], _HOLD, axis=0))
+    return np.concatenate(parts)
+
+
+def _usable(joints: np.ndarray) -> np.ndarray:
+    """False in frames of a T-pose, a jump or an impossible speed."""
+    left = normalised(joints[:, joint("left_wrist")] - joints[:, joint("left_shoulder")])
+    right = normalised(joints[:, joint("right_wrist")] - joints[:, joint("right_shoulder")])
+    t_pose = ((left * right).sum(-1) < -0.93) & (np.abs(left[:, 2]) < 0.25)
+    airborne = np.minimum(joints[:, joint("left_foot"), 2], joints[:, joint("right_foot"), 2]) > 0.22
+    step = np.linalg.norm(np.diff(joints, axis=0, prepend=joints[:1]), axis=-1).max(1)
+    return ~(t_pose | airborne | (step > 0.4))
+
+
+def motion_of(name: str, source: str, subject: str, category: str, joints: np.ndarray) -> Motion:
+    """A motion ready to be drawn from."""
+    held = _held(joints)
+    rests = tuple(resting(held, root_from_joints(held))) if len(held) > 2 else ()
+    return Motion(name, source, subject, category, held, _usable(held), rests)
+
+
+def mirrored(joints: np.ndarray) -> np.ndarray:
+    """The motion seen in a mirror (x and −x, left and right)."""
+    return joints[:, MIRROR] * (-1.0, 1.0, 1.0)
+
+
+def at_seat_height(joints: np.ndarray, resting_pelvis: float, wanted: float) -> np.ndarray:
+    """The motion with its resting pelvis moved from one height to another: feet stay where they are, legs bend to suit.
+
+    The body above the legs moves by the whole difference while seated, by none while standing, in between in proportion.
+    """
+    standing = max(0.90, resting_pelvis + 0.08)
+    share = np.clip((standing - joints[:, 0, 2]) / (standing - resting_pelvis), 0.0, 1.1)
+    out = joints + np.array([0.0, 0.0, 1.0]) * ((wanted - resting_pelvis) * share)[:, None, None]
+    out[:, _LEGS] = joints[:, _LEGS]
+    return pose_legs(out)
+
+
+def _retimed(joints: np.ndarray, speed: float) -> np.ndarray:
+    times = np.arange(0.0, len(joints) - 1, speed)
+    low = times.astype(int)
+    share = (times - low)[:, None, None]
+    return joints[low] * (1 - share) + joints[low + 1] * share
+
+
+def _animated_by_hand(rng: np.random.Generator, path: RootPath) -> RootPath:
+    """The root as an animator's curves give it: without the gait's sway, or smoothly a little wrong."""
+    if rng.random() < 0.5:
+        path = smoothed(path, rng.uniform(4, 12), rng.uniform(4, 12))
+    if rng.random() < 0.5:
+        wobble = smoothed(RootPath(rng.normal(size=path.position.shape), rng.normal(size=len(path))), 12.0, 12.0)
+        position = path.position + wobble.position * (1, 1, 0) * rng.uniform(0, 0.09)
+        path = RootPath(position, path.yaw + wobble.yaw * rng.uniform(0, 0.25))
+    return path
+
+
+def _seats(rng: np.random.Generator, rests: list[Rest], points: np.ndarray) -> list[np.ndarray]:
+    """A seat for every place of rest (places within 0.25 m share one); empty where one cannot be had."""
+    places: list[Rest] = []
+    for rest in rests:
+        if all(np.linalg.norm(rest.position - other.position) > 0.25 for other in places):
+            places.append(rest)
+    seats = [seat_for(rng, place, points) for place in places]
+    return [] if any(seat is None for seat in seats) else [seat for seat in seats if seat is not None]
+
+
+def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> Window | None:
+    """One augmented, furnished window, around frame ``focus`` where given; None where this draw cannot be used."""
+    total = len(motion.joints)
+    if total < _FRAMES + 2:
+        return None
+    speed = rng.uniform(0.85, 1.2) if rng.random() < 0.4 else 1.0
+    span = int(np.ceil(_FRAMES * speed)) + 2
+    if focus is None:
+        start = int(rng.integers(0, max(1, total - span)))
+    else:
+        start = int(np.clip(focus - rng.integers(HISTORY, span - 10), 0, max(0, total - span)))
+    low, high = max(0, start - _MARGIN), min(total, start + span + _MARGIN)
+    if not motion.valid[low:high].all():
+        return None
+    joints = motion.joints[low:high]
+    rests = [r for r in motion.rests if r.start < high and r.end > low]
+    if rests:
+        height = float(rests[0].position[2])
+        wanted = rng.uniform(_LOWEST, _HIGHEST) if rng.random() < 0.75 else height + rng.normal(0, 0.02)
+        joints = at_seat_height(joints, height, float(np.clip(wanted, _LOWEST, _HIGHEST)))
+    if speed != 1.0:
+        joints = _retimed(joints, speed)
+    seated = bool(rests)
+    if rng.random() < (0.4 if seated else 0.08):
+        joints = joints[::-1]
+    if rng.random() < 0.5:
+        joints = mirrored(joints)
+    path = root_from_joints(joints)
+    points = probes(joints)
+    furniture = [box_module.NO_BOXES]
+    if seated:
+        seats = _seats(rng, resting(joints, path), points)
+        if not seats:
+            return None
+        furniture += seats
+    if rng.random() < 0.8:
+        furniture.append(scattered(rng, points, path, int(rng.integers(1, 5))))
+    if rng.random() < 0.5:
+        path = _animated_by_hand(rng, path)
+    first = int(round((start - low) / speed))
+    cut = slice(min(first, len(joints) - _FRAMES), min(first, len(joints) - _FRAMES) + _FRAMES)
+    poses = to_root(path, joints)[cut].reshape(_FRAMES, -1)
+    recent = RootPath(path.position[cut][HISTORY:], path.yaw[cut][HISTORY:])
+    occupancy = box_module.occupancy(np.concatenate(furniture), recent)
+    return Window(
+        poses.astype(np.float32), velocities(path)[cut].astype(np.float32), np.round(occupancy * 255).astype(np.uint8)
+    )
+
+
