@@ -29,7 +29,7 @@ _SETTLED, _TURN_AWAY = 0.25, 0.20  # metres before a seat where the heading has 
 
 @dataclass(frozen=True)
 class Stop:
-    """A place to rest: ``position`` (x, y) of the pelvis, the ``yaw`` it faces, ``seconds`` of rest; seated or standing."""
+    """A place to rest: ``position`` (x, y) of the pelvis, ``yaw`` it faces, ``seconds`` of rest, seated or standing."""
 
     position: Point
     yaw: float

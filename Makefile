@@ -1,0 +1,49 @@
+# make demo: a character walks to a chair and sits, from nothing.   make test: everything, on three Blenders.
+# The bpy modules of Blender 4.2 to 5.0 need Python 3.11.
+
+PYTHON ?= $(shell command -v python3.11 || echo python3)
+# Elsewhere plain pip may bring a CUDA build of several GB: name a CPU build here, e.g. TORCH=path/to/torch-…+cpu-….whl
+TORCH ?= torch==2.13.0
+PIP := bin/python -m pip install --quiet --disable-pip-version-check
+
+.PHONY: demo test lint zip setup system clean
+
+demo: setup
+	.venv/bin/python -m dafnet_addon demo -o out/demo
+
+setup: .venv/.demo
+
+test: lint .venv-4.2/.test .venv-5.0/.test
+	.venv/bin/python -m pytest -q
+	.venv-4.2/bin/python -m pytest -q
+	.venv-5.0/bin/python -m pytest -q
+
+lint: .venv/.test
+	.venv/bin/python -m ruff check .
+	.venv/bin/python -m mypy
+
+zip: setup
+	scripts/build_zip.sh .venv/bin/python
+
+system:
+	@scripts/system_packages.sh $(PYTHON)
+
+.venv/.demo: | system
+	$(PYTHON) -m venv .venv
+	.venv/$(PIP) 'bpy==4.5.*' 'numpy>=1.26,<2'
+	@touch $@
+
+.venv/.test: pyproject.toml .venv/.demo
+	.venv/$(PIP) '$(TORCH)' 'numpy>=1.26,<2' matplotlib pytest trimesh rtree scipy safetensors ruff mypy
+	@touch $@
+
+# Both generations of NumPy are in use: 4.2 takes either.
+.venv-4.2/.test: HOST = 'bpy==4.2.*' 'numpy>=2,<3'
+.venv-5.0/.test: HOST = 'bpy==5.0.*' 'numpy>=1.26,<2'
+.venv-4.2/.test .venv-5.0/.test: | system
+	$(PYTHON) -m venv $(@D)
+	$(@D)/$(PIP) $(HOST) pytest trimesh rtree scipy
+	@touch $@
+
+clean:
+	rm -rf .venv .venv-4.2 .venv-5.0 build out
