@@ -12,8 +12,9 @@ import bpy
 
 from .. import generate_steps, load_weights
 from ..core.take import Take
+from .armature import metres_per_unit
 from .baker import bake
-from .properties import Settings, find_object, settings_of, weights_path
+from .properties import Settings, find_object, find_scene, settings_of, weights_path
 from .scene_reader import read_steps
 
 if TYPE_CHECKING:
@@ -62,8 +63,8 @@ def steps(
         _READ, _GENERATED,
     )
     started = perf_counter()
-    armature = find_object(settings.armature, "character")
-    action = bake(take, armature, settings.frame_start, f"{armature.name} take")
+    armature = find_object(settings, settings.armature, "character")
+    action = bake(take, armature, settings.frame_start, f"{armature.name} take", metres_per_unit(find_scene(settings)))
     seconds |= take.seconds | {"baking": perf_counter() - started}
     yield 1.0
     return Result(action, take, read.warnings + take.warnings, seconds)

@@ -11,7 +11,7 @@ from ..core.errors import InputError
 from ..core.take import MODES
 
 __all__ = [
-    "ADDON", "CharacterSettings", "Preferences", "Settings", "settings_of", "find_object", "find_collection",
+    "ADDON", "CharacterSettings", "Preferences", "Settings", "settings_of", "find_scene", "find_object", "find_collection",
     "register", "unregister", "ensure_registered", "weights_path",
 ]
 
@@ -144,11 +144,22 @@ def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides:
     return Settings(armature=armature.name_full, scene=scene.name_full, **(values | overrides))
 
 
-def find_object(name: str, role: str) -> bpy.types.Object:
-    """The object of this ``name_full``; ``role`` says in the ``InputError`` what it was for."""
-    found = next((o for o in bpy.data.objects if o.name_full == name), None)
+def find_scene(settings: Settings) -> bpy.types.Scene:
+    """The scene of the settings; ``InputError`` where it is gone."""
+    scene = next((s for s in bpy.data.scenes if s.name_full == settings.scene), None)
+    if scene is None:
+        raise InputError(f"The scene '{settings.scene}' is not in this file any more; generate again from another scene.")
+    return scene
+
+
+def find_object(settings: Settings, name: str, role: str) -> bpy.types.Object:
+    """The scene's object of this ``name_full``; ``role`` says in the ``InputError`` what it was for.
+
+    An object that was deleted in the scene may live on in the file as long as a property names it: it counts as gone.
+    """
+    found = next((o for o in find_scene(settings).objects if o.name_full == name), None)
     if found is None:
-        raise InputError(f"The {role} '{name}' is not in this file; choose another one in the DAFNet panel.")
+        raise InputError(f"The {role} '{name}' is not in the scene; choose another one in the DAFNet panel.")
     return found
 
 

@@ -1,0 +1,104 @@
+"""A take onto the character: keyframes in a new action."""
+
+from collections.abc import Callable
+
+import bpy
+import numpy as np
+
+from ..core.errors import InputError
+from ..core.rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix, rotate, transpose
+from ..core.skeleton import JOINTS
+from ..core.take import Take
+from .armature import FACING, character_scale
+from .compat import action_curves, assign_action, new_action
+
+__all__ = ["bake", "require_bakeable"]
+
+
+def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
+    """Size of a character that can be baked onto; else ``InputError`` with what to do. ``unit``: see ``character_scale``."""
+    if armature.type != "ARMATURE":
+        raise InputError(f"'{armature.name}' is no armature; select a character that Add Character made.")
+    if armature.library or armature.override_library:
+        raise InputError(f"The armature '{armature.name}' is linked or a library override; make it local first.")
+    if armature.parent:
+        raise InputError(f"The armature '{armature.name}' has a parent; clear it, and parent the root object instead.")
+    if any(not constraint.mute for constraint in armature.constraints):
+        raise InputError(f"The armature '{armature.name}' has object constraints; mute them, and constrain the root instead.")
+    if any(armature.delta_location) or any(armature.delta_rotation_euler):
+        raise InputError(f"The armature '{armature.name}' has delta transforms; apply them and try again.")
+    return character_scale(armature, unit)
+
+
+def bake(take: Take, armature: bpy.types.Object, frame_start: int, name: str, unit: float = 1.0) -> bpy.types.Action:
+    """Key every frame of ``take`` from ``frame_start`` on in a new action ``name``, assigned to ``armature`` with its slot.
+
+    The object follows the root (location and heading), each bone turns, and the pelvis moves: bone lengths are constant, so
+    all 22 bone heads lie on ``take.joints``. ``unit`` is the length of a Blender unit in metres. Earlier actions are kept by
+    a fake user, and keys of the ``dafnet`` settings (the mode) are carried over to the new action.
+
+    ``InputError``: the armature is linked, overridden, parented, constrained, edited, or its size differs from the take's;
+    nothing is changed then.
+    """
+    scale = require_bakeable(armature, unit)
+    if abs(scale - take.scale) > 1e-3 * take.scale:
+        raise InputError(f"The character '{armature.name}' changed its size since the take was generated; generate it again.")
+    if not all(np.isfinite(values).all() for values in (take.joints, take.rotations, take.root)):
+        raise InputError("The take holds values that are not numbers; generate it again.")
+
+    frames = frame_start + np.arange(len(take), dtype=float)
+    to_root = transpose(take.root[:, :3, :3])
+    heading = np.unwrap(np.arctan2(-take.root[:, 0, 1], take.root[:, 1, 1])) + np.pi
+    pelvis = rotate(FACING @ to_root, take.joints[:, 0] - take.root[:, :3, 3]) / (unit * armature.scale[0])
+    local = matrix_from_quaternion(take.rotations)
+    local[:, 0] = to_root @ local[:, 0]
+
+    previous = armature.animation_data.action if armature.animation_data else None
+    carried = [curve for curve in action_curves(armature) if curve.data_path.startswith("dafnet.")]
+    action, add_curve = new_action(armature, name)
+    action.use_fake_user = True
+    _key(add_curve, "location", "Root", frames, take.root[:, :3, 3] / unit)
+    _key(add_curve, "rotation_euler", "Root", frames, np.stack([0 * heading, 0 * heading, heading], axis=1))
+    for j, joint_name in enumerate(JOINTS):
+        rest = np.array(armature.data.bones[joint_name].matrix_local)
+        axes = FACING @ rest[:3, :3]
+        quaternions = continuous_signs(quaternion_from_matrix(axes.T @ local[:, j] @ axes))
+        path = f'pose.bones["{joint_name}"].'
+        if j == 0:
+            _key(add_curve, path + "location", joint_name, frames, (pelvis - rest[:3, 3]) @ rest[:3, :3])
+        _key(add_curve, path + "rotation_quaternion", joint_name, frames, quaternions)
+    for curve in carried:
+        _copy(curve, add_curve(curve.data_path, curve.array_index, "DAFNet"))
+
+    if previous:
+        previous.use_fake_user = True
+    armature.rotation_mode = "XYZ"
+    for joint_name in JOINTS:
+        armature.pose.bones[joint_name].rotation_mode = "QUATERNION"
+    assign_action(armature, action)
+    return action
+
+
+def _key(
+    add_curve: Callable[[str, int, str], bpy.types.FCurve], path: str, group: str, frames: np.ndarray, values: np.ndarray,
+) -> None:
+    """One linear curve for each column of ``values`` (T, D)."""
+    for index, column in enumerate(values.T):
+        curve = add_curve(path, index, group)
+        points = curve.keyframe_points
+        points.add(len(frames))
+        points.foreach_set("co", np.stack([frames, column], axis=1).ravel())
+        points.foreach_set("interpolation", np.full(len(frames), _LINEAR))
+        curve.update()
+
+
+def _copy(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
+    target.extrapolation = source.extrapolation
+    target.keyframe_points.add(len(source.keyframe_points))
+    for old, new in zip(source.keyframe_points, target.keyframe_points, strict=True):
+        new.co, new.interpolation = old.co, old.interpolation
+        new.handle_left, new.handle_right = old.handle_left, old.handle_right
+    target.update()
+
+
+_LINEAR = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEAR"].value

@@ -1,0 +1,65 @@
+"""Everything in which Blender 4.2, 4.5, 5.0 and 5.2 differ for this add-on.
+
+Actions have slots from 4.4 on, and ``Action.fcurves`` is gone in 5.0; EEVEE changed its name twice; video is a media type of
+its own from 5.0 on.
+"""
+
+from collections.abc import Callable
+
+import bpy
+
+__all__ = ["EEVEE", "new_action", "assign_action", "action_curves", "output_video"]
+
+_SLOTS = bpy.app.version >= (4, 4, 0)
+
+EEVEE = "BLENDER_EEVEE" if bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT"
+"""Identifier of the EEVEE render engine."""
+
+
+def new_action(owner: bpy.types.Object, name: str) -> tuple[bpy.types.Action, Callable[[str, int, str], bpy.types.FCurve]]:
+    """A new action for ``owner``, not yet assigned, and a function (data path, index, group) that adds a curve to it."""
+    action = bpy.data.actions.new(name)
+    if _SLOTS:
+        slot = action.slots.new(id_type="OBJECT", name=owner.name)
+        curves = action.layers.new("Layer").strips.new(type="KEYFRAME").channelbag(slot, ensure=True)
+    else:
+        curves = action
+
+    def add(path: str, index: int, group: str) -> bpy.types.FCurve:
+        curve = curves.fcurves.new(path, index=index)
+        curve.group = curves.groups.get(group) or curves.groups.new(group)
+        return curve
+
+    return action, add
+
+
+def assign_action(owner: bpy.types.Object, action: bpy.types.Action) -> None:
+    """Let ``owner`` play ``action``; a slot that is not assigned plays nothing."""
+    data = owner.animation_data_create()
+    data.action = action
+    if _SLOTS:
+        data.action_slot = action.slots[0]
+
+
+def action_curves(owner: bpy.types.Object) -> list[bpy.types.FCurve]:
+    """The curves of the action that ``owner`` plays."""
+    data = owner.animation_data
+    if data is None or data.action is None:
+        return []
+    if not _SLOTS:
+        return list(data.action.fcurves)
+    if data.action_slot is None:
+        return []
+    bags = (strip.channelbag(data.action_slot) for layer in data.action.layers for strip in layer.strips)
+    return [curve for bag in bags if bag for curve in bag.fcurves]
+
+
+def output_video(scene: bpy.types.Scene) -> None:
+    """Let the scene render to an H.264 MP4 file."""
+    image = scene.render.image_settings
+    if hasattr(image, "media_type"):
+        image.media_type = "VIDEO"
+    image.file_format = "FFMPEG"
+    scene.render.ffmpeg.format = "MPEG4"
+    scene.render.ffmpeg.codec = "H264"
+    scene.render.ffmpeg.constant_rate_factor = "HIGH"
