@@ -1,27 +1,34 @@
 """From bones to joints and back: forward kinematics, two-bone limbs, and rotations fitted to generated positions.
 
-A joint's frame places its children: ``child = joint + frame @ OFFSETS[child] * scale``. The identity in every global frame
-is the rest pose, a T-pose that looks along +y.
+A joint's frame places its children: ``child = joint + frame @ OFFSETS[child] * scale``. The identity in every global
+frame is the rest pose, a T-pose that looks along +y.
 """
 
 import numpy as np
 
-from .rotations import (
-    frame_from, matrix_from_quaternion, normalised, quaternion_from_matrix, rotate, rotation_between, slerp, transpose,
-)
 from .root import RootPath, to_root, to_world
+from .rotations import (
+    frame_from,
+    matrix_from_quaternion,
+    normalised,
+    quaternion_from_matrix,
+    rotate,
+    rotation_between,
+    slerp,
+    transpose,
+)
 from .skeleton import OFFSETS, PARENTS, joint
 
 __all__ = ["forward_kinematics", "global_from_local", "local_from_global", "two_bone", "fit", "blend_switches"]
 
-# Limbs in one order: left and right arm, left and right leg. The rest pose is straight along _AXIS, and the middle joint
-# leaves that line along _BEND: elbows go backward, knees forward.
+# Limbs in one order: left and right arm, left and right leg. The rest pose is straight along _AXIS, and the middle
+# joint leaves that line along _BEND: elbows go backward, knees forward.
 _PARENT, _FIRST, _MIDDLE, _END = [13, 14, 0, 0], [16, 17, 1, 2], [18, 19, 4, 5], [20, 21, 7, 8]
 _AXIS = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 0, -1], [0, 0, -1]])
 _BEND = np.array([[0.0, -1, 0], [0, -1, 0], [0, 1, 0], [0, 1, 0]])
 
-_CLEAR_BEND = 0.15  # a limb bent by this (radians) shows its plane about as clearly as its neighbours in time tell it
-_CARRY, _PULL = 2.0, 0.02  # weights of the neighbouring frames and of the parent's reference, against 1 at a clear bend
+_CLEAR_BEND = 0.25  # a limb bent by this (radians) shows its plane about as clearly as its neighbours in time tell it
+_CARRY, _PULL = 4.0, 0.05  # weights of the neighbouring frames and of the parent's reference, against 1 at a clear bend
 
 _HAND_REST = {  # columns: x, the fingers' direction, the back of the hand; as they lie in the rest pose
     "left_wrist": np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]),
@@ -39,7 +46,7 @@ def forward_kinematics(rotations: np.ndarray, pelvis: np.ndarray, scale: float =
 
 
 def global_from_local(local: np.ndarray) -> np.ndarray:
-    """Global joint frames (T, 22, 3, 3) of frames given in their parents' frames; the pelvis' is in the world in both."""
+    """Global joint frames (T, 22, 3, 3) of frames in their parents' frames; the pelvis' is in the world in both."""
     frames = np.empty_like(local)
     frames[..., 0, :, :] = local[..., 0, :, :]
     for j in range(1, len(PARENTS)):
@@ -58,17 +65,17 @@ def two_bone(
     root: np.ndarray, target: np.ndarray, pole: np.ndarray, length1: np.ndarray | float, length2: np.ndarray | float,
     fallback: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Middle and end joint (…, 3) of limbs from ``root`` to ``target``, the middle joint bent towards the point ``pole``.
+    """Middle and end joint (…, 3) of limbs from ``root`` to ``target``, bent towards the point ``pole``.
 
-    The end lies on the target wherever the bone lengths reach it, else as near as they allow. Where the pole lies on the line
-    from root to target, the limb bends along the direction ``fallback`` (…, 3) if given, else as in the last frame (first
-    axis) in which the pole was clear, else anywhere.
+    The end lies on the target wherever the bone lengths reach it, else as near as they allow. Where the pole lies on
+    the line from root to target, the limb bends along the direction ``fallback`` (…, 3) if given, else as in the last
+    frame (first axis) in which the pole was clear, else anywhere.
     """
     root, target, pole = np.broadcast_arrays(root, target, pole)
     length1, length2 = np.asarray(length1, float)[..., None], np.asarray(length2, float)[..., None]
     reach = length1 + length2
     distance = np.linalg.norm(target - root, axis=-1, keepdims=True)
-    distance = np.clip(distance, np.abs(length1 - length2) + 1e-9 * reach, (1.0 - 1e-9) * reach)
+    distance = np.clip(distance, np.abs(length1 - length2) + 1e-12 * reach, (1.0 - 1e-12) * reach)
     along = normalised(target - root, np.array([0.0, 0.0, -1.0]))
     bend = _across(pole - root, along)
     clear = np.linalg.norm(bend, axis=-1, keepdims=True) > 1e-6 * reach
@@ -103,14 +110,14 @@ def fit(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pelvis (T, 3) and global joint frames (T, 22, 3, 3) of the body whose bones fit world joints (T, 22, 3) best.
 
-    Bone lengths are those of the canonical body times ``scale``. The pelvis is exact, and so are ankles and wrists wherever
-    the limbs reach them. Pelvis from hips and spine1, chest from collars and neck, limbs twisted by the planes of elbows and
-    knees; a limb too straight to show its plane takes it from its neighbours in time and from its parent. Elbows and knees
-    are hinges. Frames follow one another without a pop as long as the joints do.
+    Bone lengths are those of the canonical body times ``scale``. The pelvis is exact, and so are ankles and wrists
+    wherever the limbs reach them. Pelvis from hips and spine1, chest from collars and neck, limbs twisted by the planes
+    of elbows and knees; a limb too straight to show its plane takes it from its neighbours in time and from its parent.
+    Elbows and knees are hinges. Frames follow one another without a pop as long as the joints do.
 
-    ``head_rotation`` (T, 3, 3): world axes, y where the face looks, z the crown. ``hand_…_rotation`` (T, 3, 3): y where the
-    fingers point, z the back of the hand. Head and hands follow their parents where the argument is missing or NaN; toes
-    always follow the foot.
+    ``head_rotation`` (T, 3, 3): world axes, y where the face looks, z the crown. ``hand_…_rotation`` (T, 3, 3): y where
+    the fingers point, z the back of the hand. Head and hands follow their parents where the argument is missing or NaN;
+    toes always follow the foot.
     """
     joints = np.asarray(joints, float)
     position = joints.copy()
@@ -121,7 +128,7 @@ def fit(
         position[:, child] = position[:, parent] + frame[:, parent] @ (scale * OFFSETS[child])
 
     def aim(at: int, child: int, base: np.ndarray) -> None:
-        """Frame of joint ``at`` nearest to ``base`` whose bone to ``child`` points at the child's generated position."""
+        """Frame of joint ``at``, nearest to ``base``, whose bone points at the child's generated position."""
         frame[:, at] = rotation_between(base @ OFFSETS[child], joints[:, child] - position[:, at]) @ base
         place(child)
 
@@ -153,7 +160,7 @@ def fit(
 
 
 def _aligned(joints: np.ndarray, center: int, children: list[int]) -> np.ndarray:
-    """Rotation (T, 3, 3) that carries the children's rest offsets nearest to where they lie (least squares; Kabsch 1976)."""
+    """Rotation (T, 3, 3) that carries the children's rest offsets nearest to where they lie (Kabsch 1976)."""
     u, _, vt = np.linalg.svd(np.swapaxes(joints[:, children] - joints[:, center, None], 1, 2) @ OFFSETS[children])
     u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
     return u @ vt
@@ -165,7 +172,7 @@ def _between(a: np.ndarray, b: np.ndarray, t: float) -> np.ndarray:
 
 
 def _where_given(axes: np.ndarray, rest: np.ndarray, fallback: np.ndarray) -> np.ndarray:
-    """Global frames of a joint whose axes are asked for and lie as ``rest`` in the rest pose; ``fallback`` where NaN."""
+    """Global frames of a joint whose asked axes lie as ``rest`` in the rest pose; ``fallback`` where NaN."""
     free = ~np.isfinite(axes).all(axis=(1, 2))[:, None, None]
     asked = np.where(free, np.eye(3), axes)
     return np.where(free, fallback, frame_from(asked[..., 1], asked[..., 2], "yz") @ rest.T)
@@ -189,10 +196,10 @@ def _limbs(
 def _bend_direction(offset: np.ndarray, along: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """Unit directions (T, L, 3) in which the middle joints leave their limbs' lines, steady in time.
 
-    ``offset`` (T, L, 3): the middle joint off the line, over the bone length. Its direction, as a point on the unit circle
-    around ``along``, is smoothed by least squares: every frame holds to its own with a weight that grows steeply with the
-    bend and fades where it opposes the reference (a knee or elbow bent the wrong way by noise), to its neighbours, and
-    faintly to ``reference``.
+    ``offset`` (T, L, 3): the middle joint off the line, over the bone length. Its direction, as a point on the unit
+    circle around ``along``, is smoothed by least squares: every frame holds to its own with a weight that grows steeply
+    with the bend and fades where it opposes the reference (a knee or elbow bent the wrong way by noise), to its
+    neighbours, and faintly to ``reference``.
     """
     size = np.linalg.norm(offset, axis=-1)
     seen = (offset * reference).sum(-1) + 1j * (offset * np.cross(along, reference)).sum(-1)
@@ -225,10 +232,10 @@ def blend_switches(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Ease the jump where the mode changes: local quaternions (T, 22, 4) and pelvis (T, 3), both again.
 
-    At a switch frame s the pose before it (s - 1) and the new one differ by one rotation a bone; the new motion starts with
-    that difference added to it, which then fades by slerp over ``length`` frames with smoothstep((k + 1) / (length + 1)) at
-    frame s + k. So the body keeps moving through the switch, where blending from a frozen pose would halt its stride. The
-    pelvis' rotation and offset are eased in the frames of the root ``path``, which itself stays as it is.
+    At a switch frame s the pose before it (s - 1) and the new one differ by one rotation a bone; the new motion starts
+    with that difference added to it, which then fades by slerp over ``length`` frames with smoothstep((k + 1) / (length
+    + 1)) at frame s + k. So the body keeps moving through the switch, where blending from a frozen pose would halt its
+    stride. The pelvis' rotation and offset are eased in the frames of the root ``path``, which itself stays as it is.
     """
     local = matrix_from_quaternion(rotations)
     local[:, 0] = transpose(path.rotation) @ local[:, 0]
