@@ -1,0 +1,102 @@
+"""What the sensor's spheres see of the furniture along a root path, and the distance of any points to it.
+
+Paper, section 4.1: a sphere's occupancy is 0 where nothing is within it, 1 where its centre is inside a solid, and in
+between it falls with the distance from its centre to the solid.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from .distance import BAND, FLOOR, grid_of, rigid_split
+from .errors import InputError
+from .root import RootPath
+from .rotations import rotate, transpose
+from .sensor import HEIGHT, RADIUS, REACH, SPHERES, occupancy_of_distance
+from .solids import Box, Scene, box_distance
+
+__all__ = ["occupancy", "distance"]
+
+_FRAMES_AT_ONCE = 32
+
+
+@dataclass(frozen=True)
+class _Field:
+    """One solid over T frames, in whose own frame ``measure`` gives the distance of points (N, 3).
+
+    ``rotation`` (T, 3, 3), ``position`` (T, 3): its rigid frames. ``present`` (T,): where it is more than floor.
+    ``low``, ``high`` (3,): outside this box every distance is beyond the reach.
+    """
+
+    rotation: np.ndarray
+    position: np.ndarray
+    present: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    measure: Callable[[np.ndarray], np.ndarray]
+
+
+def _fields(scene: Scene, floor: np.ndarray, reach: float) -> Iterator[_Field]:
+    frames = len(floor)
+    for solid in scene.solids:
+        matrices = solid.matrices() if isinstance(solid, Box) else rigid_split(solid.matrix)[0]
+        if matrices.ndim == 3 and len(matrices) not in (1, frames):
+            raise InputError(
+                f"'{solid.name}' has {len(matrices)} frames and the root {frames}; give it one matrix or one a frame."
+            )
+        matrices = np.broadcast_to(matrices, (frames, 4, 4))
+        rotation, position = matrices[:, :3, :3], matrices[:, :3, 3]
+        if isinstance(solid, Box):
+            half = np.asarray(solid.half_size, float)
+            top = position[:, 2] + np.abs(rotation[:, 2]) @ half
+            present = top > floor + FLOOR
+            measure = partial(box_distance, half_size=half)
+            yield _Field(rotation, position, present, -half - reach, half + reach, measure)
+        else:
+            grid = grid_of(solid, float(np.median(floor)))
+            low, high = grid.bounds(min(reach, 0.999 * grid.truncation))
+            if (low < high).all():
+                yield _Field(rotation, position, np.ones(frames, bool), low, high, grid.sample)
+
+
+def occupancy(scene: Scene, path: RootPath) -> np.ndarray:
+    """Occupancy (T, 2640) float32 of the sensor on every frame of ``path``, the largest over all solids.
+
+    Solids are static or have one matrix for each frame of the path. The sensor has the canonical body's size: for
+    another body, scale scene (``distance.scaled``) and path first. Surfaces within 5 cm of the floor are not seen
+    (``distance.build_grid``). Raises InputError where a solid's frames are not the path's.
+    """
+    out = np.zeros((len(path), len(SPHERES)), np.float32)
+    centres = SPHERES.T.astype(np.float32)
+    for field in _fields(scene, path.position[:, 2], RADIUS):
+        inverse = transpose(field.rotation)
+        turn, shift = inverse @ path.rotation, rotate(inverse, path.position - field.position)
+        middle = shift + turn[:, :, 2] * (HEIGHT / 2) - (field.low + field.high) / 2
+        gap = box_distance(middle, (field.high - field.low) / 2)
+        seen = np.flatnonzero(field.present & (gap < np.hypot(REACH, HEIGHT / 2)))
+        turn, shift = turn.astype(np.float32), shift.astype(np.float32)
+        for k in range(0, len(seen), _FRAMES_AT_ONCE):
+            frames = seen[k : k + _FRAMES_AT_ONCE]
+            local = [turn[frames, axis] @ centres + shift[frames, axis, None] for axis in range(3)]
+            sides = zip(local, field.low, field.high, strict=True)
+            near = np.logical_and.reduce([(x > low) & (x < high) for x, low, high in sides])
+            found = occupancy_of_distance(field.measure(np.stack([x[near] for x in local], axis=-1)))
+            row, sphere = np.nonzero(near)
+            at = frames[row], sphere
+            out[at] = np.maximum(out[at], found)
+    return out
+
+
+def distance(scene: Scene, points: np.ndarray, floor: np.ndarray | float) -> np.ndarray:
+    """Signed distance (T, N) of world ``points`` (T, N, 3) to the nearest solid, negative inside, at most ``BAND``.
+
+    ``floor``: height of the root's plane, one number or (T,). Solids as for ``occupancy``, metres.
+    """
+    out = np.full(points.shape[:2], BAND)
+    for field in _fields(scene, np.broadcast_to(np.asarray(floor, float), len(points)), BAND):
+        local = rotate(transpose(field.rotation)[:, None], points - field.position[:, None])
+        near = ((local > field.low) & (local < field.high)).all(axis=-1) & field.present[:, None]
+        out[near] = np.minimum(out[near], field.measure(local[near]))
+    return out
