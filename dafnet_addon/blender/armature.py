@@ -11,7 +11,7 @@ from mathutils import Vector
 from ..core.errors import InputError
 from ..core.skeleton import JOINTS, OFFSETS, PARENTS, REST, STATURE, joint
 
-__all__ = ["FACING", "create_character", "character_scale", "metres_per_unit", "missing_bones"]
+__all__ = ["FACING", "create_character", "character_of", "character_scale", "metres_per_unit", "missing_bones"]
 
 FACING = np.diag([-1.0, -1.0, 1.0])
 """Rotation from the canonical frame to the armature's space; its own inverse."""
@@ -98,6 +98,22 @@ def missing_bones(armature: bpy.types.Object) -> list[str]:
     return [name for name in JOINTS if name not in armature.data.bones]
 
 
+def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The character that the active object is or belongs to: its armature, its body, its root or one of its targets."""
+    active = context.object
+    if active is None:
+        return None
+    if active.type == "ARMATURE":
+        return None if missing_bones(active) else active
+    if active.parent and active.parent.type == "ARMATURE" and not missing_bones(active.parent):
+        return active.parent
+    for candidate in context.scene.objects:
+        own = candidate.dafnet
+        if candidate.type == "ARMATURE" and active in (own.root, own.head, own.hand_left, own.hand_right):
+            return candidate
+    return None
+
+
 def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:
     """Size of the character over the canonical body; ``unit`` is a Blender unit in metres.
 
@@ -113,7 +129,7 @@ def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:
     scale = float((offsets * canonical).sum() / (canonical**2).sum())
     if scale <= 0.0 or np.abs(offsets - scale * canonical).max() > 0.002 * scale:
         raise InputError(f"The bones of '{armature.name}' were moved in edit mode; add a new character and use that one.")
-    size = np.array(armature.scale) * np.array(armature.delta_scale)
+    size = np.array(armature.scale)
     if not np.isfinite(size).all() or size[0] <= 0.0 or np.ptp(size) > 1e-4 * size[0]:
         raise InputError(f"The armature '{armature.name}' is scaled unevenly; set its three scales to the same positive value.")
     return scale * float(size[0]) * unit
@@ -279,7 +295,8 @@ def _material(name: str, colour: tuple[float, float, float, float]) -> bpy.types
         found = bpy.data.materials.new(name)
         found.diffuse_color = colour
         found.roughness = 0.6
-        found.use_nodes = True
+        if found.node_tree is None:  # always there from 5.0 on
+            found.use_nodes = True
         shader = next(node for node in found.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
         shader.inputs["Base Color"].default_value = colour
         shader.inputs["Roughness"].default_value = 0.6

@@ -25,7 +25,7 @@ def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
         raise InputError(f"The armature '{armature.name}' has a parent; clear it, and parent the root object instead.")
     if any(not constraint.mute for constraint in armature.constraints):
         raise InputError(f"The armature '{armature.name}' has object constraints; mute them, and constrain the root instead.")
-    if any(armature.delta_location) or any(armature.delta_rotation_euler):
+    if any(armature.delta_location) or any(armature.delta_rotation_euler) or any(s != 1.0 for s in armature.delta_scale):
         raise InputError(f"The armature '{armature.name}' has delta transforms; apply them and try again.")
     return character_scale(armature, unit)
 
@@ -87,8 +87,8 @@ def _key(
         curve = add_curve(path, index, group)
         points = curve.keyframe_points
         points.add(len(frames))
-        points.foreach_set("co", np.stack([frames, column], axis=1).ravel())
-        points.foreach_set("interpolation", np.full(len(frames), _LINEAR))
+        points.foreach_set("co", np.stack([frames, column], axis=1).astype(np.float32).ravel())
+        points.foreach_set("interpolation", np.full(len(frames), _LINEAR, np.int32))
         curve.update()
 
 

@@ -1,0 +1,321 @@
+"""The scene as plain arrays: evaluated furniture, the root, targets, mode and source pose, frame by frame, in metres.
+
+One unit of Blender is ``metres_per_unit`` metres; everything handed to the core is in metres. The evaluated scene is read, so
+keys, constraints, drivers, modifiers and instances all count; what is hidden in the viewport does not exist.
+"""
+
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..core.errors import InputError
+from ..core.root import POSITION_SIGMA, YAW_SIGMA, root_from_joints, root_from_matrices, smoothed, to_root, to_world
+from ..core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
+from ..core.solids import Mesh, Scene
+from ..core.take import Controls
+from .armature import FACING, metres_per_unit, missing_bones
+from .baker import require_bakeable
+from .compat import action_curves
+from .properties import Settings, find_collection, find_object, find_scene
+
+__all__ = ["ReadScene", "read_steps", "read_scene"]
+
+_BATCH = 16
+_TURNED = np.radians(0.1)
+_TARGETS = {"head": "head target", "hand_left": "left hand target", "hand_right": "right hand target"}
+
+
+@dataclass(frozen=True)
+class ReadScene:
+    """What generation needs: the furniture, the controls at the scene's frame rate, and sentences for the user."""
+
+    scene: Scene
+    controls: Controls
+    warnings: tuple[str, ...]
+
+
+@dataclass
+class _Piece:
+    """One evaluated mesh, an object's own or an instance: where to find it again, its geometry, its matrix per frame."""
+
+    key: tuple
+    name: str
+    source: bpy.types.Object | None
+    vertices: np.ndarray
+    triangles: np.ndarray
+    matrices: list[np.ndarray] = field(default_factory=list)
+
+
+def read_scene(context: bpy.types.Context, settings: Settings) -> ReadScene:
+    """``read_steps`` drained."""
+    steps = read_steps(context, settings)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            return done.value
+
+
+def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[float, None, ReadScene]:
+    """Read the scene; yields progress in [0, 1], at which the current frame is as it was.
+
+    Furniture: every mesh of the collection and of the collections in it, as the viewport evaluates it at the first frame, with
+    its matrix for each frame if it moves; shapes that change over time are warned about. The character, what is parented to
+    it or deformed by it, the root and the targets are never furniture.
+
+    Targets: the empties' places. Their rotations count where they are keyed, or where a target was ever turned in its parent's
+    space; a target that was only moved leaves head and hands free to turn.
+
+    Upper body: the source's bones, carried from the source's root onto this character's and to its size. The source's root is
+    its object if it is one of our characters, else it is found from hips and shoulders.
+
+    ``InputError``: something that is needed is missing, gone, linked, empty or not a number.
+    """
+    scene = find_scene(settings)
+    if context.scene != scene:
+        raise InputError(f"The scene '{settings.scene}' is not the active one; make it active and generate again.")
+    unit = metres_per_unit(scene)
+    armature = find_object(settings, settings.armature, "character")
+    size = require_bakeable(armature, unit)
+    if settings.root is None:
+        raise InputError(f"The character '{armature.name}' has no root; choose its root object in the DAFNet panel.")
+    root = find_object(settings, settings.root, "root")
+    targets = {
+        role: find_object(settings, name, label) for role, label in _TARGETS.items() if (name := getattr(settings, role))
+    }
+    source = _upper_body_source(settings, armature)
+    own = {armature, root, *targets.values(), *armature.children_recursive}
+    collection = find_collection(settings.furniture) if settings.furniture else None
+
+    frames = range(settings.frame_start, settings.frame_end + 1)
+    pieces: list[_Piece] = []
+    modes: list[str] = []
+    tracks: dict[str, list[np.ndarray]] = {name: [] for name in ("root", *targets, *(f"{role} local" for role in targets))}
+    bones: list[np.ndarray] = []
+    bodies: list[np.ndarray] = []
+    for start in range(0, len(frames), _BATCH):
+        with _frame_kept(scene):
+            for frame in frames[start : start + _BATCH]:
+                scene.frame_set(frame)
+                depsgraph = context.evaluated_depsgraph_get()
+                if frame == frames[0] and collection:
+                    pieces = _furniture(depsgraph, collection, armature, own, unit)
+                _follow(depsgraph, pieces)
+                modes.append(settings.mode or armature.evaluated_get(depsgraph).dafnet.mode)
+                tracks["root"].append(_array(root.evaluated_get(depsgraph).matrix_world))
+                for role, target in targets.items():
+                    evaluated = target.evaluated_get(depsgraph)
+                    tracks[role].append(_array(evaluated.matrix_world))
+                    tracks[f"{role} local"].append(_array(evaluated.matrix_local))
+                if source:
+                    evaluated = source.evaluated_get(depsgraph)
+                    bodies.append(_array(evaluated.matrix_world))
+                    bones.append(np.array([evaluated.pose.bones[name].head for name in JOINTS]))
+        yield min(start + _BATCH, len(frames)) / (len(frames) + 1)
+
+    with _frame_kept(scene):
+        warnings = _deforming(context, scene, frames, collection, armature, own, unit, pieces)
+    fps = scene.render.fps / scene.render.fps_base
+    root_matrices = _rigid(np.array(tracks["root"]), unit, f"root '{root.name}'")
+    given: dict[str, np.ndarray] = {}
+    for role, target in targets.items():
+        matrices = _rigid(np.array(tracks[role]), unit, f"{_TARGETS[role]} '{target.name}'")
+        given[role] = matrices[:, :3, 3]
+        if _is_turned(target, np.array(tracks[f"{role} local"])):
+            given[f"{role}_rotation"] = matrices[:, :3, :3]
+    if source and "FULL" in modes:
+        given["upper_body"] = _carried(source, np.array(bones), np.array(bodies), unit, root_matrices, size, fps)
+    elif "FULL" in modes:
+        raise InputError(f"The mode of '{armature.name}' is FULL but it has no source; choose the armature to copy from.")
+    mode = modes[0] if len(set(modes)) == 1 else tuple(modes)
+    controls = Controls(fps=fps, root=root_matrices, mode=mode, scale=size, **given)
+
+    solids = tuple(_solid(piece, unit) for piece in pieces)
+    if collection is None:
+        warnings += ("No furniture is chosen; the character moves on a bare floor.",)
+    yield 1.0
+    return ReadScene(Scene(solids), controls, warnings)
+
+
+@contextmanager
+def _frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
+    """Return to the current frame at the end, whatever happens."""
+    frame, subframe = scene.frame_current, scene.frame_subframe
+    try:
+        yield
+    finally:
+        scene.frame_set(frame, subframe=subframe)
+
+
+def _array(matrix: Matrix) -> np.ndarray:
+    return np.array(matrix, float)
+
+
+def _owner(instance: bpy.types.DepsgraphObjectInstance) -> bpy.types.Object:
+    return (instance.parent or instance.object).original
+
+
+def _key(instance: bpy.types.DepsgraphObjectInstance) -> tuple:
+    """Names one evaluated mesh of the scene, the same in every frame."""
+    place = tuple(instance.persistent_id) if instance.is_instance else ()
+    return (_owner(instance).name_full, instance.object.original.name_full, place)
+
+
+def _meshes(
+    depsgraph: bpy.types.Depsgraph, collection: bpy.types.Collection, armature: bpy.types.Object, own: set[bpy.types.Object],
+) -> Iterator[bpy.types.DepsgraphObjectInstance]:
+    """Every evaluated mesh of the collection that is furniture, instances among them."""
+    members = set(collection.all_objects) - own
+    for instance in depsgraph.object_instances:
+        if instance.object.type != "MESH" or not (instance.is_instance or instance.show_self):
+            continue
+        if _owner(instance) in members and instance.object.original not in own and not _deformed_by(instance.object, armature):
+            yield instance
+
+
+def _deformed_by(candidate: bpy.types.Object, armature: bpy.types.Object) -> bool:
+    return any(m.type == "ARMATURE" and m.object and m.object.original == armature for m in candidate.original.modifiers)
+
+
+def _geometry(evaluated: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (V, 3) and triangles (F, 3) in the object's own space."""
+    mesh = evaluated.to_mesh()
+    try:
+        mesh.calc_loop_triangles()
+        vertices = np.empty(3 * len(mesh.vertices), np.float32)
+        triangles = np.empty(3 * len(mesh.loop_triangles), np.int32)
+        mesh.vertices.foreach_get("co", vertices)
+        mesh.loop_triangles.foreach_get("vertices", triangles)
+    finally:
+        evaluated.to_mesh_clear()
+    return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3)
+
+
+def _furniture(
+    depsgraph: bpy.types.Depsgraph, collection: bpy.types.Collection, armature: bpy.types.Object,
+    own: set[bpy.types.Object], unit: float,
+) -> list[_Piece]:
+    """The collection's meshes with faces; instances of one mesh share its arrays."""
+    shapes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+    pieces: list[_Piece] = []
+    seen = False
+    for instance in _meshes(depsgraph, collection, armature, own):
+        seen = True
+        pointer = instance.object.data.as_pointer()
+        if pointer not in shapes:
+            shapes[pointer] = _geometry(instance.object)
+        vertices, triangles = shapes[pointer]
+        if len(triangles):
+            source = None if instance.is_instance else instance.object.original
+            pieces.append(_Piece(_key(instance), _owner(instance).name, source, vertices, triangles))
+    if not seen:
+        raise InputError(
+            f"The furniture collection '{collection.name}' has no visible mesh; put furniture into it or choose none."
+        )
+    if not pieces:
+        raise InputError(f"The meshes of the furniture collection '{collection.name}' have no faces; give them some.")
+    return pieces
+
+
+def _follow(depsgraph: bpy.types.Depsgraph, pieces: list[_Piece]) -> None:
+    """Add this frame's matrices; an instance that is gone stays where it was."""
+    found: dict[tuple, np.ndarray] = {}
+    if any(piece.source is None for piece in pieces):
+        wanted = {piece.key for piece in pieces if piece.source is None}
+        for instance in depsgraph.object_instances:
+            if instance.is_instance and (key := _key(instance)) in wanted:
+                found[key] = _array(instance.matrix_world)
+    for piece in pieces:
+        if piece.source is not None:
+            piece.matrices.append(_array(piece.source.evaluated_get(depsgraph).matrix_world))
+        else:
+            piece.matrices.append(found[piece.key] if piece.key in found else piece.matrices[-1])
+
+
+def _deforming(
+    context: bpy.types.Context, scene: bpy.types.Scene, frames: range, collection: bpy.types.Collection | None,
+    armature: bpy.types.Object, own: set[bpy.types.Object], unit: float, pieces: list[_Piece],
+) -> tuple[str, ...]:
+    """Warnings about furniture whose shape differs in the middle or at the end of the range."""
+    if collection is None:
+        return ()
+    shapes = {piece.key: piece for piece in pieces}
+    changed: dict[str, None] = {}
+    for frame in dict.fromkeys((frames[len(frames) // 2], frames[-1])):
+        scene.frame_set(frame)
+        for instance in _meshes(context.evaluated_depsgraph_get(), collection, armature, own):
+            piece = shapes.get(_key(instance))
+            if piece is None:
+                continue
+            vertices, _ = _geometry(instance.object)
+            if vertices.shape != piece.vertices.shape or not np.allclose(vertices, piece.vertices, atol=1e-4 / unit):
+                changed[piece.name] = None
+    return tuple(
+        f"The shape of '{name}' changes during the shot; its shape at the first frame is used throughout." for name in changed
+    )
+
+
+def _solid(piece: _Piece, unit: float) -> Mesh:
+    matrices = np.array(piece.matrices)
+    matrices[:, :3] *= unit
+    still = np.allclose(matrices, matrices[0], atol=1e-6)
+    return Mesh(piece.vertices, piece.triangles, matrices[0] if still else matrices, piece.name)
+
+
+def _rigid(matrices: np.ndarray, unit: float, what: str) -> np.ndarray:
+    """Matrices (T, 4, 4) in metres and without scale; x is made to fit y and z."""
+    if not np.isfinite(matrices).all():
+        raise InputError(f"The {what} has a transform that is not a number; clear its transform or fix what drives it.")
+    length = np.linalg.norm(matrices[:, :3, :3], axis=1, keepdims=True)
+    if (length < 1e-9).any():
+        raise InputError(f"The {what} is scaled to zero; give it a scale.")
+    out = matrices.copy()
+    out[:, :3, :3] /= length
+    out[:, :3, 0] = np.cross(out[:, :3, 1], out[:, :3, 2])
+    out[:, :3, 3] *= unit
+    return out
+
+
+def _is_turned(target: bpy.types.Object, local: np.ndarray) -> bool:
+    """Whether a target's rotation is meant: keyed, or anywhere other than its parent's."""
+    if any("rotation" in curve.data_path for curve in action_curves(target)):
+        return True
+    axes = local[:, :3, :3] / np.maximum(np.linalg.norm(local[:, :3, :3], axis=1, keepdims=True), 1e-9)
+    return bool(np.abs(axes - np.eye(3)).max() > _TURNED)
+
+
+def _upper_body_source(settings: Settings, armature: bpy.types.Object) -> bpy.types.Object | None:
+    if settings.upper_body_source is None:
+        return None
+    source = find_object(settings, settings.upper_body_source, "upper body's source")
+    if source.type != "ARMATURE" or source == armature:
+        raise InputError(f"'{source.name}' cannot be the upper body's source; choose another armature than the character.")
+    if missing := missing_bones(source):
+        raise InputError(f"The upper body's source '{source.name}' has no bone '{missing[0]}'; rename its bones as the character's.")
+    return source
+
+
+def _carried(
+    source: bpy.types.Object, heads: np.ndarray, bodies: np.ndarray, unit: float, root: np.ndarray, size: float, fps: float,
+) -> np.ndarray:
+    """Upper body (T, 14, 3) in world metres on this character's root, of the source's bone heads (T, 22, 3) in its own space."""
+    what = f"upper body's source '{source.name}'"
+    if not np.isfinite(heads).all() or not np.isfinite(bodies).all():
+        raise InputError(f"The {what} has a transform that is not a number; clear its transform or fix what drives it.")
+    joints = unit * (np.einsum("tij,tnj->tni", bodies[:, :3, :3], heads) + bodies[:, None, :3, 3])
+    if source.dafnet.root:
+        frames = _rigid(bodies, unit, what)
+        frames[:, :3, :3] = frames[:, :3, :3] @ FACING
+        path, _ = root_from_matrices(frames)
+    else:
+        path = root_from_joints(joints, floor=float(unit * bodies[0, 2, 3]))
+    offsets = joints[:, 1:] - joints[:, list(PARENTS[1:])]
+    upper = [j - 1 for j in UPPER[1:]]
+    lengths = np.linalg.norm(offsets[:, upper], axis=-1).mean(axis=0).sum()
+    ratio = size * np.linalg.norm(OFFSETS[1:][upper], axis=-1).sum() / lengths
+    onto = smoothed(root_from_matrices(root)[0], POSITION_SIGMA * fps / 30.0, YAW_SIGMA * fps / 30.0)
+    return to_world(onto, ratio * to_root(path, joints[:, list(UPPER)]))

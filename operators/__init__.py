@@ -1,0 +1,8 @@
+"""What the animator can do. Operators translate between Blender and the add-on and compute nothing themselves."""
+
+from .add_character import DAFNET_OT_add_character
+from .generate import DAFNET_OT_generate
+
+__all__ = ["CLASSES"]
+
+CLASSES = (DAFNET_OT_add_character, DAFNET_OT_generate)

@@ -1,0 +1,36 @@
+"""Add a character to the scene."""
+
+import bpy
+from bpy.props import FloatProperty, StringProperty
+
+from ..dafnet_addon.blender.armature import create_character
+from ..dafnet_addon.core.skeleton import STATURE
+from .reporting import reported
+
+__all__ = ["DAFNET_OT_add_character"]
+
+
+class DAFNET_OT_add_character(bpy.types.Operator):
+    """Add a character at the 3D cursor: an armature with a body, and the empties that direct it"""
+
+    bl_idname = "dafnet.add_character"
+    bl_label = "Add Character"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(name="Name", default="Character", description="Name of the character and of its collection")
+    height: FloatProperty(
+        name="Height", default=STATURE, min=0.5, soft_min=1.4, soft_max=2.1, max=4.0, description="Crown to sole, in metres",
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """A new armature needs object mode."""
+        cls.poll_message_set("Leave the current mode for object mode first")
+        return context.mode == "OBJECT"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Add it."""
+        with reported(self):
+            create_character(context, self.name, self.height)
+            return {"FINISHED"}
+        return {"CANCELLED"}

@@ -1,0 +1,71 @@
+"""The one tab in the 3D view's sidebar."""
+
+import bpy
+
+from ..dafnet_addon.blender.armature import character_of
+from ..dafnet_addon.blender.compat import action_curves
+from ..operators.add_character import DAFNET_OT_add_character
+from ..operators.generate import DAFNET_OT_generate
+
+__all__ = ["DAFNET_PT_character"]
+
+
+class DAFNET_PT_character(bpy.types.Panel):
+    """Settings of the active character, and Generate"""
+
+    bl_label = "DAFNet"
+    bl_idname = "DAFNET_PT_character"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "DAFNet"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the settings of the active character, or the way to get one."""
+        layout = self.layout
+        character = character_of(context)
+        if character is None:
+            layout.label(text="No character is selected", icon="INFO")
+            layout.operator(DAFNET_OT_add_character.bl_idname, icon="ARMATURE_DATA")
+            return
+
+        settings = character.dafnet
+        layout.label(text=character.name, icon="ARMATURE_DATA")
+        layout.row(align=True).prop(settings, "mode", expand=True)
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        animated = any(curve.data_path == "dafnet.mode" for curve in action_curves(character))
+
+        column = layout.column()
+        column.prop(settings, "furniture")
+        column.prop(settings, "root", icon="EMPTY_ARROWS")
+        if settings.mode == "EE" or animated:
+            column = layout.column(heading="Targets")
+            column.prop(settings, "head")
+            column.prop(settings, "hand_left")
+            column.prop(settings, "hand_right")
+        if settings.mode == "FULL" or animated:
+            layout.prop(settings, "upper_body_source", icon="ARMATURE_DATA")
+
+        column = layout.column(align=True)
+        column.prop(settings, "use_scene_range")
+        if not settings.use_scene_range:
+            column.prop(settings, "frame_start")
+            column.prop(settings, "frame_end")
+
+        column = layout.column()
+        column.prop(settings, "temperature", slider=True)
+        column.prop(settings, "seed")
+        row = column.row(heading="Vary the Legs")
+        row.prop(settings, "use_lower_seed", text="")
+        legs = row.row()
+        legs.active = settings.use_lower_seed
+        legs.prop(settings, "lower_seed", text="")
+
+        if DAFNET_OT_generate.progress is None:
+            row = layout.row()
+            row.scale_y = 1.5
+            row.operator(DAFNET_OT_generate.bl_idname, icon="PLAY")
+            layout.operator(DAFNET_OT_add_character.bl_idname, icon="ADD")
+        else:
+            percent = f"{100 * DAFNET_OT_generate.progress:.0f} %, Esc cancels"
+            layout.progress(factor=DAFNET_OT_generate.progress, text=percent)

@@ -1,0 +1,69 @@
+"""Paths for all tests, and a real Blender with the extension enabled for those that ask for it.
+
+Core tests need NumPy alone. Tests of the Blender side use the fixture ``blender``, which enables this working tree as an extension
+in a fresh user profile, and an empty scene for each test; they are skipped where no ``bpy`` module is installed.
+"""
+
+import importlib
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).absolute().parents[1]
+EXTENSION = "bl_ext.user_default.dafnet"
+
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+if "bpy" not in sys.modules:
+    os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="dafnet_tests_")
+
+_state = {"enabled": False, "status": 0}
+
+
+@pytest.fixture(scope="session")
+def extension() -> Iterator[str]:
+    """Name of the enabled extension's package."""
+    bpy = pytest.importorskip("bpy")
+    import addon_utils
+
+    link = Path(bpy.utils.user_resource("EXTENSIONS", path="user_default", create=True), "dafnet")
+    if not link.exists():
+        link.symlink_to(ROOT, target_is_directory=True)
+    addon_utils.extensions_refresh(ensure_wheels=True)
+    assert bpy.ops.preferences.addon_enable(module=EXTENSION) == {"FINISHED"}
+    _state["enabled"] = True
+    yield EXTENSION
+    addon_utils.disable(EXTENSION)
+
+
+@pytest.fixture
+def blender(extension: str) -> ModuleType:
+    """The module ``bpy`` with an empty scene and the extension enabled."""
+    import bpy
+
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    return bpy
+
+
+@pytest.fixture
+def addon(extension: str):  # noqa: ANN201
+    """Import a module of the extension by its path in the repository, as ``addon("dafnet_addon.blender.baker")``."""
+    return lambda name: importlib.import_module(f"{extension}.{name}")
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    _state["status"] = int(exitstatus)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Blender may crash or hang when Python ends with its module loaded: leave at once, with pytest's own status."""
+    if "bpy" in sys.modules and _state["enabled"]:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(_state["status"])

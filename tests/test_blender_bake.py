@@ -1,0 +1,209 @@
+"""Character and baker: what plays in Blender is the take, at any frame rate, and nothing that was there is lost."""
+
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+
+def made_take(addon, frames: int = 40, fps: float = 30.0, scale: float = 1.0, seed: int = 0):
+    """A take of smooth random rotations on a curved root path that turns more than once."""
+    rotations = addon("dafnet_addon.core.rotations")
+    root = addon("dafnet_addon.core.root")
+    skeleton = addon("dafnet_addon.core.skeleton")
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0.0, 1.0, frames)[:, None, None]
+    q = rotations.normalised(rng.normal(size=(22, 4)) * (1 - t) + rng.normal(size=(22, 4)) * t)
+    q = rotations.continuous_signs(q)
+    yaw = np.linspace(-1.0, 8.0, frames)
+    path = root.RootPath(np.stack([2 * np.cos(yaw / 3), yaw, 0.3 * yaw / yaw.max()], axis=1), yaw)
+    local = rotations.matrix_from_quaternion(q)
+    frame, joints = np.empty((frames, 22, 3, 3)), np.empty((frames, 22, 3))
+    frame[:, 0], joints[:, 0] = local[:, 0], path.position + np.array([0.02, -0.1, 0.9 * scale])
+    for j in range(1, 22):
+        parent = skeleton.PARENTS[j]
+        frame[:, j] = frame[:, parent] @ local[:, j]
+        joints[:, j] = joints[:, parent] + frame[:, parent] @ (scale * skeleton.OFFSETS[j])
+    take = addon("dafnet_addon.core.take").Take
+    return take(
+        fps=fps, joints=joints, rotations=q, root=path.matrices(), action=np.zeros((frames, 10)), scale=scale,
+        poses=np.zeros((frames, 66)), path=path,
+    )
+
+
+def bone_heads(bpy: ModuleType, addon, armature, frame: int, subframe: float = 0.0) -> np.ndarray:
+    """World heads (22, 3) of the evaluated bones, in the order of the joints."""
+    bpy.context.scene.frame_set(frame, subframe=subframe)
+    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    joints = addon("dafnet_addon.core.skeleton").JOINTS
+    return np.array([evaluated.matrix_world @ evaluated.pose.bones[name].head for name in joints])
+
+
+def character(bpy: ModuleType, addon, **options):
+    return addon("dafnet_addon.blender.armature").create_character(bpy.context, "Ann", **options)
+
+
+def test_character_stands_in_the_rest_pose(blender, addon) -> None:
+    skeleton = addon("dafnet_addon.core.skeleton")
+    blender.context.scene.cursor.location = (1.0, 2.0, 0.5)
+    ann = character(blender, addon, height=1.4)
+    heads = bone_heads(blender, addon, ann, 1)
+    assert sorted(bone.name for bone in ann.data.bones) == sorted(skeleton.JOINTS)
+    assert np.abs(heads - (0.8 * skeleton.REST + np.array([1.0, 2.0, 0.5]))).max() < 1e-5, "looks along +y, left at -x"
+    assert ann.data.bones["left_wrist"].head_local.x > 0.0, "the rig itself looks along -y, left at +x"
+    for bone in ann.data.bones:
+        assert bone.length > 0.04 * 0.8
+    assert tuple(ann.scale) == (1.0, 1.0, 1.0)
+    assert ann.dafnet.root.location == blender.context.scene.cursor.location
+    assert None not in (ann.dafnet.head, ann.dafnet.hand_left, ann.dafnet.hand_right)
+
+
+def test_body_is_a_closed_person_of_the_stature(blender, addon) -> None:
+    ann = character(blender, addon, height=1.6)
+    body = next(child for child in ann.children if child.type == "MESH")
+    points = np.array([v.co for v in body.data.vertices])
+    assert np.ptp(points[:, 2]) == pytest.approx(1.6, abs=0.01)
+    assert points[:, 2].min() == pytest.approx(0.0, abs=0.003)
+    assert all(len(v.groups) == 1 and v.groups[0].weight == 1.0 for v in body.data.vertices)
+    assert {group.name for group in body.vertex_groups} == {bone.name for bone in ann.data.bones}
+    edges: dict[tuple[int, int], int] = {}
+    for face in body.data.polygons:
+        for edge in face.edge_keys:
+            edges[edge] = edges.get(edge, 0) + 1
+    assert set(edges.values()) == {2}
+    outward = 0
+    for group in body.vertex_groups:
+        members = {v.index for v in body.data.vertices if v.groups[0].group == group.index}
+        faces = [f for f in body.data.polygons if f.vertices[0] in members]
+        volume = sum(np.dot(f.center, f.normal) * f.area for f in faces) / 3.0
+        outward += volume > 0.0
+    assert outward == 22, "every part has its faces outward"
+
+
+@pytest.mark.parametrize(("fps", "base"), [(24, 1.0), (25, 1.0), (30, 1.001), (60, 1.0)])
+def test_bone_heads_play_the_joints(blender, addon, fps: int, base: float) -> None:
+    scene = blender.context.scene
+    scene.render.fps, scene.render.fps_base = fps, base
+    ann = character(blender, addon)
+    take = made_take(addon, fps=fps / base)
+    addon("dafnet_addon.blender.baker").bake(take, ann, 7, "Walk")
+    for i in range(len(take)):
+        assert np.abs(bone_heads(blender, addon, ann, 7 + i) - take.joints[i]).max() < 1e-3
+    assert (scene.render.fps, scene.render.fps_base) == (fps, pytest.approx(base))
+
+
+@pytest.mark.parametrize(("unit", "height", "object_scale"), [(0.01, 1.75, 1.0), (1.0, 1.4, 1.0), (1.0, 1.75, 1.3), (0.5, 1.9, 0.7)])
+def test_units_and_sizes(blender, addon, unit: float, height: float, object_scale: float) -> None:
+    blender.context.scene.unit_settings.scale_length = unit
+    ann = character(blender, addon, height=height)
+    ann.scale = (object_scale,) * 3
+    size = addon("dafnet_addon.blender.armature").character_scale(ann, unit)
+    assert size == pytest.approx(object_scale * height / 1.75, rel=1e-5)
+    take = made_take(addon, scale=size)
+    addon("dafnet_addon.blender.baker").bake(take, ann, 1, "Walk", unit)
+    for i in (0, 11, len(take) - 1):
+        assert np.abs(unit * bone_heads(blender, addon, ann, 1 + i) - take.joints[i]).max() < 1e-3
+
+
+def test_bones_may_have_other_rolls_and_tails(blender, addon) -> None:
+    ann = character(blender, addon)
+    blender.ops.object.mode_set(mode="EDIT")
+    for k, bone in enumerate(ann.data.edit_bones):
+        bone.roll += 0.3 * k
+    ann.data.edit_bones["head"].tail.y -= 0.1
+    blender.ops.object.mode_set(mode="OBJECT")
+    take = made_take(addon)
+    addon("dafnet_addon.blender.baker").bake(take, ann, 1, "Walk")
+    assert np.abs(bone_heads(blender, addon, ann, 20) - take.joints[19]).max() < 1e-3
+
+
+def test_it_is_smooth_between_frames(blender, addon) -> None:
+    """Quaternions and the heading keep their signs, so half-way poses lie between their neighbours."""
+    ann = character(blender, addon)
+    take = made_take(addon)
+    addon("dafnet_addon.blender.baker").bake(take, ann, 1, "Walk")
+    for i in range(len(take) - 1):
+        heads = bone_heads(blender, addon, ann, 1 + i, 0.5)
+        assert np.linalg.norm(heads - 0.5 * (take.joints[i] + take.joints[i + 1]), axis=1).max() < 0.06
+
+
+def test_every_take_is_kept_and_mode_keys_stay(blender, addon) -> None:
+    bake = addon("dafnet_addon.blender.baker").bake
+    compat = addon("dafnet_addon.blender.compat")
+    ann = character(blender, addon)
+    ann.dafnet.mode = "FREE"
+    ann.dafnet.keyframe_insert("mode", frame=1)
+    ann.dafnet.mode = "EE"
+    ann.dafnet.keyframe_insert("mode", frame=20)
+    mine = ann.animation_data.action
+    first = bake(made_take(addon, seed=1), ann, 1, "Take")
+    second = bake(made_take(addon, seed=2), ann, 1, "Take")
+    assert len({mine.name, first.name, second.name}) == 3
+    assert ann.animation_data.action == second
+    assert all(action.use_fake_user for action in (mine, first, second))
+    assert [(p.co[0], p.co[1]) for c in compat.action_curves(ann) if c.data_path == "dafnet.mode" for p in c.keyframe_points] == [
+        (1.0, 0.0), (20.0, 1.0),
+    ]
+    compat.assign_action(ann, first)
+    assert np.abs(bone_heads(blender, addon, ann, 5) - made_take(addon, seed=1).joints[4]).max() < 1e-3
+
+
+def test_what_cannot_be_baked_is_refused_and_left_alone(blender, addon, tmp_path) -> None:
+    bake = addon("dafnet_addon.blender.baker").bake
+    error = addon("dafnet_addon.core.errors").InputError
+    take = made_take(addon, frames=3)
+    ann = character(blender, addon)
+
+    def refused(match: str, character=ann, take=take) -> None:
+        actions = set(blender.data.actions)
+        with pytest.raises(error, match=match):
+            bake(take, character, 1, "Walk")
+        assert set(blender.data.actions) == actions
+        assert character.animation_data is None
+
+    ann.scale = (1.0, 1.0, 2.0)
+    refused("unevenly")
+    ann.scale = (1.2, 1.2, 1.2)
+    refused("size")
+    ann.scale = (1.0, 1.0, 1.0)
+    ann.parent = ann.dafnet.root
+    refused("parent")
+    ann.parent = None
+    constraint = ann.constraints.new("COPY_LOCATION")
+    refused("constraints")
+    constraint.mute = True
+    ann.delta_location.x = 1.0
+    refused("delta")
+    ann.delta_location.x = 0.0
+    refused("armature", character=ann.dafnet.root)
+    joints = take.joints.copy()
+    joints[1, 3, 0] = np.nan
+    refused("not numbers", take=made_take(addon, frames=3).__class__(**{**vars(take), "joints": joints}))
+
+    blender.context.view_layer.objects.active = ann
+    blender.ops.object.mode_set(mode="EDIT")
+    refused("edit mode")
+    ann.data.edit_bones["left_knee"].tail.z -= 0.1
+    ann.data.edit_bones["left_ankle"].head.z -= 0.1
+    blender.ops.object.mode_set(mode="OBJECT")
+    refused("were moved")
+
+    library = str(tmp_path / "library.blend")
+    blender.data.libraries.write(library, {ann})
+    blender.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with blender.data.libraries.load(library, link=True) as (_, wanted):
+        wanted.objects = ["Ann"]
+    linked = wanted.objects[0]
+    blender.context.scene.collection.objects.link(linked)
+    refused("linked", character=linked)
+    refused("linked", character=linked.override_create())
+
+
+def test_three_hundred_frames_bake_fast(blender, addon) -> None:
+    from time import perf_counter
+
+    ann = character(blender, addon)
+    take = made_take(addon, frames=300)
+    started = perf_counter()
+    addon("dafnet_addon.blender.baker").bake(take, ann, 1, "Walk")
+    assert perf_counter() - started < 0.5, "0.05 s on an idle machine"
