@@ -105,7 +105,7 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
                 if frame == frames[0] and collection:
                     pieces = _furniture(depsgraph, collection, armature, own, unit)
                 _follow(depsgraph, pieces)
-                modes.append(settings.mode or armature.evaluated_get(depsgraph).dafnet.mode)
+                modes.append(settings.mode or armature.dafnet.mode)
                 tracks["root"].append(_array(root.evaluated_get(depsgraph).matrix_world))
                 for role, target in targets.items():
                     evaluated = target.evaluated_get(depsgraph)

@@ -1,0 +1,294 @@
+"""Scene reader: what the core is handed is what Blender shows, in metres."""
+
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+CUBE = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+
+
+class Stage:
+    """A scene with a character, a furniture collection and short ways to fill and read it."""
+
+    def __init__(self, bpy: ModuleType, addon) -> None:
+        self.bpy, self.addon = bpy, addon
+        self.error = addon("dafnet_addon.core.errors").InputError
+        self.scene = bpy.context.scene
+        self.furniture = bpy.data.collections.new("Furniture")
+        self.scene.collection.children.link(self.furniture)
+        self.ann = addon("dafnet_addon.blender.armature").create_character(bpy.context, "Ann")
+        self.ann.dafnet.furniture = self.furniture
+        self.scene.frame_start, self.scene.frame_end = 1, 10
+        self.scene.frame_set(4)
+
+    def cube(self, name: str = "Cube", faces=FACES, collection=None, **transform):
+        mesh = self.bpy.data.meshes.new(name)
+        mesh.from_pydata(CUBE, [], faces)
+        return self.put(self.bpy.data.objects.new(name, mesh), collection, **transform)
+
+    def put(self, made, collection=None, **transform):
+        for key, value in transform.items():
+            setattr(made, key, value)
+        (collection or self.furniture).objects.link(made)
+        return made
+
+    def read(self, **overrides):
+        settings = self.addon("dafnet_addon.blender.properties").settings_of(self.ann, self.scene, **overrides)
+        return self.addon("dafnet_addon.blender.scene_reader").read_scene(self.bpy.context, settings)
+
+    def refused(self, match: str, **overrides) -> None:
+        with pytest.raises(self.error, match=match):
+            self.read(**overrides)
+        assert self.scene.frame_current == 4
+
+
+@pytest.fixture
+def stage(blender, addon) -> Stage:
+    return Stage(blender, addon)
+
+
+def corners(solid, frame: int = 0) -> np.ndarray:
+    matrix = solid.matrix if solid.matrix.ndim == 2 else solid.matrix[frame]
+    return solid.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def box(points: np.ndarray) -> np.ndarray:
+    return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+def key(made, path: str, *values: tuple[int, object]) -> None:
+    for frame, value in values:
+        setattr(made, path, value)
+        made.keyframe_insert(path, frame=frame)
+
+
+def test_transformed_and_modified_meshes(stage: Stage) -> None:
+    parent = stage.put(stage.bpy.data.objects.new("Parent", None), location=(5, 0, 0), scale=(2, 2, -2))
+    stage.cube("Child", parent=parent, location=(1, 0, 0), scale=(1, 3, 1))
+    array = stage.cube("Array", location=(0, 0, 4)).modifiers.new("Array", "ARRAY")
+    array.count = 3
+    nested = stage.bpy.data.collections.new("Nested")
+    stage.furniture.children.link(nested)
+    stage.cube("Deep", collection=nested, location=(0, 9, 0))
+    solids = {solid.name: solid for solid in stage.read().scene.solids}
+    assert set(solids) == {"Child", "Array", "Deep"}
+    assert np.allclose(box(corners(solids["Child"])), [[5, -6, -2], [9, 6, 2]])
+    assert np.linalg.det(solids["Child"].matrix[:3, :3]) < 0
+    assert np.allclose(box(corners(solids["Array"])), [[-1, -1, 3], [5, 1, 5]])
+    assert np.allclose(box(corners(solids["Deep"])), [[-1, 8, -1], [1, 10, 1]])
+    assert all(solid.matrix.shape == (4, 4) and len(solid.triangles) % 12 == 0 for solid in solids.values())
+
+
+def test_collection_and_geometry_nodes_instances(stage: Stage) -> None:
+    chairs = stage.bpy.data.collections.new("Chairs")
+    stage.cube("Leg", collection=chairs, location=(0, 0, 1), scale=(0.1, 0.1, 1))
+    stage.cube("Seat", collection=chairs, location=(0, 0, 2))
+    instancer = stage.put(stage.bpy.data.objects.new("Chair", None), instance_type="COLLECTION", instance_collection=chairs)
+    key(instancer, "location", (1, (0, 0, 0)), (10, (9, 0, 0)))
+
+    grid = stage.cube("Grid")
+    tree = stage.bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    source, points, sphere, out = (
+        tree.nodes.new(n) for n in ("NodeGroupInput", "GeometryNodeInstanceOnPoints", "GeometryNodeMeshUVSphere", "NodeGroupOutput")
+    )
+    tree.links.new(source.outputs[0], points.inputs["Points"])
+    tree.links.new(sphere.outputs["Mesh"], points.inputs["Instance"])
+    tree.links.new(points.outputs[0], out.inputs[0])
+    grid.modifiers.new("Scatter", "NODES").node_group = tree
+    grid.location = (0, 0, 10)
+
+    solids = stage.read().scene.solids
+    chair = [solid for solid in solids if solid.name == "Chair"]
+    spheres = [solid for solid in solids if solid.name == "Grid"]
+    assert len(chair) == 2 and len(spheres) == 8 and len(solids) == 10
+    for solid in chair:
+        assert solid.matrix.shape == (10, 4, 4)
+        assert corners(solid, 9).mean(axis=0)[0] == pytest.approx(9.0, abs=1e-5)
+    assert len({id(solid.vertices) for solid in spheres}) == 1, "instances share their geometry"
+    centres = np.array([solid.matrix[:3, 3] for solid in spheres])
+    assert np.allclose(np.sort(centres[:, 2]), [9] * 4 + [11] * 4)
+
+
+def test_curves_text_and_hidden_objects(stage: Stage) -> None:
+    curve = stage.bpy.data.curves.new("Rail", "CURVE")
+    curve.dimensions = "3D"
+    curve.bevel_depth = 0.1
+    curve.splines.new("POLY").points.add(1)
+    curve.splines[0].points[1].co = (2, 0, 0, 1)
+    stage.put(stage.bpy.data.objects.new("Rail", curve), location=(0, 0, 1))
+    stage.cube("Hidden").hide_viewport = True
+    stage.cube("Unrendered").hide_render = True
+    assert {solid.name for solid in stage.read().scene.solids} == {"Rail", "Unrendered"}
+
+
+def test_moving_furniture_has_a_matrix_for_each_frame(stage: Stage) -> None:
+    chair = stage.cube("Chair")
+    key(chair, "location", (1, (0, 0, 0)), (10, (9, 0, 0)))
+    for curve in stage.addon("dafnet_addon.blender.compat").action_curves(chair):
+        for point in curve.keyframe_points:
+            point.interpolation = "LINEAR"
+    still = stage.cube("Still")
+    still.scale = (2, 1, 1)
+    read = {solid.name: solid for solid in stage.read(frame_start=2, frame_end=6).scene.solids}
+    assert read["Chair"].matrix.shape == (5, 4, 4)
+    assert np.allclose(read["Chair"].matrix[:, 0, 3], [1, 2, 3, 4, 5])
+    assert read["Still"].matrix.shape == (4, 4)
+    assert stage.scene.frame_current == 4
+
+
+def test_the_character_and_its_empties_are_no_furniture(stage: Stage) -> None:
+    for made in (stage.ann, *stage.ann.children, stage.ann.dafnet.root, stage.ann.dafnet.head):
+        stage.furniture.objects.link(made)
+    hat = stage.cube("Hat")
+    hat.parent, hat.parent_type, hat.parent_bone = stage.ann, "BONE", "head"
+    coat = stage.cube("Coat")
+    coat.modifiers.new("Armature", "ARMATURE").object = stage.ann
+    stage.cube("Chair")
+    assert [solid.name for solid in stage.read().scene.solids] == ["Chair"]
+
+
+def test_units(stage: Stage) -> None:
+    stage.scene.unit_settings.system = "METRIC"
+    stage.scene.unit_settings.scale_length = 0.01
+    bob = stage.addon("dafnet_addon.blender.armature").create_character(stage.bpy.context, "Bob", 1.75)
+    bob.dafnet.furniture, stage.ann = stage.furniture, bob
+    bob.dafnet.root.location = (100, 200, 0)
+    bob.dafnet.head.location = (0, 0, 150)
+    stage.cube("Chair", location=(300, 0, 0), scale=(50, 50, 50))
+    read = stage.read()
+    assert read.controls.scale == pytest.approx(1.0, abs=1e-5)
+    assert np.allclose(read.controls.root[0, :3, 3], (1, 2, 0))
+    assert np.allclose(read.controls.root[0, :3, :3], np.eye(3))
+    assert np.allclose(read.controls.head[0], (0, 0, 1.5))
+    assert np.allclose(box(corners(read.scene.solids[0])), [[2.5, -0.5, -0.5], [3.5, 0.5, 0.5]])
+    stage.scene.unit_settings.system = "NONE"
+    assert np.allclose(stage.read().controls.root[0, :3, 3], (100, 200, 0))
+
+
+def test_the_root_follows_whatever_drives_it(stage: Stage) -> None:
+    cart = stage.put(stage.bpy.data.objects.new("Cart", None), stage.scene.collection, scale=(3, 3, 3))
+    key(cart, "rotation_euler", (1, (0, 0, 0)), (10, (0, 0, 3)))
+    key(cart, "location", (1, (0, 0, 0)), (10, (9, 0, 0)))
+    constraint = stage.ann.dafnet.root.constraints.new("COPY_TRANSFORMS")
+    constraint.target = cart
+    stage.ann.dafnet.furniture = None
+    read = stage.read()
+    expected = []
+    for frame in range(1, 11):
+        stage.scene.frame_set(frame)
+        expected.append(np.array(cart.matrix_world.normalized()))
+    assert np.allclose(read.controls.root, expected, atol=1e-5)
+    assert len(read.controls) == 10 and read.scene.solids == ()
+    assert any("No furniture" in warning for warning in read.warnings)
+    stage.scene.render.fps, stage.scene.render.fps_base = 30, 1.001
+    assert stage.read().controls.fps == pytest.approx(30 / 1.001)
+
+
+def test_targets_and_when_their_rotation_counts(stage: Stage) -> None:
+    own = stage.ann.dafnet
+    stage.cube("Chair")
+    own.hand_right = None
+    cart = stage.put(stage.bpy.data.objects.new("Cart", None), stage.scene.collection, rotation_euler=(0, 0, 1))
+    own.hand_left.parent = cart
+    own.hand_left.location = (1, 0, 0)
+    own.head.rotation_euler = (0, 0, 0.5)
+    controls = stage.read().controls
+    assert controls.hand_right is None and controls.hand_right_rotation is None
+    assert np.allclose(controls.hand_left[3], (np.cos(1), np.sin(1), 0), atol=1e-6)
+    assert controls.hand_left_rotation is None, "turned with its parent only"
+    assert np.allclose(controls.head_rotation[3, :, 1], (-np.sin(0.5), np.cos(0.5), 0), atol=1e-6)
+    own.hand_left.keyframe_insert("rotation_euler", frame=1)
+    assert stage.read().controls.hand_left_rotation.shape == (10, 3, 3), "keyed, so meant"
+
+
+def test_the_mode_of_each_frame(stage: Stage) -> None:
+    stage.cube("Chair")
+    assert stage.read().controls.mode == "FREE"
+    stage.ann.dafnet.mode = "EE"
+    assert stage.read().controls.mode == "EE"
+    for frame, mode in ((1, "FREE"), (5, "EE"), (8, "FREE")):
+        stage.ann.dafnet.mode = mode
+        stage.ann.dafnet.keyframe_insert("mode", frame=frame)
+    assert stage.read().controls.mode == ("FREE",) * 4 + ("EE",) * 3 + ("FREE",) * 3
+    assert stage.read(mode="EE").controls.mode == "EE"
+
+
+def test_the_upper_body_of_another_character(stage: Stage) -> None:
+    """A source on its own root is carried to ours; its size and its place do not matter."""
+    skeleton = stage.addon("dafnet_addon.core.skeleton")
+    stage.scene.cursor.location = (4, 5, 0.2)
+    bob = stage.addon("dafnet_addon.blender.armature").create_character(stage.bpy.context, "Bob", 1.4)
+    bob.rotation_euler.z += 0.7
+    bob.pose.bones["left_shoulder"].rotation_quaternion = (0.9, 0.1, 0.4, 0.1)
+    stage.ann.dafnet.root.location = (1, 0, 0)
+    stage.ann.dafnet.upper_body_source = bob
+    stage.cube("Chair")
+    stage.ann.dafnet.mode = "FULL"
+    upper = stage.read().controls.upper_body
+    assert upper.shape == (10, 14, 3)
+    rest = skeleton.REST[list(skeleton.UPPER)] + np.array([1, 0, 0])
+    arm = [skeleton.UPPER.index(j) for j in (18, 20)]
+    others = [k for k in range(14) if k not in arm]
+    assert np.abs(upper[0][others] - rest[others]).max() < 1e-4
+    assert np.abs(upper[0][arm] - rest[arm]).max() > 0.1
+
+    bob.dafnet.root = None
+    found = stage.read().controls.upper_body
+    assert np.abs(found[0][others] - rest[others]).max() < 0.02, "the root is found from hips and shoulders"
+    stage.ann.dafnet.upper_body_source = None
+    stage.refused("no source")
+
+
+def test_changing_shapes_are_warned_about(stage: Stage) -> None:
+    stage.cube("Rigid")
+    soft = stage.cube("Soft")
+    soft.shape_key_add(name="Basis")
+    pressed = soft.shape_key_add(name="Pressed")
+    pressed.data[0].co.z += 0.5
+    key(pressed, "value", (1, 0.0), (10, 1.0))
+    warnings = stage.read().warnings
+    assert len(warnings) == 1 and "'Soft'" in warnings[0]
+
+
+def test_bad_input_is_refused_in_one_sentence(stage: Stage) -> None:
+    stage.refused("no visible mesh")
+    stage.cube("Wire", faces=[])
+    stage.refused("no faces")
+    chair = stage.cube("Chair")
+    chair.location.x = np.nan
+    stage.refused("'Chair'.*not a number")
+    chair.location.x = 0.0
+    own = stage.ann.dafnet
+    own.root.location.x = np.nan
+    stage.refused("root.*not a number")
+    own.root.location.x = 0.0
+    own.head.location.x = np.nan
+    stage.refused("head target.*not a number")
+    own.head.location.x = 0.0
+    stage.refused("before its start", frame_start=10, frame_end=9)
+    stage.refused("unknown", mode="FRE")
+    stage.refused("no root", root=None)
+    stage.refused("'Gone' is not in the scene", root="Gone")
+    stage.refused("'Gone' is not in this file", furniture="Gone")
+    stage.bpy.ops.object.select_all(action="DESELECT")
+    own.head.select_set(True)
+    stage.bpy.ops.object.delete()
+    assert own.head is not None, "the property still holds the deleted object"
+    stage.refused("head target.*is not in the scene")
+    own.head = None
+    assert len(stage.read().scene.solids) == 1
+
+
+def test_the_frame_is_kept_while_reading(stage: Stage) -> None:
+    stage.cube("Chair")
+    stage.scene.frame_set(3, subframe=0.25)
+    settings = stage.addon("dafnet_addon.blender.properties").settings_of(stage.ann, stage.scene, frame_end=100)
+    progress = []
+    for share in stage.addon("dafnet_addon.blender.scene_reader").read_steps(stage.bpy.context, settings):
+        progress.append(share)
+        assert (stage.scene.frame_current, stage.scene.frame_subframe) == (3, 0.25)
+    assert len(progress) > 5 and progress == sorted(progress) and progress[-1] == 1.0
