@@ -57,6 +57,8 @@ def test_round_trip_is_exact_and_deterministic(tmp_path: Path) -> None:
 def test_no_tensor_at_all_is_a_file_too(tmp_path: Path) -> None:
     write_safetensors(tmp_path / "none.safetensors", {}, {})
     assert read_safetensors(tmp_path / "none.safetensors") == ({}, {})
+    write_safetensors(tmp_path / "empty.safetensors", {"empty": np.zeros((3, 0), np.float32)}, {})
+    assert read_safetensors(tmp_path / "empty.safetensors")[0]["empty"].shape == (3, 0)
 
 
 def test_library_reads_what_we_write(tmp_path: Path) -> None:

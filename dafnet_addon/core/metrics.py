@@ -108,7 +108,7 @@ def penetration(distance: np.ndarray) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Seat:
-    """Something to sit on: ``center`` (3,) of its top in the world; a root within ``radius`` metres of it rests on it."""
+    """Something to sit on: ``center`` (3,) of its top in the world; a root that rests within ``radius`` metres sits."""
 
     name: str
     center: np.ndarray
@@ -117,8 +117,9 @@ class Seat:
 
 @dataclass(frozen=True)
 class SeatEpisode:
-    """Frames ``start`` to ``stop`` (exclusive) in which the root rests at ``position`` (3,), the pelvis ``pelvis_height``
-    over the local floor (median)."""
+    """A rest of the root: frames ``start`` to ``stop`` (exclusive), its mean ``position`` (3,) in the world, and the
+    median height of the pelvis over the local floor.
+    """
 
     start: int
     stop: int
