@@ -1,0 +1,295 @@
+"""The command ``dafnet``: one parser behind ``python -m dafnet_addon …`` and ``blender [file] --command dafnet …``.
+
+Results go to standard output, for machines with ``--json``; progress and errors go to standard error. Exit codes: 0
+done, 1 an error said in one sentence, 2 a wrong command line, 130 stopped.
+"""
+
+import argparse
+import json
+import os
+import runpy
+import sys
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from .core.errors import DafnetError, InputError
+from .core.take import MODES
+
+if TYPE_CHECKING:
+    import bpy
+
+__all__ = ["main", "run"]
+
+_T = TypeVar("_T")
+_FURTHER_TAKES = 0.8  # temperature of every take but the first, where none is asked for
+
+
+def main(argv: Sequence[str] | None = None, in_blender: bool = False) -> int:
+    """Run one command and return its exit code. ``in_blender``: the file that Blender has open is the scene."""
+    try:
+        options = _parser(in_blender).parse_args(argv)
+        options.run(options)
+    except SystemExit as stop:  # argparse has said why
+        return int(stop.code or 0)
+    except DafnetError as error:
+        print(f"dafnet: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("dafnet: stopped.", file=sys.stderr)
+        return 130
+    return 0
+
+
+def run() -> None:
+    """``main`` as a console script."""
+    sys.exit(main())
+
+
+def _parser(in_blender: bool) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="dafnet", description="A character that walks up to furniture and uses it, from an animated root."
+    )
+    commands = parser.add_subparsers(metavar="command", required=True)
+
+    def command(name: str, action: Callable[[argparse.Namespace], None], text: str) -> argparse.ArgumentParser:
+        added = commands.add_parser(name, help=text, description=text)
+        added.set_defaults(run=action, in_blender=in_blender)
+        added.add_argument("--json", action="store_true", help="print the result as JSON on standard output")
+        return added
+
+    def sampling(added: argparse.ArgumentParser, temperature: float | None) -> None:
+        added.add_argument("--seed", type=int, default=None if temperature is None else 0, help="seed of the noise")
+        added.add_argument("--temperature", type=float, default=temperature, help="0 is the calm take, 0.8 lively ones")
+        added.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
+
+    demo = command("demo", _demo, "build the example room, generate, bake, render a preview and report")
+    demo.add_argument("-o", "--output", type=Path, default=Path("out/demo"), metavar="FOLDER")
+    demo.add_argument("--no-preview", action="store_true", help="leave out the film and the contact sheet")
+    sampling(demo, 0.0)
+
+    bake = command("bake", _bake, "generate a character of a scene and save the scene with its keys")
+    bake.add_argument("file", type=Path, nargs="?" if in_blender else None, metavar="FILE.blend")
+    bake.add_argument("-o", "--output", type=Path, required=True, metavar="OUT.blend")
+    bake.add_argument("--character", metavar="ARMATURE", help="needed where the scene has several characters")
+    for name in ("root", "furniture", "head", "hand-left", "hand-right", "upper-body"):
+        bake.add_argument(f"--{name}", metavar="NAME", help="overrules the character's own setting")
+    bake.add_argument("--mode", choices=MODES, help="one mode for all frames")
+    bake.add_argument("--frames", type=_frames, metavar="A:B", help="first and last frame")
+    bake.add_argument("--takes", type=int, default=1, metavar="N", help="how many takes; the first one plays")
+    sampling(bake, None)
+
+    info = command("info", _info, "say what a weights file is")
+    info.add_argument("weights", type=Path, nargs="?", metavar="WEIGHTS", help="else the weights that ship")
+
+    bench = command("bench", _bench, "measure: 'seats' sits on ten heights from three sides")
+    bench.add_argument("name", choices=["seats"])
+    bench.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
+    return parser
+
+
+def _frames(text: str) -> tuple[int, int]:
+    first, colon, last = text.partition(":")
+    if not colon:
+        raise argparse.ArgumentTypeError(f"'{text}' is no range; write it as FIRST:LAST")
+    return int(first), int(last)
+
+
+def _demo(options: argparse.Namespace) -> None:
+    _require_bpy()
+    from .blender.demo_room import run_demo
+
+    with _only_our_output(), _Bar() as bar:
+        report = run_demo(
+            options.output, seed=options.seed, temperature=options.temperature,
+            weights=options.weights, preview=not options.no_preview, progress=bar,
+        )
+    if options.json:
+        print(json.dumps(report, indent=2))
+        return
+    for seat in report["seats"]:
+        print(f"{seat['name']}: seat {seat['seat_height']:.2f} m, pelvis {seat['pelvis_height']:.3f} m, "
+              f"{100 * seat['error']:+.1f} cm from where it should be")
+    print(f"Written to {options.output}")
+
+
+def _bake(options: argparse.Namespace) -> None:
+    _require_bpy()
+    import bpy
+
+    from .blender import job
+    from .blender.compat import assign_action
+    from .blender.properties import ensure_registered
+    from .core.weights import load_weights
+
+    if options.takes < 1:
+        raise InputError("Ask for at least one take.")
+    if options.output.suffix != ".blend":
+        raise InputError(f"The output '{options.output}' has to end in .blend.")
+    weights = load_weights(options.weights) if options.weights else None
+    ensure_registered()
+    results = []
+    with _only_our_output():
+        if options.file is not None:
+            _open(options.file)
+        armature = _character(bpy.context.scene, options.character)
+        for index in range(options.takes):
+            settings = job.settings_of(armature, bpy.context.scene, **_overrides(options, armature, index))
+            label = f"take {index + 1} of {options.takes}" if options.takes > 1 else ""
+            results.append((settings, _drain(job.steps(bpy.context, settings, weights), label)))
+        assign_action(armature, results[0][1].action)
+        options.output.parent.mkdir(parents=True, exist_ok=True)
+        bpy.ops.wm.save_as_mainfile(filepath=str(options.output.resolve()), copy=options.in_blender)
+    report: dict[str, Any] = {
+        "output": str(options.output),
+        "takes": [
+            {
+                "action": result.action.name, "seed": settings.seed, "temperature": settings.temperature,
+                "frames": len(result.take), "warnings": list(result.warnings),
+                "seconds": {stage: round(spent, 4) for stage, spent in result.seconds.items()},
+            }
+            for settings, result in results
+        ],
+    }
+    if options.json:
+        print(json.dumps(report, indent=2))
+        return
+    for take in report["takes"]:
+        for warning in take["warnings"]:
+            print(f"Warning: {warning}")
+        spent = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in take["seconds"].items())
+        print(f"{take['action']}: {take['frames']} frames; {spent}")
+    print(f"Written to {options.output}")
+
+
+def _overrides(options: argparse.Namespace, armature: "bpy.types.Object", index: int) -> dict[str, Any]:
+    """Fields of ``Settings`` that the command line sets, for take number ``index``."""
+    chosen: dict[str, Any] = {
+        "root": options.root, "furniture": options.furniture, "head": options.head, "hand_left": options.hand_left,
+        "hand_right": options.hand_right, "upper_body_source": options.upper_body, "mode": options.mode,
+        "temperature": options.temperature,
+    }
+    if options.frames:
+        chosen["frame_start"], chosen["frame_end"] = options.frames
+    if index:
+        chosen["seed"] = (armature.dafnet.seed if options.seed is None else options.seed) + index
+        if options.temperature is None:
+            chosen["temperature"] = armature.dafnet.temperature or _FURTHER_TAKES
+    elif options.seed is not None:
+        chosen["seed"] = options.seed
+    return {name: value for name, value in chosen.items() if value is not None}
+
+
+def _open(file: Path) -> None:
+    import bpy
+
+    if not file.is_file():
+        raise InputError(f"There is no file '{file}'; check its path.")
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(file.resolve()))
+    except RuntimeError as error:
+        raise InputError(f"Blender cannot open '{file}'; save it again with this Blender or an older one.") from error
+
+
+def _character(scene: "bpy.types.Scene", name: str | None) -> "bpy.types.Object":
+    """The armature to bake onto: the one named, else the only one of the scene that is a DAFNet character."""
+    from .blender.armature import missing_bones
+
+    armatures = [ob for ob in scene.objects if ob.type == "ARMATURE"]
+    if name is not None:
+        named = [ob for ob in armatures if name in (ob.name, ob.name_full)]
+        if not named:
+            raise InputError(f"The scene has no armature '{name}'; give --character the name of one that it has.")
+        return named[0]
+    characters = [ob for ob in armatures if not missing_bones(ob)]
+    directed = [ob for ob in characters if ob.dafnet.root is not None] or characters
+    if not directed:
+        raise InputError("The scene has no character; add one in Blender with Add Character and save the file.")
+    if len(directed) > 1:
+        names = ", ".join(f"'{ob.name}'" for ob in directed)
+        raise InputError(f"The scene has several characters; choose one of {names} with --character.")
+    return directed[0]
+
+
+def _info(options: argparse.Namespace) -> None:
+    from .core.weights import load_weights
+
+    weights = load_weights(options.weights)
+    described: dict[str, Any] = {
+        "file": str(weights.path), "bytes": weights.path.stat().st_size,
+        "parameters": sum(int(tensor.size) for tensor in weights.tensors.values()),
+    }
+    for key, value in sorted(weights.metadata.items()):
+        try:
+            described[key] = json.loads(value)
+        except ValueError:
+            described[key] = value
+    if options.json:
+        print(json.dumps(described, indent=2))
+        return
+    for key, value in described.items():
+        print(f"{key}: {value if isinstance(value, str | int) else json.dumps(value)}")
+
+
+def _bench(options: argparse.Namespace) -> None:
+    script = Path(__file__).parents[1] / "benchmarks" / f"{options.name}.py"
+    if not script.exists():
+        raise InputError("Benchmarks are not part of the extension; run this from a checkout of the project.")
+    with _Bar() as bar:
+        report, summary = runpy.run_path(str(script))["measure"](options.weights, bar)
+    print(json.dumps(report, indent=2) if options.json else summary)
+
+
+def _require_bpy() -> None:
+    try:
+        import bpy  # noqa: F401
+    except ImportError as error:
+        raise InputError("This command needs Blender's Python module; install it, or run it inside Blender.") from error
+
+
+class _Bar:
+    """Progress for people, on standard error: a bar on a terminal, ten dots elsewhere."""
+
+    def __init__(self, label: str = "") -> None:
+        self.label, self.dots = label, 0
+
+    def __call__(self, progress: float) -> None:
+        """Show the part done, in [0, 1]."""
+        part = min(max(progress, 0.0), 1.0)
+        if sys.stderr.isatty():
+            filled = "#" * int(30 * part)
+            print(f"\r[{filled:.<30}] {100 * part:3.0f} % {self.label}", end="", file=sys.stderr, flush=True)
+        elif int(10 * part) > self.dots:
+            print("." * (int(10 * part) - self.dots), end="", file=sys.stderr, flush=True)
+            self.dots = int(10 * part)
+
+    def __enter__(self) -> "_Bar":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        print(file=sys.stderr, flush=True)
+
+
+def _drain(steps: Generator[float, None, _T], label: str = "") -> _T:
+    """Run a job to its end and show its progress."""
+    with _Bar(label) as bar:
+        while True:
+            try:
+                bar(next(steps))
+            except StopIteration as done:
+                return done.value
+
+
+@contextmanager
+def _only_our_output() -> Iterator[None]:
+    """Send what Blender itself prints on standard output to standard error, so that JSON stays JSON."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        os.dup2(kept, 1)
+        os.close(kept)
