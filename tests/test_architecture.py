@@ -1,0 +1,102 @@
+"""One direction of flow: what each part of the project may import, read from its source."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).absolute().parents[1]
+PACKAGE = ROOT / "dafnet_addon"
+FOLDERS = ("dafnet_addon", "operators", "panels", "benchmarks")
+
+
+def imports(file: Path, top_level_only: bool = False) -> Iterator[tuple[int, str]]:
+    """(level, module) of every import of a file; level counts the leading dots."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    nodes = tree.body if top_level_only else list(ast.walk(tree))
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            yield from ((0, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.level, node.module or ""
+
+
+def outside(file: Path, top_level_only: bool = False) -> set[str]:
+    """Top-level names of the modules outside the project that a file imports."""
+    return {module.split(".")[0] for level, module in imports(file, top_level_only) if level == 0}
+
+
+def sources(*folders: str) -> list[Path]:
+    return sorted(file for folder in folders for file in (ROOT / folder).rglob("*.py"))
+
+
+def test_there_is_something_to_check() -> None:
+    assert len(sources("dafnet_addon/core")) > 10
+    assert sources("operators") and sources("panels")
+
+
+@pytest.mark.parametrize("file", sources("dafnet_addon/core"), ids=lambda file: file.stem)
+def test_core_needs_numpy_only(file: Path) -> None:
+    allowed = {"numpy", *sys.stdlib_module_names}
+    assert outside(file, top_level_only=True) <= allowed
+    assert outside(file) <= allowed | {"torch"}, "torch may run the sampler where it is installed, nothing else may"
+
+
+@pytest.mark.parametrize("file", sources(*FOLDERS), ids=lambda file: file.relative_to(ROOT).as_posix())
+def test_only_the_blender_side_imports_bpy(file: Path) -> None:
+    host = {"bpy", "bmesh", "mathutils", "addon_utils"} & outside(file, top_level_only=True)
+    place = file.relative_to(ROOT).parts
+    if place[0] in ("operators", "panels") or place[:2] == ("dafnet_addon", "blender"):
+        return
+    assert not host
+    if file != PACKAGE / "cli.py":  # the command imports Blender inside the commands that need it
+        assert not {"bpy", "bmesh", "mathutils"} & outside(file)
+
+
+@pytest.mark.parametrize(
+    "file",
+    [f for f in sources("dafnet_addon", "operators", "panels") if f.parent.name not in ("model", "training")],
+    ids=lambda file: file.relative_to(ROOT).as_posix(),
+)
+def test_what_runs_inside_blender_needs_no_torch(file: Path) -> None:
+    heavy = {"torch", "scipy", "trimesh", "safetensors", "matplotlib"}
+    assert not heavy & outside(file, top_level_only=True)
+
+
+@pytest.mark.parametrize("file", sources("dafnet_addon"), ids=lambda file: file.relative_to(PACKAGE).as_posix())
+def test_the_package_imports_relatively_and_never_upward(file: Path) -> None:
+    depth = len(file.relative_to(PACKAGE).parts)
+    for level, module in imports(file):
+        assert level <= depth, f"{module} is outside the package"
+        assert not (level == 0 and module.split(".")[0] == "dafnet_addon"), f"import {module} relatively"
+
+
+def test_core_does_not_know_its_users() -> None:
+    for file in sources("dafnet_addon/core"):
+        for level, module in imports(file):
+            assert level < 2, f"{file.name} imports {module} from outside the core"
+
+
+@pytest.mark.parametrize("file", sources(*FOLDERS), ids=lambda file: file.relative_to(ROOT).as_posix())
+def test_blender_classes_keep_real_annotations(file: Path) -> None:
+    if "bpy" in outside(file):
+        assert (0, "__future__") not in set(imports(file))
+
+
+def test_nothing_names_the_data_beside_the_repository() -> None:
+    for file in [*sources(*FOLDERS), *(ROOT / "scripts").glob("*"), ROOT / "Makefile", ROOT / "README.md"]:
+        assert "../shared" not in file.read_text(encoding="utf-8"), file
+
+
+def test_the_package_imports_quickly_and_without_blender_or_torch() -> None:
+    code = (
+        "import sys, time; start = time.perf_counter(); import numpy; start = time.perf_counter(); import dafnet_addon;"
+        "assert not {'bpy', 'torch', 'scipy', 'trimesh'} & set(sys.modules), 'heavy';"
+        "assert callable(dafnet_addon.generate); print(time.perf_counter() - start)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 1.0
