@@ -1,0 +1,130 @@
+"""The extension's zip: built and validated by Blender's own tool, holds what an animator needs, and lives through its life.
+
+Also the rules that every module keeps: the core does not know Blender, and nothing of the product imports upward.
+"""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path, PurePosixPath
+
+import pytest
+
+ROOT = Path(__file__).absolute().parents[1]
+SHIPPED = {"__init__.py", "blender_manifest.toml", "dafnet_addon", "operators", "panels", "weights_stub", "LICENSE",
+           "LICENSE-WEIGHTS", "README.md"}
+LEFT_OUT = {"model", "data", "training", "baselines"}
+
+LIFE = """
+import os, sys, bpy, addon_utils
+zipped, module = sys.argv[-1], "bl_ext.user_default.dafnet"
+assert bpy.ops.extensions.package_install_files(filepath=zipped, repo="user_default", enable_on_install=True) == {"FINISHED"}
+assert module in bpy.context.preferences.addons and addon_utils.check(module)[1]
+assert bpy.ops.dafnet.add_character() == {"FINISHED"}
+character, scene = bpy.context.object, bpy.context.scene
+scene.frame_start, scene.frame_end = 1, 12
+assert bpy.ops.dafnet.generate() == {"FINISHED"}
+assert character.animation_data.action
+assert bpy.ops.preferences.addon_disable(module=module) == {"FINISHED"}
+assert not hasattr(bpy.types.Object, "dafnet") and not hasattr(bpy.types, "DAFNET_PT_character")
+assert bpy.ops.preferences.addon_enable(module=module) == {"FINISHED"}
+repos = bpy.context.preferences.extensions.repos
+index = next(i for i, repo in enumerate(repos) if repo.module == "user_default")
+assert bpy.ops.extensions.package_uninstall(repo_index=index, pkg_id="dafnet") == {"FINISHED"}
+assert module not in bpy.context.preferences.addons and not hasattr(bpy.types.Object, "dafnet")
+assert not os.path.exists(os.path.join(repos[index].directory, "dafnet"))
+print("lived")
+sys.stdout.flush(); sys.stderr.flush(); os._exit(0)
+"""
+
+
+def tool(*arguments: str | Path) -> str:
+    """Run Blender's extension tool."""
+    bpy = pytest.importorskip("bpy")
+    programs = (Path(folder, "addons_core/bl_pkg/cli/blender_ext.py") for folder in bpy.utils.script_paths())
+    program = next(path for path in programs if path.exists())
+    done = subprocess.run([sys.executable, program, *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def zipped(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("build")
+    tool("build", "--source-dir", ROOT, "--output-dir", folder)
+    return next(folder.glob("dafnet-*.zip"))
+
+
+def test_the_source_and_the_zip_validate(zipped: Path) -> None:
+    assert "Success" in tool("validate", ROOT) and "Success" in tool("validate", zipped)
+
+
+def test_the_zip_holds_what_an_animator_needs(zipped: Path) -> None:
+    assert zipped.stat().st_size < 100e6
+    names = [PurePosixPath(name) for name in zipfile.ZipFile(zipped).namelist()]
+    assert {name.parts[0] for name in names} <= SHIPPED
+    assert not {name.parts[1] for name in names if name.parts[0] == "dafnet_addon"} & LEFT_OUT
+    assert not [name for name in names if "__pycache__" in name.parts or name.suffix in {".pyc", ".zip", ".blend"}]
+    shipped = {str(name) for name in names}
+    for package in ("dafnet_addon/core", "dafnet_addon/blender", "operators", "panels"):
+        assert {str(path.relative_to(ROOT)) for path in (ROOT / package).glob("*.py")} <= shipped
+    assert any(name.parts[0] == "weights_stub" and name.suffix == ".safetensors" for name in names)
+
+
+def test_it_installs_generates_and_goes_without_a_word(zipped: Path, tmp_path: Path) -> None:
+    import bpy
+
+    script = tmp_path / "life.py"
+    script.write_text(LIFE, encoding="utf-8")
+    (tmp_path / "user").mkdir()
+    command = [sys.executable, script, zipped]
+    if bpy.app.binary_path:
+        command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-exit-code", "1", "--python", script, "--", zipped]
+    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=tmp_path)
+    assert done.returncode == 0 and "lived" in done.stdout, done.stdout + done.stderr
+    assert done.stderr == ""
+
+
+def imports(path: Path, at_load_only: bool = False) -> set[str]:
+    """Names of imported modules, relative ones with their dots; all of them, or those that loading the module imports."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    names: set[str] = set()
+    for node in tree.body if at_load_only else ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            names.add("." * node.level + (node.module or ""))
+        elif isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+    return names
+
+
+def modules(*folders: str) -> list[Path]:
+    return [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
+
+
+@pytest.mark.parametrize("path", modules("dafnet_addon/core"), ids=lambda path: path.name)
+def test_the_core_needs_numpy_only(path: Path) -> None:
+    outside = {name.split(".")[0] for name in imports(path, at_load_only=True) if name[0] != "."}
+    assert outside <= set(sys.stdlib_module_names) | {"numpy"}
+
+
+@pytest.mark.parametrize("path", modules("dafnet_addon/core", "dafnet_addon/model", "dafnet_addon/data", "dafnet_addon/training"),
+                         ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_nothing_below_blender_imports_it_or_reaches_out_of_the_package(path: Path) -> None:
+    depth = len(path.relative_to(ROOT / "dafnet_addon").parts)
+    for name in imports(path):
+        assert name.split(".")[0] not in {"bpy", "mathutils", "bpy_extras", "dafnet_addon"}
+        assert not re.match(r"\.{%d,}" % (depth + 1), name), name
+        assert not re.match(r"\.+(blender|cli)\b", name), name
+
+
+@pytest.mark.parametrize("path", [ROOT / "__init__.py", *modules("dafnet_addon/blender", "operators", "panels")],
+                         ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_the_extension_imports_itself_relatively(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert "dafnet_addon" not in {name.split(".")[0] for name in imports(path)}
+    if re.search(r"class \w+\(bpy\.types\.", text):
+        assert "from __future__ import annotations" not in text
