@@ -1,0 +1,189 @@
+"""From the animator's controls and the scene to what the model is told at each frame, at 30 fps and on the canonical body."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .distance import prepared, scaled
+from .errors import InputError
+from .occupancy import distance, occupancy
+from .resampling import MODEL_FPS, covering_frames, frame_times, resample_nearest, resample_positions, resample_rigid
+from .root import RootPath, root_from_matrices, smoothed, to_root, velocities
+from .rotations import normalised
+from .sampler import Conditions
+from .skeleton import END_EFFECTORS, LOWER, UPPER
+from .solids import Box, Mesh, Scene
+from .take import MODES, Controls
+
+__all__ = ["Shot", "shot_of", "PREROLL"]
+
+PREROLL = 70
+"""Frames for which the root stands still before the first one, so that the model's memory has settled."""
+
+_ORDER = UPPER + LOWER
+_EFFECTORS = {name: _ORDER.index(j) for name, j in END_EFFECTORS.items()}
+_TILT, _JUMP = np.radians(5.0), 0.35  # radians; metres in a 30-fps frame, a fast sprint's
+_REACH_FROM, _REACH = np.array([0.0, 0.0, 1.0]), 1.25  # a sphere that holds every head and wrist of the training poses
+_STILL, _CROWDED = 0.02, 0.35
+_TRUNK = (0.95, 1.15, 1.35)
+
+
+@dataclass(frozen=True)
+class Shot:
+    """``conditions`` of ``PREROLL`` + N frames at 30 fps; ``path`` (N): R^τ, canonical metres; ``modes`` (N,) of MODES;
+    ``warnings``: sentences for the user.
+    """
+
+    conditions: Conditions
+    path: RootPath
+    modes: np.ndarray
+    warnings: tuple[str, ...]
+
+
+def _checked_modes(mode: str | object, frames: int) -> np.ndarray:
+    modes = np.array([mode] * frames if isinstance(mode, str) else list(mode))  # type: ignore[call-overload]
+    wrong = sorted(set(modes.tolist()) - set(MODES))
+    if wrong:
+        raise InputError(f"The mode '{wrong[0]}' is unknown; use FREE, EE or FULL.")
+    if len(modes) != frames:
+        raise InputError(f"There are {len(modes)} modes for {frames} frames; give one word, or one for each frame.")
+    return modes
+
+
+def _check(controls: Controls) -> None:
+    frames = len(controls)
+    if np.shape(controls.root) != (frames, 4, 4) or frames == 0:
+        raise InputError("The root must be one 4 × 4 matrix for each frame; give at least one frame.")
+    if not np.isfinite(controls.root).all():
+        bad = int(np.flatnonzero(~np.isfinite(controls.root).all(axis=(1, 2)))[0])
+        raise InputError(f"The root's transform is not a number at frame {bad}; fix its keys, drivers or constraints.")
+    if not np.isfinite(controls.fps) or controls.fps <= 0:
+        raise InputError(f"The frame rate is {controls.fps}; give a positive number of frames a second.")
+    if not np.isfinite(controls.scale) or controls.scale <= 0:
+        raise InputError(f"The character's scale is {controls.scale}; give a positive number.")
+    shapes = {"upper_body": (frames, len(UPPER), 3), **{name: (frames, 3) for name in END_EFFECTORS}}
+    for name, shape in shapes.items():
+        value = getattr(controls, name)
+        if value is not None and np.shape(value) != shape:
+            raise InputError(f"'{name}' has the shape {np.shape(value)}; it must be {shape}, like the root's frames.")
+
+
+def _path_of(controls: Controls, times: np.ndarray, target: np.ndarray, warnings: list[str]) -> RootPath:
+    """R^τ: the root flattened, at 30 fps, smoothed once."""
+    raw, tilt = root_from_matrices(np.asarray(controls.root, float))
+    if tilt > _TILT:
+        warnings.append(f"The root tilts by up to {np.degrees(tilt):.0f}°; only its heading and position were used.")
+    position = resample_positions(raw.position / controls.scale, times, target)
+    path = RootPath(position, resample_positions(raw.yaw, times, target))
+    step = np.linalg.norm(np.diff(path.position, axis=0), axis=1)
+    if len(path) == 1:
+        warnings.append("There is only one frame, so the result is a pose; widen the frame range to get motion.")
+    elif np.ptp(path.position, axis=0).max() < _STILL and np.ptp(path.yaw) < _STILL:
+        warnings.append("The root does not move, so the character stays where it is; animate the root to make it walk.")
+    if len(step) and step.max() > _JUMP:
+        frame = int(np.argmax(step) / MODEL_FPS * controls.fps)
+        warnings.append(
+            f"The root jumps {step.max() * controls.scale:.1f} m near frame {frame} of the range; slow it down there."
+        )
+    return smoothed(path)
+
+
+def _targets(controls: Controls, name: str, times: np.ndarray, target: np.ndarray, path: RootPath) -> np.ndarray | None:
+    value = getattr(controls, name)
+    if value is None:
+        return None
+    return to_root(path, resample_positions(np.asarray(value, float) / controls.scale, times, target))
+
+
+def _observed(
+    controls: Controls, modes: np.ndarray, times: np.ndarray, target: np.ndarray, path: RootPath, warnings: list[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """c_ob (N, 66), root frame, model order, and which joints are given (N, 22)."""
+    frames = len(path)
+    observation, given = np.zeros((frames, 22, 3)), np.zeros((frames, 22))
+    for name, slot in _EFFECTORS.items():
+        place = _targets(controls, name, times, target, path)
+        if place is None:
+            continue
+        used = (modes == "EE") & np.isfinite(place).all(-1)
+        far = np.linalg.norm(place - _REACH_FROM, axis=-1)
+        if (used & (far > _REACH)).any():
+            metres = float(np.nanmax(np.where(used, far, np.nan))) * controls.scale
+            words = name.replace("_", " ")
+            warnings.append(f"The target of '{words}' is up to {metres:.1f} m away; it is reached for, not reached.")
+            within = _REACH_FROM + normalised(place - _REACH_FROM) * _REACH
+            place = np.where((far > _REACH)[:, None], within, place)
+        observation[used, slot], given[used, slot] = place[used], 1.0
+    full = modes == "FULL"
+    if full.any():
+        body = _targets(controls, "upper_body", times, target, path)
+        if body is None:
+            raise InputError("The mode is FULL but there is no upper body to follow; choose a source, or use FREE or EE.")
+        if not np.isfinite(body[full]).all():
+            raise InputError("The upper body to follow has a joint that is not a number; fix its animation.")
+        observation[full, : len(UPPER)], given[full, : len(UPPER)] = body[full], 1.0
+        given[full, _ORDER.index(0)] = float(controls.pelvis_given)
+    return observation.reshape(frames, -1), given
+
+
+def _at_model_rate(scene: Scene, times: np.ndarray, target: np.ndarray) -> Scene:
+    """The scene with moving solids at the model's frames."""
+    solids: list[Box | Mesh] = []
+    for solid in scene.solids:
+        if isinstance(solid, Box):
+            frames = solid.matrices()
+            if frames.ndim == 3 and len(frames) > 1:
+                moved = resample_rigid(frames, times, target)
+                solid = replace(solid, center=moved[:, :3, 3], rotation=moved[:, :3, :3])
+        elif np.ndim(solid.matrix) == 3 and len(solid.matrix) > 1:
+            # Scale and shear are those of the first frame (``prepared`` warns); only the rigid motion is mixed.
+            solid = replace(solid, matrix=resample_positions(np.asarray(solid.matrix, float), times, target))
+        solids.append(solid)
+    return Scene(tuple(solids))
+
+
+def _look_around(scene: Scene, path: RootPath, occupied: np.ndarray, warnings: list[str]) -> None:
+    if not scene.solids:
+        warnings.append("There is no furniture; the character walks and stands on a bare floor.")
+        return
+    trunk = path.position[:, None] + np.array([[0.0, 0.0, z] for z in _TRUNK])
+    inside = distance(scene, trunk, path.position[:, 2]).min(axis=1) < -0.02
+    if inside.any():
+        warnings.append(
+            f"The root runs through furniture in {inside.sum() / MODEL_FPS:.1f} s of the shot, "
+            f"first {np.argmax(inside) / MODEL_FPS:.1f} s into it; move the path or the furniture."
+        )
+    crowd = occupied.mean(axis=1)
+    if crowd.max() > _CROWDED:
+        warnings.append(
+            f"Furniture fills {100 * crowd.max():.0f} % of the character's surroundings {np.argmax(crowd) / MODEL_FPS:.1f} s "
+            "into the shot, more than the sensor can tell apart; give the character room."
+        )
+
+
+def shot_of(scene: Scene, controls: Controls) -> Shot:
+    """Everything that the model is told. Raises InputError for controls that cannot be used."""
+    _check(controls)
+    warnings: list[str] = []
+    modes = _checked_modes(controls.mode, len(controls))
+    frames = covering_frames(len(controls), controls.fps)
+    times, target = frame_times(len(controls), controls.fps), frame_times(frames, MODEL_FPS)
+    path = _path_of(controls, times, target, warnings)
+    modes = resample_nearest(modes, times, target)
+    observation, given = _observed(controls, modes, times, target, path, warnings)
+
+    scene, said = prepared(_at_model_rate(scene, times, target), float(np.median(path.position[:, 2])) * controls.scale)
+    warnings += said
+    scene = scaled(scene, 1.0 / controls.scale)
+    occupied = occupancy(scene, path)
+    _look_around(scene, path, occupied, warnings)
+
+    def rolled(values: np.ndarray, before: np.ndarray) -> np.ndarray:
+        return np.concatenate([np.repeat(before, PREROLL, axis=0), values])
+
+    velocity = velocities(path)
+    conditions = Conditions(
+        rolled(velocity, np.zeros((1, 3))), rolled(occupied, occupied[:1]),
+        rolled(observation, observation[:1]), rolled(given, given[:1]),
+    )
+    return Shot(conditions, path, modes, tuple(warnings))

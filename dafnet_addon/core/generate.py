@@ -1,0 +1,134 @@
+"""Scene and controls in, a take out: the one code path under the operator, the command line and the Python API."""
+
+from collections.abc import Generator
+from time import perf_counter
+
+import numpy as np
+
+from .conditions import PREROLL, Shot, shot_of
+from .errors import InputError
+from .kinematics import blend_switches, fit, forward_kinematics, global_from_local, local_from_global
+from .resampling import (
+    MODEL_FPS, covering_frames, frame_times, resample_path, resample_positions, resample_rotations,
+)
+from .root import RootPath, to_root, to_world
+from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix
+from .sampler import Sampler
+from .solids import Scene
+from .take import Controls, Take
+from .weights import Weights
+
+__all__ = ["generate", "generate_steps"]
+
+_UPPER_SIZE = 42
+
+
+def noise_of(seed: int, lower_seed: int | None, temperature: float) -> np.ndarray:
+    """The take's noise vector (1, 66), upper part first; each part has a seed of its own, so legs vary under one trunk."""
+    upper = np.random.default_rng([abs(seed), 0]).standard_normal(_UPPER_SIZE)
+    lower = np.random.default_rng([abs(seed if lower_seed is None else lower_seed), 1]).standard_normal(66 - _UPPER_SIZE)
+    return temperature * np.concatenate([upper, lower])[None]
+
+
+def _kept(resume: Take, frame: int, path: RootPath) -> np.ndarray:
+    """The resumed take's poses (N, 66) before a frame of the shot, in the new path's frames."""
+    count = min(covering_frames(frame, resume.fps), len(resume.poses), len(path))
+    old = RootPath(resume.path.position[:count], resume.path.yaw[:count])
+    new = RootPath(path.position[:count], path.yaw[:count])
+    return to_root(new, to_world(old, resume.poses[:count].reshape(count, 22, 3))).reshape(count, 66)
+
+
+def _rotation(controls: Controls, name: str, target: np.ndarray) -> np.ndarray | None:
+    """A head's or hand's rotations (N, 3, 3) at the model's frames, NaN where free."""
+    value = getattr(controls, name)
+    if value is None:
+        return None
+    times = frame_times(len(controls), controls.fps)
+    free = ~np.isfinite(value).all(axis=(1, 2))
+    quaternions = quaternion_from_matrix(np.where(free[:, None, None], np.eye(3), value))
+    quaternions[free] = np.nan
+    return matrix_from_quaternion(resample_rotations(quaternions, times, target))
+
+
+def _onto_bones(poses: np.ndarray, shot: Shot, controls: Controls, switches: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Local quaternions (N, 22, 4) and pelvis (N, 3), canonical metres, of poses (N, 66), eased over mode switches."""
+    joints = to_world(shot.path, poses.reshape(-1, 22, 3))
+    target = frame_times(len(joints), MODEL_FPS)
+    pelvis, frames = fit(joints, **{
+        name: _rotation(controls, name, target) for name in ("head_rotation", "hand_left_rotation", "hand_right_rotation")
+    })
+    local = continuous_signs(quaternion_from_matrix(local_from_global(frames)))
+    return blend_switches(local, pelvis, shot.path, switches) if len(switches) else (local, pelvis)
+
+
+def generate_steps(
+    scene: Scene, controls: Controls, weights: Weights, *, seed: int = 0, lower_seed: int | None = None,
+    temperature: float = 0.0, resume: Take | None = None, resume_frame: int = 0, device: str | None = None,
+) -> Generator[float, None, Take]:
+    """Generate one take; yields progress in [0, 1] and returns the ``Take``.
+
+    ``temperature`` scales the take's noise; 0 is the pose at z = 0. ``lower_seed``: another seed for the legs. ``resume``: a
+    take whose motion before ``resume_frame`` (a frame of the controls) is kept, and gone on from. ``device``: None runs on
+    NumPy, else on that torch device. Raises InputError for what cannot be used, WeightsError for weights that do not fit.
+    """
+    if not np.isfinite(temperature) or temperature < 0:
+        raise InputError(f"The temperature is {temperature}; give 0 or a small positive number such as 0.8.")
+    started = perf_counter()
+    yield 0.0
+    shot = shot_of(scene, controls)
+    conditioned = perf_counter()
+    sampler = Sampler(weights, device)
+    z = noise_of(seed, lower_seed, temperature)
+    kept = None
+    if resume is not None and resume_frame > 0:
+        held = _kept(resume, resume_frame, shot.path)
+        kept = np.concatenate([np.repeat(held[:1], PREROLL, axis=0), held])[:, None]
+    run = sampler.run(shot.conditions, z, kept)
+    while True:
+        try:
+            share = next(run)
+        except StopIteration as done:
+            made, actions = done.value
+            break
+        yield 0.05 + 0.9 * share
+    sampled = perf_counter()
+
+    poses, actions = made[PREROLL:, 0], actions[PREROLL:, 0]
+    switches = np.flatnonzero(shot.modes[1:] != shot.modes[:-1]) + 1
+    if kept is not None:
+        switches = np.union1d(switches, [len(kept) - PREROLL])
+    local, pelvis = _onto_bones(poses, shot, controls, switches)
+    yield 0.97
+
+    # From 30 frames a second to the controls' own rate, and to the character's own size.
+    source, target = frame_times(len(poses), MODEL_FPS), frame_times(len(controls), controls.fps)
+    rotations = resample_rotations(local, source, target)
+    pelvis = resample_positions(pelvis, source, target)
+    root = resample_path(shot.path, MODEL_FPS, controls.fps, len(controls))
+    joints = forward_kinematics(global_from_local(matrix_from_quaternion(rotations)), pelvis) * controls.scale
+    matrices = RootPath(root.position * controls.scale, root.yaw).matrices()
+    seconds = {
+        "conditions": conditioned - started, "sampling": sampled - conditioned, "fitting": perf_counter() - sampled,
+    }
+    yield 1.0
+    return Take(
+        controls.fps, joints, rotations, matrices, resample_positions(actions, source, target), controls.scale, poses,
+        shot.path, seconds, shot.warnings,
+    )
+
+
+def generate(
+    scene: Scene, controls: Controls, weights: Weights, *, seed: int = 0, lower_seed: int | None = None,
+    temperature: float = 0.0, resume: Take | None = None, resume_frame: int = 0, device: str | None = None,
+) -> Take:
+    """Drain ``generate_steps``, whose arguments these are, and return its take."""
+    steps = generate_steps(
+        scene, controls, weights, seed=seed, lower_seed=lower_seed, temperature=temperature, resume=resume,
+        resume_frame=resume_frame, device=device,
+    )
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            take: Take = done.value
+            return take

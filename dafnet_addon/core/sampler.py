@@ -1,0 +1,314 @@
+"""Runs the two-part flow frame by frame, over NumPy or torch arrays alike.
+
+Everything that is known in advance (occupancy, velocity, observation) goes through its share of the first layers for all
+frames at once; only the recurrent part and the action predictor, which looks at the poses just made, are left per frame.
+"""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from .errors import WeightsError
+from .skeleton import LOWER, UPPER
+from .weights import Weights
+
+__all__ = ["Conditions", "Sampler", "model_order", "smpl_order"]
+
+Array = Any  # numpy.ndarray or torch.Tensor
+
+_UPPER_SIZE, _LOWER_SIZE = 3 * len(UPPER), 3 * len(LOWER)
+_POSE_SIZE = _UPPER_SIZE + _LOWER_SIZE
+_ORDER = np.array([3 * j + k for j in UPPER + LOWER for k in range(3)])
+_INVERSE = np.argsort(_ORDER)
+
+
+def model_order(poses: np.ndarray) -> np.ndarray:
+    """Poses (…, 66) in SMPL order, as the model holds them: the upper body first."""
+    return poses[..., _ORDER]
+
+
+def smpl_order(poses: np.ndarray) -> np.ndarray:
+    """Inverse of ``model_order``."""
+    return poses[..., _INVERSE]
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What the model is told at each of T frames, 30 a second, in the target root's frame R^τ (paper, section 4.1).
+
+    ``velocity`` (T, 3): c_vel, metres and radians per frame. ``occupancy`` (T, 2640): c_env. ``observation`` (T, 66): c_ob,
+    positions in metres in the model's order; what is not ``given`` (T, 22) is ignored.
+    """
+
+    velocity: np.ndarray
+    occupancy: np.ndarray
+    observation: np.ndarray
+    given: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.velocity)
+
+
+def _sigmoid(xp: ModuleType, x: Array) -> Array:
+    return 0.5 * xp.tanh(0.5 * x) + 0.5
+
+
+@dataclass
+class _Layer:
+    """One LSTM layer: ``matrix`` (inputs + width, 4 · width) for [input, hidden]; ``bias`` (4 · width,)."""
+
+    matrix: Array
+    bias: Array
+
+
+class _Coupling:
+    """The recurrent net of one affine coupling, its first layer split into what is known in advance and what is not."""
+
+    def __init__(self, xp: ModuleType, static: Array, layers: list[_Layer], out: Array, out_bias: Array, width: int) -> None:
+        self.xp, self.static, self.layers, self.out, self.out_bias, self.width = xp, static, layers, out, out_bias, width
+        self.state: list[tuple[Array, Array]] = []
+        self.known: Array = None
+
+    def __call__(self, frame: int, fresh: Array) -> tuple[Array, Array]:
+        """Shift and scale (B, n) from the frame's known share and its ``fresh`` inputs (B, m); advances the state."""
+        xp, x = self.xp, fresh
+        for i, layer in enumerate(self.layers):
+            hidden, cell = self.state[i]
+            gates = xp.concatenate([x, hidden], axis=-1) @ layer.matrix + (self.known[frame] if i == 0 else layer.bias)
+            w = self.width
+            opened = _sigmoid(xp, gates[:, : 2 * w])
+            cell = opened[:, w:] * cell + opened[:, :w] * xp.tanh(gates[:, 2 * w : 3 * w])
+            x = _sigmoid(xp, gates[:, 3 * w :]) * xp.tanh(cell)
+            self.state[i] = (x, cell)
+        shift_scale = x @ self.out + self.out_bias
+        half = shift_scale.shape[-1] // 2
+        return shift_scale[:, :half], _sigmoid(xp, shift_scale[:, half:] + 2.0) + 1e-6
+
+
+@dataclass
+class _Step:
+    """A flow step; its activation norm and invertible linear are one affine map: y = x · matrix + offset."""
+
+    coupling: _Coupling
+    matrix: Array
+    offset: Array
+    inverse: Array
+    inverse_offset: Array
+    half: int
+
+
+@dataclass
+class _Part:
+    """One part's flow steps, and its environment encoders: one for all steps, or one each."""
+
+    encoders: list[tuple[tuple[Array, Array], tuple[Array, Array]]]
+    steps: list[_Step]
+
+
+class Sampler:
+    """The model of one weights file, ready to run on one array library.
+
+    ``device`` is None for NumPy, else a torch device ('cpu', 'cuda', …). ``dtype``: 'float32' or 'float64'. Raises
+    WeightsError where the file lacks a tensor or has one of the wrong shape.
+    """
+
+    def __init__(self, weights: Weights, device: str | None = None, dtype: str = "float32") -> None:
+        self.config = weights.config.get("model", {})
+        self.device, self.dtype = device, dtype
+        if device is None:
+            self.xp: ModuleType = np
+        else:
+            import torch
+
+            self.xp = torch
+        try:
+            c = {name: int(self.config[name]) for name in (
+                "actions", "history", "predictor_code", "predictor_width", "steps_upper", "steps_lower", "width", "layers",
+                "code",
+            )}
+            self.mask, shared = bool(self.config["mask"]), bool(self.config["shared_encoder"])
+            self.action_temperature = float(self.config["action_temperature"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise WeightsError(
+                f"The weights '{weights.path}' do not say how their model is built ({error}); choose another file."
+            ) from error
+        self.actions, self.history, self.width = c["actions"], c["history"], c["width"]
+
+        def array(name: str, *shape: int) -> np.ndarray:
+            return weights.require(name, shape).astype(np.float64)
+
+        self.pose_mean, self.pose_std = array("pose_mean", _POSE_SIZE), array("pose_std", _POSE_SIZE)
+        self.velocity_mean, self.velocity_std = array("velocity_mean", 3), array("velocity_std", 3)
+
+        poses = self.history * _POSE_SIZE
+        scene = poses + 3 * (self.history + 1)
+        width, code = c["predictor_width"], c["predictor_code"]
+        self._predictor_environment = self._linear(array, "predictor.environment", 2640, code)
+        first = array("predictor.layers.0.weight", width, scene + code)
+        self._predictor_past = self._to(first[:, :poses].T)
+        self._predictor_known = self._to(first[:, poses:].T), self._to(array("predictor.layers.0.bias", width))
+        self._predictor_second = self._linear(array, "predictor.layers.2", width, width)
+        self._predictor_out = self._linear(array, "predictor.layers.4", width, self.actions)
+
+        self._upper = self._part(array, "upper", _UPPER_SIZE, c["steps_upper"], shared, c)
+        self._lower = self._part(array, "lower", _LOWER_SIZE, c["steps_lower"], shared, c)
+
+    def _to(self, a: np.ndarray) -> Array:
+        if self.device is None:
+            return np.ascontiguousarray(a, dtype=self.dtype)
+        return self.xp.as_tensor(np.ascontiguousarray(a, dtype=self.dtype), device=self.device)
+
+    def _from(self, a: Array) -> np.ndarray:
+        return a if self.device is None else a.cpu().numpy()
+
+    def _linear(self, array: Any, name: str, inputs: int, outputs: int) -> tuple[Array, Array]:
+        return self._to(array(f"{name}.weight", outputs, inputs).T), self._to(array(f"{name}.bias", outputs))
+
+    def _part(self, array: Any, part: str, size: int, steps: int, shared: bool, c: dict[str, int]) -> _Part:
+        encoders = [
+            (self._linear(array, f"{part}.encoders.{e}.first", 2640, c["code"]),
+             self._linear(array, f"{part}.encoders.{e}.second", c["code"], c["code"]))
+            for e in range(1 if shared else steps)
+        ]
+        return _Part(encoders, [self._step(array, f"{part}.{k}", size, c) for k in range(steps)])
+
+    def _step(self, array: Any, name: str, size: int, c: dict[str, int]) -> _Step:
+        half, width = size // 2, c["width"]
+        observed = _POSE_SIZE + (22 if self.mask else 0)
+        condition = self.actions + 3 + c["code"] + observed
+        bias, exponent = array(f"{name}.bias", size), np.exp(array(f"{name}.log_scale", size))
+        weight = array(f"{name}.weight", size, size)
+        inverse = np.linalg.inv(weight)
+        layers = []
+        for i in range(c["layers"]):
+            inputs = half + condition if i == 0 else width
+            into = array(f"{name}.lstm.weight_ih_l{i}", 4 * width, inputs).T
+            back = array(f"{name}.lstm.weight_hh_l{i}", 4 * width, width).T
+            total = array(f"{name}.lstm.bias_ih_l{i}", 4 * width) + array(f"{name}.lstm.bias_hh_l{i}", 4 * width)
+            if i == 0:
+                # Rows of the input: half a pose, actions, velocity, code, observation (upper part first), mask.
+                fresh = [np.arange(half + self.actions)]
+                start = half + self.actions + 3 + c["code"]
+                if size == _LOWER_SIZE:
+                    # The upper slots of the observation are the upper body just made: known only now.
+                    fresh.append(np.arange(start, start + _UPPER_SIZE))
+                rows = np.concatenate(fresh)
+                known = np.setdiff1d(np.arange(inputs), rows)
+                static = self._to(np.concatenate([into[known], total[None]]))
+                into = into[rows]
+            layers.append(_Layer(self._to(np.concatenate([into, back])), self._to(total)))
+        out = self._to(array(f"{name}.out.weight", 2 * (size - half), width).T)
+        coupling = _Coupling(self.xp, static, layers, out, self._to(array(f"{name}.out.bias", 2 * (size - half))), width)
+        return _Step(
+            coupling,
+            self._to((weight * exponent).T), self._to((bias * exponent) @ weight.T),
+            self._to(inverse.T / exponent), self._to(-bias), half,
+        )
+
+    def standardised(self, poses: np.ndarray) -> np.ndarray:
+        """Poses (…, 66) in SMPL order, metres, as the model holds them."""
+        return (model_order(poses) - self.pose_mean) / self.pose_std
+
+    def start(self, conditions: Conditions, takes: int = 1) -> None:
+        """Bring in the conditions of a whole shot and forget all memory; the past is the mean pose."""
+        xp, frames = self.xp, len(conditions)
+        velocity = (conditions.velocity - self.velocity_mean) / self.velocity_std
+        before = np.repeat(velocity[:1], self.history, axis=0)
+        padded = np.concatenate([before, velocity])
+        window = np.concatenate([padded[k : k + frames] for k in range(self.history + 1)], axis=1)
+        matrix, bias = self._predictor_environment
+        occupancy = self._to(conditions.occupancy)
+        known, known_bias = self._predictor_known
+        self._predictor_ahead = xp.concatenate([self._to(window), occupancy @ matrix + bias], axis=-1) @ known + known_bias
+
+        given = np.repeat(conditions.given, 3, axis=-1)
+        observation = np.where(given > 0, (conditions.observation - self.pose_mean) / self.pose_std, 0.0)
+        mask = [conditions.given] if self.mask else []
+        joints = len(UPPER)
+        lower_mask = [np.concatenate([np.ones((frames, joints)), m[:, joints:]], axis=1) for m in mask]
+        seen_upper = self._to(np.concatenate([observation, *mask], axis=1))
+        seen_lower = self._to(np.concatenate([observation[:, _UPPER_SIZE:], *lower_mask], axis=1))
+        moving, one = self._to(velocity), self._to(np.ones((frames, 1)))
+        empty = self._to(np.zeros((takes, self.width)))
+        for part, seen in ((self._upper, seen_upper), (self._lower, seen_lower)):
+            codes = []
+            for first, second in part.encoders:
+                hidden = occupancy @ first[0] + first[1]
+                codes.append((hidden * (hidden > 0)) @ second[0] + second[1])
+            for k, step in enumerate(part.steps):
+                known = xp.concatenate([moving, codes[k % len(codes)], seen, one], axis=-1)
+                step.coupling.known = known @ step.coupling.static
+                step.coupling.state = [(empty, empty) for _ in step.coupling.layers]
+        self._past = self._to(np.zeros((takes, self.history * _POSE_SIZE)))
+
+    def _act(self, frame: int) -> Array:
+        """Action probabilities π (B, K) of a frame from the poses just made (paper, section 4.2)."""
+        xp = self.xp
+        x = self._past @ self._predictor_past + self._predictor_ahead[frame]
+        x = (x * (x > 0)) @ self._predictor_second[0] + self._predictor_second[1]
+        x = ((x * (x > 0)) @ self._predictor_out[0] + self._predictor_out[1]) / self.action_temperature
+        x = xp.exp(x - x.max())
+        return x / x.sum(-1)[:, None]
+
+    def _remember(self, pose: Array) -> None:
+        self._past = self.xp.concatenate([self._past[:, _POSE_SIZE:], pose], axis=-1)
+
+    def frame(self, index: int, z_upper: Array, z_lower: Array) -> tuple[Array, Array]:
+        """Standardised pose (B, 66) and action probabilities (B, K) of the next frame: noise to pose, upper then lower."""
+        xp = self.xp
+        actions = self._act(index)
+        parts = []
+        for part, z in ((self._upper, z_upper), (self._lower, z_lower)):
+            for step in reversed(part.steps):
+                passed = z[:, : step.half]
+                shift, scale = step.coupling(index, xp.concatenate([passed, actions, *parts], axis=-1))
+                changed = z[:, step.half :] / scale - shift
+                z = xp.concatenate([passed, changed], axis=-1) @ step.inverse + step.inverse_offset
+            parts.append(z)
+        pose = xp.concatenate(parts, axis=-1)
+        self._remember(pose)
+        return pose, actions
+
+    def absorb(self, index: int, pose: Array) -> tuple[Array, Array]:
+        """Noise (B, 66) and action probabilities of a kept frame: pose to noise, which rebuilds the memory to go on from."""
+        xp = self.xp
+        actions = self._act(index)
+        noise = []
+        upper = pose[:, :_UPPER_SIZE]
+        for part, x, extra in ((self._upper, upper, []), (self._lower, pose[:, _UPPER_SIZE:], [upper])):
+            for step in part.steps:
+                x = x @ step.matrix + step.offset
+                passed = x[:, : step.half]
+                shift, scale = step.coupling(index, xp.concatenate([passed, actions, *extra], axis=-1))
+                x = xp.concatenate([passed, (x[:, step.half :] + shift) * scale], axis=-1)
+            noise.append(x)
+        self._remember(pose)
+        return xp.concatenate(noise, axis=-1), actions
+
+    def run(
+        self, conditions: Conditions, z: np.ndarray, kept: np.ndarray | None = None
+    ) -> Generator[float, None, tuple[np.ndarray, np.ndarray]]:
+        """Poses (T, B, 66) in SMPL order, metres, and action probabilities (T, B, K); yields progress in [0, 1].
+
+        ``z`` (B, 66): one noise vector a take, upper part first, held constant. ``kept`` (N, B, 66), SMPL order, metres: the
+        first N frames as they are to stay; the model goes on from them.
+        """
+        noise = self._to(z)
+        self.start(conditions, takes=len(z))
+        first = 0 if kept is None else len(kept)
+        known = None if kept is None else self._to(self.standardised(kept))
+        poses, actions = [], []
+        for t in range(len(conditions)):
+            if known is not None and t < first:
+                pose, (_, action) = known[t], self.absorb(t, known[t])
+            else:
+                pose, action = self.frame(t, noise[:, :_UPPER_SIZE], noise[:, _UPPER_SIZE:])
+            poses.append(pose)
+            actions.append(action)
+            yield (t + 1) / len(conditions)
+        stacked = self._from(self.xp.stack(poses)).astype(np.float64)
+        made = smpl_order(stacked * self.pose_std + self.pose_mean)
+        return made, self._from(self.xp.stack(actions)).astype(np.float64)

@@ -1,0 +1,52 @@
+"""Sizes of the model. A configuration travels inside the weights file that was made with it."""
+
+from dataclasses import asdict, dataclass
+
+__all__ = ["ModelConfig", "PAPER", "SMALL", "UPPER_SIZE", "LOWER_SIZE", "POSE_SIZE", "VELOCITY_SIZE", "SENSOR_SIZE"]
+
+POSE_SIZE, UPPER_SIZE, LOWER_SIZE, VELOCITY_SIZE, SENSOR_SIZE = 66, 42, 24, 3, 2640
+
+
+@dataclass(frozen=True)
+class ModelConfig:
+    """``actions``: K of the action predictor. ``predictor_code``, ``predictor_width``: its environment code and its layers.
+    ``latent``: the GMVAE's. ``steps_upper``, ``steps_lower``: flow steps of each part. ``width``, ``layers``: the coupling's
+    LSTM. ``code``: the flow's environment code. ``shared_encoder``: one environment encoder for all couplings of a part
+    (else one each). ``mask``: 22 values beside the observation say which joints are given. ``action_temperature``: softmax temperature
+    after training (paper, section 4.2). ``history``: past frames that the predictor sees.
+    """
+
+    actions: int = 10
+    predictor_code: int = 512
+    predictor_width: int = 512
+    latent: int = 66
+    steps_upper: int = 3
+    steps_lower: int = 3
+    width: int = 512
+    layers: int = 2
+    code: int = 512
+    shared_encoder: bool = False
+    mask: bool = False
+    action_temperature: float = 0.7
+    history: int = 10
+
+    @property
+    def condition_size(self) -> int:
+        """Action probabilities, root velocity, environment code, observation (and its mask)."""
+        return self.actions + VELOCITY_SIZE + self.code + POSE_SIZE + (22 if self.mask else 0)
+
+    @property
+    def scene_size(self) -> int:
+        """The predictor's input beside the environment: past poses, and velocities up to now (693 for ten frames)."""
+        return self.history * POSE_SIZE + (self.history + 1) * VELOCITY_SIZE
+
+    def as_dict(self) -> dict[str, int | float | bool]:
+        return asdict(self)
+
+
+PAPER = ModelConfig()
+"""Appendix A of the paper, with K = 3 + 3 flow steps as in its section 4.3."""
+SMALL = ModelConfig(
+    predictor_code=128, predictor_width=256, width=192, code=160, shared_encoder=True, mask=True
+)
+"""What two CPU cores train in an hour or two."""

@@ -1,0 +1,212 @@
+"""The two-part normalizing flow (paper, sections 3 and 4.3, Appendix A; flow step after MoGlow and Glow).
+
+Every transform keeps one small contract. ``forward(x, condition)`` goes from pose to noise and returns (y, log_det, state),
+``inverse(y, condition)`` from noise to pose and returns (x, state). Sequences are (batch, time, features); log_det is
+(batch, time); ``state`` is what the recurrent part must be given to go on with the next frames, None at the start.
+"""
+
+import math
+
+import torch
+from torch import Tensor, nn
+
+from .config import LOWER_SIZE, SENSOR_SIZE, UPPER_SIZE, ModelConfig
+
+__all__ = ["ActNorm", "InvertibleLinear", "Coupling", "PartFlow", "EnvironmentEncoder", "TwoPartFlow"]
+
+LSTMState = tuple[Tensor, Tensor]
+
+
+class ActNorm(nn.Module):
+    """y = (x + bias) · exp(log_scale), one pair for each feature, set by the first batch to whiten it."""
+
+    def __init__(self, size: int) -> None:
+        super().__init__()
+        self.bias = nn.Parameter(torch.zeros(size))
+        self.log_scale = nn.Parameter(torch.zeros(size))
+
+    @torch.no_grad()
+    def initialise(self, x: Tensor) -> None:
+        """Zero mean and unit deviation over batch and time; the deviation is floored, constant features must not explode."""
+        flat = x.reshape(-1, x.shape[-1])
+        self.bias.copy_(-flat.mean(0))
+        self.log_scale.copy_(-flat.std(0).clamp_min(0.05).log())
+
+    def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        log_det = self.log_scale.sum().expand(x.shape[:-1])
+        return (x + self.bias) * self.log_scale.exp(), log_det
+
+    def inverse(self, y: Tensor) -> Tensor:
+        return y * (-self.log_scale).exp() - self.bias
+
+
+class InvertibleLinear(nn.Module):
+    """y = x Wᵀ with W = P L (U + diag(sign · exp(log_s))): Glow's invertible 1×1 convolution by LU."""
+
+    permutation: Tensor
+    sign: Tensor
+
+    def __init__(self, size: int) -> None:
+        super().__init__()
+        rotation = torch.linalg.qr(torch.randn(size, size))[0]
+        p, lower, upper = torch.linalg.lu(rotation)
+        self.register_buffer("permutation", p)
+        self.register_buffer("sign", upper.diagonal().sign())
+        self.log_s = nn.Parameter(upper.diagonal().abs().log())
+        self.lower = nn.Parameter(lower.tril(-1))
+        self.upper = nn.Parameter(upper.triu(1))
+
+    def factors(self) -> tuple[Tensor, Tensor]:
+        eye = torch.eye(len(self.log_s), dtype=self.log_s.dtype, device=self.log_s.device)
+        return self.lower.tril(-1) + eye, self.upper.triu(1) + torch.diag(self.sign * self.log_s.exp())
+
+    def weight(self) -> Tensor:
+        lower, upper = self.factors()
+        return self.permutation @ lower @ upper
+
+    def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        return x @ self.weight().T, self.log_s.sum().expand(x.shape[:-1])
+
+    def inverse_weight(self) -> Tensor:
+        """W⁻¹ by two triangular solves."""
+        lower, upper = self.factors()
+        half = torch.linalg.solve_triangular(lower, self.permutation.T, upper=False, unitriangular=True)
+        return torch.linalg.solve_triangular(upper, half, upper=True)
+
+    def inverse(self, y: Tensor) -> Tensor:
+        return y @ self.inverse_weight().T
+
+
+class Coupling(nn.Module):
+    """Affine coupling: the first half passes; an LSTM on it and the condition gives shift and scale of the second."""
+
+    def __init__(self, size: int, condition: int, width: int, layers: int) -> None:
+        super().__init__()
+        self.half = size // 2
+        self.lstm = nn.LSTM(self.half + condition, width, layers, batch_first=True)
+        self.out = nn.Linear(width, 2 * (size - self.half))
+        nn.init.zeros_(self.out.weight)
+        nn.init.zeros_(self.out.bias)
+
+    def _affine(self, passed: Tensor, condition: Tensor, state: LSTMState | None) -> tuple[Tensor, Tensor, LSTMState]:
+        hidden, state = self.lstm(torch.cat([passed, condition], dim=-1), state)
+        shift, raw = self.out(hidden).chunk(2, dim=-1)
+        return shift, torch.sigmoid(raw + 2.0) + 1e-6, state
+
+    def forward(self, x: Tensor, condition: Tensor, state: LSTMState | None = None) -> tuple[Tensor, Tensor, LSTMState]:
+        passed, changed = x[..., : self.half], x[..., self.half :]
+        shift, scale, state = self._affine(passed, condition, state)
+        return torch.cat([passed, (changed + shift) * scale], dim=-1), scale.log().sum(-1), state
+
+    def inverse(self, y: Tensor, condition: Tensor, state: LSTMState | None = None) -> tuple[Tensor, LSTMState]:
+        passed, changed = y[..., : self.half], y[..., self.half :]
+        shift, scale, state = self._affine(passed, condition, state)
+        return torch.cat([passed, changed / scale - shift], dim=-1), state
+
+
+class PartFlow(nn.Module):
+    """K flow steps over one part of the body, with what encodes the environment for them.
+
+    ``condition`` (B, T, C): all that is known beside the environment; ``occupancy`` (B, T, 2640).
+    """
+
+    def __init__(self, size: int, steps: int, config: ModelConfig) -> None:
+        super().__init__()
+        self.encoders = nn.ModuleList(EnvironmentEncoder(config.code) for _ in range(1 if config.shared_encoder else steps))
+        self.norms = nn.ModuleList(ActNorm(size) for _ in range(steps))
+        self.linears = nn.ModuleList(InvertibleLinear(size) for _ in range(steps))
+        self.couplings = nn.ModuleList(
+            Coupling(size, config.condition_size, config.width, config.layers) for _ in range(steps)
+        )
+
+    def _conditions(self, condition: Tensor, occupancy: Tensor) -> list[Tensor]:
+        """One condition for each step: with a shared encoder, the same one."""
+        each = [torch.cat([condition, encoder(occupancy)], dim=-1) for encoder in self.encoders]
+        return each * (len(self.norms) // len(each))
+
+    def forward(
+        self, x: Tensor, condition: Tensor, occupancy: Tensor, states: list[LSTMState] | None = None,
+        initialise: bool = False,
+    ) -> tuple[Tensor, Tensor, list[LSTMState]]:
+        conditions = self._conditions(condition, occupancy)
+        total = x.new_zeros(x.shape[:-1])
+        after = []
+        for k, (norm, linear, coupling) in enumerate(zip(self.norms, self.linears, self.couplings, strict=True)):
+            if initialise:
+                norm.initialise(x)
+            x, a = norm(x)
+            x, b = linear(x)
+            x, c, state = coupling(x, conditions[k], None if states is None else states[k])
+            total = total + a + b + c
+            after.append(state)
+        return x, total, after
+
+    def inverse(
+        self, z: Tensor, condition: Tensor, occupancy: Tensor, states: list[LSTMState] | None = None
+    ) -> tuple[Tensor, list[LSTMState]]:
+        conditions = self._conditions(condition, occupancy)
+        after: list[LSTMState] = []
+        for k in reversed(range(len(self.norms))):
+            z, state = self.couplings[k].inverse(z, conditions[k], None if states is None else states[k])
+            z = self.norms[k].inverse(self.linears[k].inverse(z))
+            after.insert(0, state)
+        return z, after
+
+    def log_likelihood(self, x: Tensor, condition: Tensor, occupancy: Tensor, initialise: bool = False) -> Tensor:
+        """Log density (B, T) in standardised units (equation 2)."""
+        z, log_det, _ = self(x, condition, occupancy, initialise=initialise)
+        return -0.5 * (z.square() + math.log(2.0 * math.pi)).sum(-1) + log_det
+
+
+class EnvironmentEncoder(nn.Module):
+    """Occupancy (…, 2640) to a code: Linear, ReLU, Linear (paper, Table 4)."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__()
+        self.first = nn.Linear(SENSOR_SIZE, code)
+        self.second = nn.Linear(code, code)
+
+    def forward(self, occupancy: Tensor) -> Tensor:
+        return self.second(torch.relu(self.first(occupancy)))
+
+
+class TwoPartFlow(nn.Module):
+    """The upper body's flow, then the lower's, whose observation is updated by the upper body (paper, figure 5).
+
+    Everything here is standardised. ``upper`` (B, T, 42), ``lower`` (B, T, 24); ``base`` (B, T, K + 3): action probabilities
+    and root velocity; ``occupancy`` (B, T, 2640); ``observation`` (B, T, 66): the upper slots first, in the order of
+    ``skeleton.UPPER``, zero where free; ``given`` (B, T, 22): 1 where a joint of that order is given.
+    """
+
+    def __init__(self, config: ModelConfig) -> None:
+        super().__init__()
+        self.config = config
+        self.upper = PartFlow(UPPER_SIZE, config.steps_upper, config)
+        self.lower = PartFlow(LOWER_SIZE, config.steps_lower, config)
+
+    def upper_condition(self, base: Tensor, observation: Tensor, given: Tensor) -> Tensor:
+        """What the upper part is told beside the environment (B, T, K + 3 + 66 [+ 22])."""
+        return torch.cat([base, observation, given] if self.config.mask else [base, observation], dim=-1)
+
+    def lower_condition(self, base: Tensor, observation: Tensor, given: Tensor, upper: Tensor) -> Tensor:
+        """The same for the lower part: the observation's upper slots are the true or the generated upper body."""
+        updated = torch.cat([upper, observation[..., UPPER_SIZE:]], dim=-1)
+        joints = UPPER_SIZE // 3
+        known = torch.cat([torch.ones_like(given[..., :joints]), given[..., joints:]], dim=-1)
+        return self.upper_condition(base, updated, known)
+
+    def forward(
+        self, upper: Tensor, lower: Tensor, base: Tensor, occupancy: Tensor, observation: Tensor, given: Tensor,
+    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Noise of both parts (B, T, 42), (B, T, 24) and both log-determinants (B, T)."""
+        z_upper, det_upper, _ = self.upper(upper, self.upper_condition(base, observation, given), occupancy)
+        z_lower, det_lower, _ = self.lower(lower, self.lower_condition(base, observation, given, upper), occupancy)
+        return z_upper, z_lower, det_upper, det_lower
+
+    def inverse(
+        self, z_upper: Tensor, z_lower: Tensor, base: Tensor, occupancy: Tensor, observation: Tensor, given: Tensor
+    ) -> Tensor:
+        """Pose (B, T, 66), upper part first, of noise: the upper body, then the lower under it."""
+        upper, _ = self.upper.inverse(z_upper, self.upper_condition(base, observation, given), occupancy)
+        lower, _ = self.lower.inverse(z_lower, self.lower_condition(base, observation, given, upper), occupancy)
+        return torch.cat([upper, lower], dim=-1)

@@ -1,0 +1,230 @@
+"""Trains the action predictor, then the two-part flow on top of it (paper, section 5.1, figure 7).
+
+A run lives in a folder: ``predictor.pt``, ``upper.pt``, ``lower.pt`` (each resumes exactly where it was saved), ``log.jsonl``.
+Time, not steps, is the budget: the learning rate follows the share of the minutes that is spent.
+"""
+
+import json
+import math
+import multiprocessing
+import os
+import time
+import tomllib
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import nn
+
+from ..core.errors import InputError
+from ..data.prepare import load_pool
+from ..model.config import PAPER, POSE_SIZE, SMALL, ModelConfig
+from ..model.flow import TwoPartFlow
+from ..model.predictor import GMVAE, ActionPredictor, gumbel_temperature
+from .batches import Batch, Statistics, batch_of, observation_for
+
+__all__ = ["TrainingConfig", "read_config", "Run", "train", "train_part", "trained"]
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """``minutes_predictor``, ``minutes_flow``: time budgets. Learning rates rise over ``warmup`` steps to ``peak`` and fall
+    along a cosine to ``final``. ``slot_dropout``: share of past-pose slots hidden from the predictor while it learns.
+    ``environment_dropout``: share of sensor values hidden from both. ``clip_norm``: largest gradient norm.
+    """
+
+    minutes_predictor: float = 5.0
+    minutes_flow: float = 60.0
+    batch: int = 50
+    warmup: int = 150
+    peak: float = 2e-3
+    final: float = 1e-4
+    slot_dropout: float = 0.95
+    environment_dropout: float = 0.5
+    clip_norm: float = 50.0
+    save_every: int = 100
+    seed: int = 0
+
+
+def read_config(file: Path) -> tuple[ModelConfig, TrainingConfig]:
+    """Model and training configuration of a TOML file: ``preset``, ``[model]`` and ``[training]`` override the defaults."""
+    try:
+        table = tomllib.loads(Path(file).read_text())
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"The configuration '{file}' cannot be read ({error}); check the path and its TOML.") from error
+    presets = {"paper": PAPER, "small": SMALL}
+    if table.get("preset", "small") not in presets:
+        raise InputError(f"The preset '{table['preset']}' is unknown; use one of {', '.join(presets)}.")
+    try:
+        model = replace(presets[table.get("preset", "small")], **table.get("model", {}))
+        return model, TrainingConfig(**table.get("training", {}))
+    except TypeError as error:
+        raise InputError(f"The configuration '{file}' has an unknown setting ({error}); remove it.") from error
+
+
+class Run:
+    """One network in training: 'predictor' (within its GMVAE), or the flow's 'upper' or 'lower' part.
+
+    The likelihood is a sum of the two parts', and the lower is trained under the true upper body: given the predictor they
+    have nothing in common, and are trained as two runs, side by side where there are two cores.
+    """
+
+    def __init__(self, part: str, folder: Path, model: ModelConfig, config: TrainingConfig, statistics: Statistics) -> None:
+        torch.manual_seed(config.seed)
+        self.part, self.folder, self.model, self.config, self.statistics = part, folder, model, config, statistics
+        self.gmvae, self.flow = GMVAE(model), TwoPartFlow(model)
+        self.network: nn.Module = self.gmvae if part == "predictor" else getattr(self.flow, part)
+        self.optimiser = torch.optim.Adam(self.network.parameters(), lr=config.peak)
+        self.step, self.seconds = 0, 0.0
+        self.rng = np.random.default_rng(config.seed)
+
+    @property
+    def budget(self) -> float:
+        """Seconds that this part may take."""
+        return 60.0 * (self.config.minutes_predictor if self.part == "predictor" else self.config.minutes_flow)
+
+    @property
+    def share(self) -> float:
+        """Share of the budget that is spent."""
+        return min(1.0, self.seconds / max(self.budget, 1e-9))
+
+    def save(self) -> None:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        state = {
+            "model": self.model.as_dict(), "config": asdict(self.config), "statistics": asdict(self.statistics),
+            "network": self.network.state_dict(), "optimiser": self.optimiser.state_dict(), "step": self.step,
+            "seconds": self.seconds, "rng": self.rng.bit_generator.state, "torch": torch.get_rng_state(),
+        }
+        part = self.folder / f"{self.part}.part"
+        torch.save(state, part)
+        part.rename(self.folder / f"{self.part}.pt")
+
+    @staticmethod
+    def load(part: str, folder: Path, config: TrainingConfig | None = None) -> "Run":
+        """The run saved in ``folder``; ``config`` replaces its settings, a longer budget for example."""
+        # The checkpoint is the trainer's own file, holding optimiser and generator states; weights that ship are never pickled.
+        state = torch.load(folder / f"{part}.pt", weights_only=False)
+        run = Run(
+            part, folder, ModelConfig(**state["model"]), config or TrainingConfig(**state["config"]),
+            Statistics(**state["statistics"]),
+        )
+        run.network.load_state_dict(state["network"])
+        run.optimiser.load_state_dict(state["optimiser"])
+        run.step, run.seconds = state["step"], state["seconds"]
+        run.rng.bit_generator.state = state["rng"]
+        torch.set_rng_state(state["torch"])
+        return run
+
+    def rate(self) -> float:
+        c = self.config
+        rate = c.final + 0.5 * (c.peak - c.final) * (1.0 + math.cos(math.pi * self.share))
+        return rate * min(1.0, (self.step + 1) / c.warmup)
+
+    def hidden(self, occupancy: torch.Tensor) -> torch.Tensor:
+        """Occupancy with a share of its values dropped (paper, Appendix A); nothing is rescaled."""
+        return occupancy * (torch.rand_like(occupancy) >= self.config.environment_dropout)
+
+    def loss(self, batch: Batch, initialise: bool = False) -> torch.Tensor:
+        """The GMVAE's loss, or the part's negative log-likelihood a frame with the predictor frozen."""
+        if self.part == "predictor":
+            # Neighbouring frames say nearly the same: every fifth is plenty for a network without memory.
+            past, occupancy = batch.past[:, ::5].flatten(0, 1), batch.occupancy[:, ::5].flatten(0, 1)
+            poses = self.model.history * POSE_SIZE
+            seen = past.clone()
+            seen[:, :poses] *= torch.rand(len(past), poses) >= self.config.slot_dropout
+            return self.gmvae.losses(past, seen, self.hidden(occupancy), gumbel_temperature(self.share)).total
+        occupancy = self.hidden(batch.occupancy)
+        with torch.no_grad():
+            actions = self.gmvae.predictor(batch.past, occupancy)
+        observation, given = observation_for(self.rng, batch.upper)
+        base = torch.cat([actions, batch.velocity], dim=-1)
+        if self.part == "upper":
+            condition = self.flow.upper_condition(base, observation, given)
+            return -self.flow.upper.log_likelihood(batch.upper, condition, occupancy, initialise).mean()
+        condition = self.flow.lower_condition(base, observation, given, batch.upper)
+        return -self.flow.lower.log_likelihood(batch.lower, condition, occupancy, initialise).mean()
+
+    @torch.no_grad()
+    def held_loss(self, held: dict[str, np.ndarray], windows: int = 50) -> float:
+        """The loss on unseen bodies, with the same draws each time."""
+        state, rng = torch.get_rng_state(), self.rng
+        torch.manual_seed(1)
+        self.rng = np.random.default_rng(1)
+        loss = float(self.loss(batch_of(held, np.arange(windows), self.statistics, self.model.history)))
+        self.rng = rng
+        torch.set_rng_state(state)
+        return loss
+
+
+def train_part(
+    part: str, dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig, threads: int | None = None,
+    progress: Callable[[str, float, float], None] = lambda part, share, loss: None,
+) -> Run:
+    """Train one part, or go on with it, until its budget is spent. Raises InputError without a dataset.
+
+    A loss that is not a number stops the run with the last good checkpoint kept.
+    """
+    if threads is not None:
+        torch.set_num_threads(threads)
+    files = sorted(Path(dataset).glob("pool-*.npz"))
+    if not files:
+        raise InputError(f"The dataset '{dataset}' holds no windows; make it with 'dafnet prepare'.")
+    pool, held = load_pool(files), load_pool([Path(dataset) / "held.npz"])
+    if (folder / f"{part}.pt").exists():
+        run = Run.load(part, folder, config)
+    else:
+        run = Run(part, folder, model, config, Statistics.of(pool["poses"], pool["velocity"]))
+        run.save()
+    if part != "predictor":
+        run.gmvae.load_state_dict(Run.load("predictor", folder).network.state_dict())
+        run.gmvae.requires_grad_(False)
+    recent: list[float] = []
+    while run.share < 1.0:
+        begin = time.monotonic()
+        rows = run.rng.integers(0, len(pool["poses"]), config.batch)
+        batch = batch_of(pool, rows, run.statistics, run.model.history)
+        for group in run.optimiser.param_groups:
+            group["lr"] = run.rate()
+        loss = run.loss(batch, initialise=run.step == 0)
+        if not torch.isfinite(loss):
+            raise InputError(f"The loss of '{part}' is no number at step {run.step}; resume with a lower peak rate.")
+        run.optimiser.zero_grad()
+        loss.backward()
+        nn.utils.clip_grad_norm_(run.network.parameters(), config.clip_norm)
+        run.optimiser.step()
+        recent.append(float(loss.detach()))
+        run.step += 1
+        run.seconds += time.monotonic() - begin
+        if run.step % config.save_every == 0 or run.share >= 1.0:
+            values = {
+                "part": part, "step": run.step, "minutes": run.seconds / 60, "loss": float(np.mean(recent)),
+                "held_out": run.held_loss(held),
+            }
+            with (folder / "log.jsonl").open("a") as f:
+                f.write(json.dumps(values) + "\n")
+            progress(part, run.share, values["loss"])
+            recent.clear()
+            run.save()
+    return run
+
+
+def train(dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig) -> None:
+    """Train the predictor, then both parts of the flow in two processes; what a folder holds is gone on with."""
+    train_part("predictor", dataset, folder, model, config)
+    threads = max(1, (os.cpu_count() or 2) // 2)
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(2, mp_context=context) as pool:
+        parts = [pool.submit(train_part, part, dataset, folder, model, config, threads) for part in ("upper", "lower")]
+        for done in parts:
+            done.result()
+
+
+def trained(folder: Path) -> tuple[TwoPartFlow, ActionPredictor, Statistics]:
+    """The flow, predictor and statistics of a run's latest checkpoints."""
+    runs = {part: Run.load(part, folder) for part in ("predictor", "upper", "lower")}
+    flow = runs["upper"].flow
+    flow.lower = runs["lower"].flow.lower
+    return flow, runs["predictor"].gmvae.predictor, runs["predictor"].statistics

@@ -1,0 +1,120 @@
+"""The sampler against the torch model it was exported from, NumPy against torch, resuming, and seeds."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dafnet_addon.core.sampler import Conditions, Sampler, model_order, smpl_order
+from dafnet_addon.core.weights import load_weights
+
+
+def _conditions(frames: int, seed: int = 0) -> Conditions:
+    rng = np.random.default_rng(seed)
+    smooth = np.cumsum(rng.normal(size=(frames, 3)), axis=0) * (0.001, 0.002, 0.003) + (0, 0.02, 0)
+    occupancy = np.repeat((rng.random((1, 2640)) < 0.05).astype(float), frames, axis=0)
+    given = np.zeros((frames, 22))
+    given[frames // 3 : frames // 2, 12:14] = 1.0
+    observation = np.tile(rng.normal(size=66) * 0.1 + np.tile([0.0, 0.2, 1.0], 22), (frames, 1))
+    return Conditions(smooth, occupancy, observation, given)
+
+
+def _drain(steps):
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            return done.value
+
+
+def test_orders_are_inverse():
+    poses = np.arange(66.0)
+    assert (smpl_order(model_order(poses)) == poses).all() and not (model_order(poses) == poses).all()
+
+
+def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
+    torch = pytest.importorskip("torch")
+    from dafnet_addon.core.weights import FORMAT, Weights
+    from dafnet_addon.model.config import ModelConfig
+    from dafnet_addon.model.flow import TwoPartFlow
+    from dafnet_addon.model.predictor import ActionPredictor
+    from dafnet_addon.training.batches import Statistics, past_of
+    from dafnet_addon.training.export import tensors_of
+
+    torch.manual_seed(3)
+    config = ModelConfig(predictor_code=8, predictor_width=16, width=12, code=8, shared_encoder=False, mask=True)
+    flow, predictor = TwoPartFlow(config), ActionPredictor(config)
+    with torch.no_grad():
+        for p in [*flow.parameters(), *predictor.parameters()]:
+            p += 0.05 * torch.randn_like(p)
+    rng = np.random.default_rng(0)
+    statistics = Statistics(rng.normal(size=66), rng.uniform(0.1, 0.3, 66), rng.normal(size=3) * 0.01, np.full(3, 0.02))
+    tensors = tensors_of(flow, predictor, statistics)
+    weights = Weights(tensors, {"model": config.as_dict()}, {"format": FORMAT}, tmp_path)
+    conditions, z = _conditions(30), rng.normal(size=(2, 66))
+    made, actions = _drain(Sampler(weights, dtype="float64").run(conditions, z))
+
+    # The same, by the model's own forward: poses must go back to the noise that they were made from.
+    flow.double(), predictor.double()
+    poses = torch.from_numpy((model_order(made).transpose(1, 0, 2) - tensors["pose_mean"]) / tensors["pose_std"])
+    velocity = torch.from_numpy((conditions.velocity - tensors["velocity_mean"]) / tensors["velocity_std"])
+    velocity = torch.cat([velocity[:1].repeat(10, 1), velocity]).repeat(2, 1, 1)
+    past = past_of(torch.cat([torch.zeros(2, 10, 66, dtype=torch.float64), poses], 1), velocity, 10)
+    occupancy = torch.from_numpy(conditions.occupancy).repeat(2, 1, 1)
+    with torch.no_grad():
+        probabilities = predictor(past, occupancy)
+        given = torch.from_numpy(conditions.given).repeat(2, 1, 1)
+        scaled = (conditions.observation - tensors["pose_mean"]) / tensors["pose_std"] * np.repeat(conditions.given, 3, -1)
+        base = torch.cat([probabilities, velocity[:, 10:]], -1)
+        observation = torch.from_numpy(scaled).repeat(2, 1, 1)
+        z_upper, z_lower, *_ = flow(poses[..., :42], poses[..., 42:], base, occupancy, observation, given)
+    assert np.abs(actions - probabilities.transpose(0, 1).numpy()).max() < 1e-6
+    noise = torch.cat([z_upper, z_lower], -1).numpy()
+    assert np.abs(noise - z[:, None]).max() < 1e-5, "tensors are exported in single precision"
+
+
+@pytest.fixture(scope="module")
+def weights():
+    return load_weights()
+
+
+def test_numpy_and_torch_agree_over_300_frames(weights):
+    pytest.importorskip("torch")
+    z = 0.7 * np.random.default_rng(1).normal(size=(1, 66))
+    ours, _ = _drain(Sampler(weights).run(_conditions(300), z))
+    theirs, _ = _drain(Sampler(weights, device="cpu").run(_conditions(300), z))
+    assert np.abs(ours - theirs).max() < 1e-4
+
+
+def test_shipped_weights_invert(weights):
+    sampler = Sampler(weights)
+    conditions, z = _conditions(100), 0.7 * np.random.default_rng(1).normal(size=(1, 66))
+    made, _ = _drain(sampler.run(conditions, z))
+    again = Sampler(weights)
+    again.start(conditions)
+    standard = again.standardised(made).astype(np.float32)
+    noise = np.concatenate([again.absorb(t, standard[t])[0] for t in range(100)])
+    assert np.abs(noise - z).max() < 1e-2, "pose to noise gives back the noise"
+
+
+def test_a_batch_is_its_single_takes(weights):
+    z = np.random.default_rng(2).normal(size=(3, 66))
+    together, _ = _drain(Sampler(weights).run(_conditions(40), z))
+    alone, _ = _drain(Sampler(weights).run(_conditions(40), z[1:2]))
+    assert np.abs(together[:, 1] - alone[:, 0]).max() < 1e-4
+
+
+def test_resuming_goes_on_as_if_never_stopped(weights):
+    conditions, z = _conditions(160), 0.5 * np.random.default_rng(4).normal(size=(1, 66))
+    whole, _ = _drain(Sampler(weights).run(conditions, z))
+    resumed, _ = _drain(Sampler(weights).run(conditions, z, kept=whole[:90]))
+    assert np.abs(resumed - whole).max() < 1e-3
+
+
+def test_lower_noise_leaves_the_upper_body_alone_at_the_first_frame(weights):
+    z = np.zeros((2, 66))
+    z[1, 42:] = 1.0
+    made, _ = _drain(Sampler(weights).run(_conditions(1), z))
+    upper = model_order(made)[..., :42]
+    assert np.abs(upper[0, 0] - upper[0, 1]).max() < 1e-5
+    assert np.abs(made[0, 0] - made[0, 1]).max() > 1e-3
