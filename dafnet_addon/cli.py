@@ -5,12 +5,13 @@ done, 1 an error said in one sentence, 2 a wrong command line, 130 stopped.
 """
 
 import argparse
+import ctypes
 import json
 import os
 import runpy
 import sys
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -288,8 +289,9 @@ def _only_our_output() -> Iterator[None]:
     kept = os.dup(1)
     os.dup2(2, 1)
     try:
-        yield
+        with redirect_stdout(sys.stderr):  # what goes through Python; the rest is written by C
+            yield
     finally:
-        sys.stdout.flush()
+        ctypes.CDLL("ucrtbase" if os.name == "nt" else None).fflush(None)
         os.dup2(kept, 1)
         os.close(kept)

@@ -198,7 +198,9 @@ def run_demo(
     read = read_scene(bpy.context, settings)
     report = demo_report(result.take, read.scene, read.controls, loaded, result.seconds)
     (folder / "report.json").write_text(json.dumps(report, indent=2) + "\n")
-    bpy.ops.wm.save_as_mainfile(filepath=str((folder / "demo.blend").resolve()))
+    scene_file = (folder / "demo.blend").resolve()
+    scene_file.unlink(missing_ok=True)  # else Blender would keep the old one as demo.blend1
+    bpy.ops.wm.save_as_mainfile(filepath=str(scene_file), compress=True)
     if preview:
         frames = np.linspace(room.scene.frame_start, room.scene.frame_end, 16).astype(int).tolist()
         render_sheet(room.scene, folder / "sheet.png", frames)

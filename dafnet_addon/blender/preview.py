@@ -25,14 +25,13 @@ def use_workbench(scene: bpy.types.Scene, width: int = 640, height: int = 360) -
     scene.render.resolution_x, scene.render.resolution_y = width, height
     scene.render.resolution_percentage = 100
     scene.view_settings.view_transform = "Standard"
-    scene.display.render_aa = "5"
+    scene.display.render_aa = "FXAA"
     scene.display.light_direction = (0.35, 0.85, 0.55)
     shading = scene.display.shading
     shading.light, shading.studio_light = "STUDIO", "paint.sl"
     shading.color_type = "MATERIAL"
     shading.show_shadows, shading.shadow_intensity = True, 0.40
-    shading.show_cavity, shading.cavity_type = True, "BOTH"
-    shading.cavity_ridge_factor, shading.cavity_valley_factor = 0.6, 1.2
+    shading.show_cavity, shading.cavity_type = True, "SCREEN"  # the other kind is noisy without many samples
     if scene.world is None:
         scene.world = bpy.data.worlds.new("World")
     scene.world.color = (0.60, 0.62, 0.64)
@@ -72,6 +71,7 @@ def render_sheet(scene: bpy.types.Scene, path: Path, frames: Sequence[int], colu
     if hasattr(settings, "media_type"):  # since 5.0
         settings.media_type = "IMAGE"
     settings.file_format = "PNG"
+    scene.display.render_aa = "8"  # few frames that may take longer
     images = []
     with TemporaryDirectory() as folder:
         for frame in frames:

@@ -1,0 +1,158 @@
+"""The command: what it prints and returns, and that its two doors and the operator make the same keys."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dafnet_addon.cli import main
+from dafnet_addon.core.weights import load_weights
+
+Addon = Callable[[str], Any]
+
+
+def test_wrong_command_lines_return_2_and_help_returns_0(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 2
+    assert main(["bake", "a.blend"]) == 2
+    assert main(["bake", "a.blend", "-o", "b.blend", "--frames", "7"]) == 2
+    assert "FIRST:LAST" in capsys.readouterr().err
+    assert main(["--help"]) == 0
+    assert "bake" in capsys.readouterr().out
+
+
+def test_errors_are_one_sentence_on_standard_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(tmp_path / "none.safetensors")]) == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("dafnet: ") and said.err.count("\n") == 1
+
+
+def test_info_says_what_a_file_is(capsys: pytest.CaptureFixture[str]) -> None:
+    weights = load_weights()
+    assert main(["info", "--json"]) == 0
+    described = json.loads(capsys.readouterr().out)
+    assert described["format"] == "dafnet-1"
+    assert described["config"] == weights.config
+    assert described["parameters"] == sum(tensor.size for tensor in weights.tensors.values())
+    assert main(["info", str(weights.path)]) == 0
+    assert f"parameters: {described['parameters']}" in capsys.readouterr().out
+
+
+@pytest.fixture
+def scene_file(blender: ModuleType, addon: Addon, tmp_path: Path) -> Path:
+    """A character whose root walks a metre in 20 frames, beside a box to sit on, saved to a file."""
+    bpy = blender
+    bpy.context.scene.frame_end = 20
+    armature = addon("dafnet_addon.blender.armature").create_character(bpy.context)
+    root = armature.dafnet.root
+    for frame, y in ((1, 0.0), (20, 1.0)):
+        root.location.y = y
+        root.keyframe_insert("location", frame=frame)
+    furniture = bpy.data.collections.new("Furniture")
+    bpy.context.scene.collection.children.link(furniture)
+    mesh = bpy.data.meshes.new("Box")
+    corners = [(x, y, z) for x in (0.3, 0.7) for y in (0.8, 1.2) for z in (0.0, 0.45)]
+    mesh.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
+    furniture.objects.link(bpy.data.objects.new("Box", mesh))
+    armature.dafnet.furniture = furniture
+    file = tmp_path / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    return file
+
+
+def keys(bpy: ModuleType, addon: Addon) -> dict[tuple[str, int], np.ndarray]:
+    """The key values of what the only armature plays, by data path and index."""
+    armature = next(ob for ob in bpy.context.scene.objects if ob.type == "ARMATURE")
+    found = {}
+    for curve in addon("dafnet_addon.blender.compat").action_curves(armature):
+        values = np.empty(2 * len(curve.keyframe_points))
+        curve.keyframe_points.foreach_get("co", values)
+        found[curve.data_path, curve.array_index] = values
+    return found
+
+
+def test_bake_saves_the_keys_that_the_operator_makes(
+    blender: ModuleType, addon: Addon, scene_file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bpy = blender
+    bpy.ops.wm.open_mainfile(filepath=str(scene_file))
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
+    by_operator = keys(bpy, addon)
+
+    command = addon("dafnet_addon.cli").main
+    out = tmp_path / "made" / "out.blend"
+    capfd.readouterr()
+    assert command(["bake", str(scene_file), "-o", str(out), "--json"]) == 0
+    report = json.loads(capfd.readouterr().out)
+    assert {"reading", "conditions", "sampling", "baking"} <= set(report["takes"][0]["seconds"])
+    assert report["takes"][0]["frames"] == 20
+
+    bpy.ops.wm.open_mainfile(filepath=str(out))
+    by_command = keys(bpy, addon)
+    assert by_command.keys() == by_operator.keys() and len(by_command) > 90
+    for key, values in by_operator.items():
+        np.testing.assert_array_equal(by_command[key], values, err_msg=str(key))
+
+
+def test_several_takes_are_kept_and_the_first_one_plays(
+    blender: ModuleType, addon: Addon, scene_file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "takes.blend"
+    capfd.readouterr()
+    arguments = ["bake", str(scene_file), "-o", str(out), "--takes", "3", "--seed", "5", "--frames", "3:9", "--json"]
+    assert addon("dafnet_addon.cli").main(arguments) == 0
+    takes = json.loads(capfd.readouterr().out)["takes"]
+    made = [(take["seed"], take["temperature"], take["frames"]) for take in takes]
+    assert made == [(5, 0.0, 7), (6, 0.8, 7), (7, 0.8, 7)]
+    blender.ops.wm.open_mainfile(filepath=str(out))
+    armature = next(ob for ob in blender.context.scene.objects if ob.type == "ARMATURE")
+    assert armature.animation_data.action.name == takes[0]["action"]
+    assert {take["action"] for take in takes} <= {action.name for action in blender.data.actions}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["none.blend", "-o", "out.blend"], "no file"),
+        (["{scene}", "-o", "out.txt"], ".blend"),
+        (["{scene}", "-o", "{out}", "--takes", "0"], "at least one take"),
+        (["{scene}", "-o", "{out}", "--character", "Nobody"], "no armature 'Nobody'"),
+        (["{scene}", "-o", "{out}", "--root", "Nothing"], "root 'Nothing'"),
+        (["{scene}", "-o", "{out}", "--frames", "9:3"], "before its start"),
+        (["{scene}", "-o", "{out}", "--weights", "none.safetensors"], "weights file"),
+    ],
+)
+def test_bake_says_what_is_wrong(
+    addon: Addon, scene_file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], arguments: list[str], said: str
+) -> None:
+    out = tmp_path / "out.blend"
+    capfd.readouterr()
+    filled = [argument.format(scene=scene_file, out=out) for argument in arguments]
+    assert addon("dafnet_addon.cli").main(["bake", *filled]) == 1
+    assert said in capfd.readouterr().err
+    assert not out.exists()
+
+
+def test_the_demo_room_has_its_seats_at_their_heights(blender: ModuleType, addon: Addon) -> None:
+    room = addon("dafnet_addon.blender.demo_room").build_room(blender.context)
+    demo = addon("dafnet_addon.demo")
+    blender.context.view_layer.update()
+    depsgraph = blender.context.evaluated_depsgraph_get()
+    furniture = {ob.name: ob for ob in blender.data.collections["Furniture"].objects}
+    assert set(furniture) == set(demo.PLACES)
+    for seat in demo.SEATS:
+        hit, where, _, _, ob, _ = room.scene.ray_cast(depsgraph, (*seat.center[:2], 0.9), (0, 0, -1))
+        assert hit and ob.name == seat.name
+        assert where.z == pytest.approx(seat.center[2], abs=0.002)
+
+    root = room.armature.dafnet.root
+    modes = set()
+    for rest in room.route.rests:
+        room.scene.frame_set(1 + (rest.first + rest.last) // 2)
+        np.testing.assert_allclose(root.matrix_world.translation[:2], rest.stop.position, atol=1e-4)
+        modes.add((rest.stop.name, room.armature.dafnet.mode))
+    assert modes == {("", "FREE"), ("Chair", "FREE"), ("Whiteboard", "EE"), ("Stool", "FREE")}
