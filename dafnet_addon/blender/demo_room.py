@@ -13,6 +13,7 @@ import numpy as np
 from mathutils import Euler, Matrix
 
 from ..core.paths import Route
+from ..core.root import smoothed
 from ..core.weights import load_weights
 from ..demo import FPS, PLACES, Place, demo_report, demo_route, hand_target
 from . import job
@@ -279,11 +280,18 @@ def _material(name: str) -> bpy.types.Material:
 
 
 def _camera_and_lights(scene: bpy.types.Scene, collection: bpy.types.Collection, walked: Route) -> None:
+    """A camera that turns after the character, calmly, and lights for the renderers that use them."""
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens = 37.0
+    camera.data.lens = 50.0
     collection.objects.link(camera)
     scene.camera = camera
-    look_at(camera, (4.4, -6.1, 2.70), (0.10, 0.0, 0.68))
+    followed = smoothed(walked.path, position_sigma=24.0).position
+    aims = (0.0, 0.1, 0.80) + (0.75, 0.45, 0.0) * followed
+    turns = []
+    for aim in aims:
+        look_at(camera, (4.4, -6.1, 2.70), aim)
+        turns.append(tuple(camera.rotation_euler))
+    _key(camera, np.arange(1, len(aims) + 1), rotation_euler=np.array(turns))
 
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.data.energy, sun.data.angle = 2.5, radians(8)
