@@ -11,6 +11,6 @@ from .core.take import Controls, Take
 from .core.weights import load_weights
 
 __all__ = [
-    "Box", "Controls", "DafnetError", "InputError", "Mesh", "Scene", "Take", "WeightsError", "generate", "generate_steps",
-    "load_weights",
+    "Box", "Controls", "DafnetError", "InputError", "Mesh", "Scene", "Take", "WeightsError", "generate",
+    "generate_steps", "load_weights",
 ]

@@ -286,10 +286,10 @@ def _camera_and_lights(scene: bpy.types.Scene, collection: bpy.types.Collection,
     collection.objects.link(camera)
     scene.camera = camera
     followed = smoothed(walked.path, position_sigma=24.0).position
-    aims = (0.0, 0.1, 0.80) + (0.75, 0.45, 0.0) * followed
+    aims = np.array([0.0, 0.1, 0.80]) + np.array([0.75, 0.45, 0.0]) * followed
     turns = []
     for aim in aims:
-        look_at(camera, (4.4, -6.1, 2.70), aim)
+        look_at(camera, (4.4, -6.1, 2.70), aim.tolist())
         turns.append(tuple(camera.rotation_euler))
     _key(camera, np.arange(1, len(aims) + 1), rotation_euler=np.array(turns))
 
