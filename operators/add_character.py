@@ -19,7 +19,8 @@ class DAFNET_OT_add_character(bpy.types.Operator):
 
     name: StringProperty(name="Name", default="Character", description="Name of the character and of its collection")
     height: FloatProperty(
-        name="Height", default=STATURE, min=0.5, soft_min=1.4, soft_max=2.1, max=4.0, description="Crown to sole, in metres",
+        name="Height", default=STATURE, min=0.5, soft_min=1.4, soft_max=2.1, max=4.0,
+        description="Crown to sole, in metres",
     )
 
     @classmethod

@@ -70,7 +70,10 @@ class DAFNET_OT_generate(bpy.types.Operator):
         return {"CANCELLED"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Do a tick's work; Esc cancels. Until the end only looking around is let through, so the scene stays as it was read."""
+        """Do a tick's work; Esc cancels.
+
+        Until the end only looking around is let through, so the scene stays as it was read.
+        """
         if event.type == "ESC":
             self.cancel(context)
             self.report({"INFO"}, "Cancelled; the scene is as it was")
@@ -109,14 +112,15 @@ class DAFNET_OT_generate(bpy.types.Operator):
                 type(self).progress = next(self._steps)
             except StopIteration as done:
                 return done.value
-        context.window_manager.progress_update(100 * self.progress)
+        context.window_manager.progress_update(100 * (self.progress or 0.0))
         _redraw(context)
         return None
 
     def _tell(self, result: job.Result) -> None:
         for warning in result.warnings:
             self.report({"WARNING"}, warning)
-        self.report({"INFO"}, f"{len(result.take)} frames in {sum(result.seconds.values()):.1f} s: '{result.action.name}'")
+        seconds = sum(result.seconds.values())
+        self.report({"INFO"}, f"{len(result.take)} frames in {seconds:.1f} s: '{result.action.name}'")
 
 
 def _redraw(context: bpy.types.Context) -> None:

@@ -39,7 +39,7 @@ class DAFNET_PT_character(bpy.types.Panel):
         column.prop(settings, "furniture")
         column.prop(settings, "root", icon="EMPTY_ARROWS")
         if settings.mode == "EE" or animated:
-            column = layout.column(heading="Targets")
+            column = layout.column()
             column.prop(settings, "head")
             column.prop(settings, "hand_left")
             column.prop(settings, "hand_right")

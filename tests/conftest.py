@@ -1,7 +1,8 @@
 """Paths for all tests, and a real Blender with the extension enabled for those that ask for it.
 
-Core tests need NumPy alone. Tests of the Blender side use the fixture ``blender``, which enables this working tree as an extension
-in a fresh user profile, and an empty scene for each test; they are skipped where no ``bpy`` module is installed.
+Core tests need NumPy alone. Tests of the Blender side use the fixture ``blender``, which enables this working tree as
+an extension in a fresh user profile, and an empty scene for each test; they are skipped where no ``bpy`` module is
+installed.
 """
 
 import importlib
@@ -51,7 +52,7 @@ def blender(extension: str) -> ModuleType:
 
 
 @pytest.fixture
-def addon(extension: str):  # noqa: ANN201
+def addon(extension: str):
     """Import a module of the extension by its path in the repository, as ``addon("dafnet_addon.blender.baker")``."""
     return lambda name: importlib.import_module(f"{extension}.{name}")
 

@@ -92,7 +92,10 @@ def test_bone_heads_play_the_joints(blender, addon, fps: int, base: float) -> No
     assert (scene.render.fps, scene.render.fps_base) == (fps, pytest.approx(base))
 
 
-@pytest.mark.parametrize(("unit", "height", "object_scale"), [(0.01, 1.75, 1.0), (1.0, 1.4, 1.0), (1.0, 1.75, 1.3), (0.5, 1.9, 0.7)])
+SIZES = [(0.01, 1.75, 1.0), (1.0, 1.4, 1.0), (1.0, 1.75, 1.3), (0.5, 1.9, 0.7)]
+
+
+@pytest.mark.parametrize(("unit", "height", "object_scale"), SIZES)
 def test_units_and_sizes(blender, addon, unit: float, height: float, object_scale: float) -> None:
     blender.context.scene.unit_settings.scale_length = unit
     ann = character(blender, addon, height=height)
@@ -141,9 +144,8 @@ def test_every_take_is_kept_and_mode_keys_stay(blender, addon) -> None:
     assert len({mine.name, first.name, second.name}) == 3
     assert ann.animation_data.action == second
     assert all(action.use_fake_user for action in (mine, first, second))
-    assert [(p.co[0], p.co[1]) for c in compat.action_curves(ann) if c.data_path == "dafnet.mode" for p in c.keyframe_points] == [
-        (1.0, 0.0), (20.0, 1.0),
-    ]
+    mode = next(curve for curve in compat.action_curves(ann) if curve.data_path == "dafnet.mode")
+    assert [tuple(point.co) for point in mode.keyframe_points] == [(1.0, 0.0), (20.0, 1.0)]
     compat.assign_action(ann, first)
     assert np.abs(bone_heads(blender, addon, ann, 5) - made_take(addon, seed=1).joints[4]).max() < 1e-3
 

@@ -20,7 +20,8 @@ class Shot:
         self.scene.collection.children.link(furniture)
         mesh = bpy.data.meshes.new("Chair")
         corners = [(x, y, z) for x in (-0.25, 0.25) for y in (-0.25, 0.25) for z in (0, 0.45)]
-        mesh.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
+        faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+        mesh.from_pydata(corners, [], faces)
         chair = bpy.data.objects.new("Chair", mesh)
         chair.location = (0, 1.5, 0)
         furniture.objects.link(chair)

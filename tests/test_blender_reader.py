@@ -85,16 +85,16 @@ def test_collection_and_geometry_nodes_instances(stage: Stage) -> None:
     chairs = stage.bpy.data.collections.new("Chairs")
     stage.cube("Leg", collection=chairs, location=(0, 0, 1), scale=(0.1, 0.1, 1))
     stage.cube("Seat", collection=chairs, location=(0, 0, 2))
-    instancer = stage.put(stage.bpy.data.objects.new("Chair", None), instance_type="COLLECTION", instance_collection=chairs)
+    instancer = stage.put(stage.bpy.data.objects.new("Chair", None), instance_type="COLLECTION")
+    instancer.instance_collection = chairs
     key(instancer, "location", (1, (0, 0, 0)), (10, (9, 0, 0)))
 
     grid = stage.cube("Grid")
     tree = stage.bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    source, points, sphere, out = (
-        tree.nodes.new(n) for n in ("NodeGroupInput", "GeometryNodeInstanceOnPoints", "GeometryNodeMeshUVSphere", "NodeGroupOutput")
-    )
+    kinds = ("NodeGroupInput", "GeometryNodeInstanceOnPoints", "GeometryNodeMeshUVSphere", "NodeGroupOutput")
+    source, points, sphere, out = (tree.nodes.new(kind) for kind in kinds)
     tree.links.new(source.outputs[0], points.inputs["Points"])
     tree.links.new(sphere.outputs["Mesh"], points.inputs["Instance"])
     tree.links.new(points.outputs[0], out.inputs[0])

@@ -1,1 +1,4 @@
-"""The only readers and writers of Blender data. Lengths are metres here; Blender's own units stay at the outermost edge."""
+"""The only readers and writers of Blender data.
+
+Lengths are metres here; Blender's own units stay at the outermost edge.
+"""

@@ -9,14 +9,15 @@ from ..core.errors import InputError
 from ..core.rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix, rotate, transpose
 from ..core.skeleton import JOINTS
 from ..core.take import Take
-from .armature import FACING, character_scale
+from .armature import character_scale
 from .compat import action_curves, assign_action, new_action
+from .mannequin import FACING
 
 __all__ = ["bake", "require_bakeable"]
 
 
 def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
-    """Size of a character that can be baked onto; else ``InputError`` with what to do. ``unit``: see ``character_scale``."""
+    """The character's size, see ``character_scale``, if it can be baked onto; else ``InputError`` with what to do."""
     if armature.type != "ARMATURE":
         raise InputError(f"'{armature.name}' is no armature; select a character that Add Character made.")
     if armature.library or armature.override_library:
@@ -24,25 +25,26 @@ def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
     if armature.parent:
         raise InputError(f"The armature '{armature.name}' has a parent; clear it, and parent the root object instead.")
     if any(not constraint.mute for constraint in armature.constraints):
-        raise InputError(f"The armature '{armature.name}' has object constraints; mute them, and constrain the root instead.")
-    if any(armature.delta_location) or any(armature.delta_rotation_euler) or any(s != 1.0 for s in armature.delta_scale):
+        raise InputError(f"The armature '{armature.name}' has object constraints; mute them and constrain the root.")
+    delta = (*armature.delta_location, *armature.delta_rotation_euler, *(s - 1.0 for s in armature.delta_scale))
+    if any(delta):
         raise InputError(f"The armature '{armature.name}' has delta transforms; apply them and try again.")
     return character_scale(armature, unit)
 
 
 def bake(take: Take, armature: bpy.types.Object, frame_start: int, name: str, unit: float = 1.0) -> bpy.types.Action:
-    """Key every frame of ``take`` from ``frame_start`` on in a new action ``name``, assigned to ``armature`` with its slot.
+    """Key every frame of ``take`` from ``frame_start`` on, in a new action ``name`` that ``armature`` plays.
 
-    The object follows the root (location and heading), each bone turns, and the pelvis moves: bone lengths are constant, so
-    all 22 bone heads lie on ``take.joints``. ``unit`` is the length of a Blender unit in metres. Earlier actions are kept by
-    a fake user, and keys of the ``dafnet`` settings (the mode) are carried over to the new action.
+    The object follows the root (location and heading), each bone turns, and the pelvis moves: bone lengths are
+    constant, so all 22 bone heads lie on ``take.joints``. ``unit`` is the length of a Blender unit in metres. Earlier
+    actions are kept by a fake user, and keys of the ``dafnet`` settings (the mode) are carried over to the new action.
 
-    ``InputError``: the armature is linked, overridden, parented, constrained, edited, or its size differs from the take's;
-    nothing is changed then.
+    ``InputError``: the armature is linked, overridden, parented, constrained, edited, or its size differs from the
+    take's; nothing is changed then.
     """
     scale = require_bakeable(armature, unit)
     if abs(scale - take.scale) > 1e-3 * take.scale:
-        raise InputError(f"The character '{armature.name}' changed its size since the take was generated; generate it again.")
+        raise InputError(f"The character '{armature.name}' is no longer of the take's size; generate it again.")
     if not all(np.isfinite(values).all() for values in (take.joints, take.rotations, take.root)):
         raise InputError("The take holds values that are not numbers; generate it again.")
 
@@ -80,7 +82,8 @@ def bake(take: Take, armature: bpy.types.Object, frame_start: int, name: str, un
 
 
 def _key(
-    add_curve: Callable[[str, int, str], bpy.types.FCurve], path: str, group: str, frames: np.ndarray, values: np.ndarray,
+    add_curve: Callable[[str, int, str], bpy.types.FCurve],
+    path: str, group: str, frames: np.ndarray, values: np.ndarray,
 ) -> None:
     """One linear curve for each column of ``values`` (T, D)."""
     for index, column in enumerate(values.T):

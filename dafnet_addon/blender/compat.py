@@ -1,7 +1,7 @@
 """Everything in which Blender 4.2, 4.5, 5.0 and 5.2 differ for this add-on.
 
-Actions have slots from 4.4 on, and ``Action.fcurves`` is gone in 5.0; EEVEE changed its name twice; video is a media type of
-its own from 5.0 on.
+Actions have slots from 4.4 on, and ``Action.fcurves`` is gone in 5.0; EEVEE changed its name twice; video is a media
+type of its own from 5.0 on.
 """
 
 from collections.abc import Callable
@@ -16,8 +16,10 @@ EEVEE = "BLENDER_EEVEE" if bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT
 """Identifier of the EEVEE render engine."""
 
 
-def new_action(owner: bpy.types.Object, name: str) -> tuple[bpy.types.Action, Callable[[str, int, str], bpy.types.FCurve]]:
-    """A new action for ``owner``, not yet assigned, and a function (data path, index, group) that adds a curve to it."""
+def new_action(
+    owner: bpy.types.Object, name: str,
+) -> tuple[bpy.types.Action, Callable[[str, int, str], bpy.types.FCurve]]:
+    """A new action for ``owner``, not assigned yet, and a function (path, index, group) that adds a curve to it."""
     action = bpy.data.actions.new(name)
     if _SLOTS:
         slot = action.slots.new(id_type="OBJECT", name=owner.name)

@@ -30,8 +30,10 @@ _READ, _GENERATED = 0.1, 0.98
 
 @dataclass(frozen=True)
 class Result:
-    """A baked take: its new ``action`` (assigned to the armature), the ``take``, sentences for the user in ``warnings``, and
-    ``seconds`` by stage: ``reading``, those of ``Take.seconds`` (``conditions``, ``sampling``, …) and ``baking``.
+    """A baked take.
+
+    ``action``: new, and played by the armature. ``warnings``: sentences for the user. ``seconds`` by stage:
+    ``reading``, those of ``Take.seconds`` (``conditions``, ``sampling``, …) and ``baking``.
     """
 
     action: bpy.types.Action
@@ -45,9 +47,10 @@ def steps(
 ) -> Generator[float, None, Result]:
     """Read the scene, generate, bake; yields progress in [0, 1] and returns the ``Result``.
 
-    ``settings`` comes from ``settings_of(armature, scene, **overrides)``. Without ``weights`` those of the preferences, else
-    the shipped ones, are loaded. The current frame is as it was at every yield, and until the last stage nothing in the
-    scene is changed: an error (``InputError``, ``WeightsError``) or ``close()`` leaves it untouched.
+    ``settings`` comes from ``settings_of(armature, scene, **overrides)``. Without ``weights`` those of the
+    preferences, else the shipped ones, are loaded. The current frame is as it was at every yield, and until the last
+    stage nothing in the scene is changed: an error (``InputError``, ``WeightsError``) or ``close()`` leaves it
+    untouched.
     """
     if weights is None:
         weights = load_weights(weights_path(context))

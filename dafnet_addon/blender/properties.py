@@ -11,8 +11,8 @@ from ..core.errors import InputError
 from ..core.take import MODES
 
 __all__ = [
-    "ADDON", "CharacterSettings", "Preferences", "Settings", "settings_of", "find_scene", "find_object", "find_collection",
-    "register", "unregister", "ensure_registered", "weights_path",
+    "ADDON", "CharacterSettings", "Preferences", "Settings", "settings_of", "find_scene", "find_object",
+    "find_collection", "register", "unregister", "ensure_registered", "weights_path",
 ]
 
 ADDON = (__package__ or "").removesuffix(".dafnet_addon.blender")
@@ -49,22 +49,23 @@ class CharacterSettings(bpy.types.PropertyGroup):
     )
     head: PointerProperty(
         name="Head", type=bpy.types.Object, poll=_is_not_the_character, options=set(),
-        description="Target of the head joint. Once rotated, it also turns the head: Y where the face looks, Z to the crown",
+        description="Target of the head joint. Once rotated, it turns the head: Y where the face looks, Z to the crown",
     )
     hand_left: PointerProperty(
         name="Left Hand", type=bpy.types.Object, poll=_is_not_the_character, options=set(),
-        description="Target of the left wrist. Once rotated, it also turns the hand: Y along the fingers, Z out of its back",
+        description="Target of the left wrist. Once rotated, it turns the hand: Y to the fingers, Z out of its back",
     )
     hand_right: PointerProperty(
         name="Right Hand", type=bpy.types.Object, poll=_is_not_the_character, options=set(),
-        description="Target of the right wrist. Once rotated, it also turns the hand: Y along the fingers, Z out of its back",
+        description="Target of the right wrist. Once rotated, it turns the hand: Y to the fingers, Z out of its back",
     )
     upper_body_source: PointerProperty(
         name="Source", type=bpy.types.Object, poll=_is_armature, options=set(),
         description="Armature with the character's bone names whose upper body is copied",
     )
     use_scene_range: BoolProperty(
-        name="Scene Range", default=True, options=set(), description="Generate the frames from the scene's start to its end",
+        name="Scene Range", default=True, options=set(),
+        description="Generate the frames from the scene's start to its end",
     )
     frame_start: IntProperty(name="Start", default=1, options=set(), description="First frame to generate")
     frame_end: IntProperty(name="End", default=250, options=set(), description="Last frame to generate")
@@ -91,7 +92,8 @@ class Preferences(bpy.types.AddonPreferences):
     bl_idname = ADDON
 
     weights: StringProperty(
-        name="Weights", subtype="FILE_PATH", description="File of trained weights; leave it empty for the weights that ship",
+        name="Weights", subtype="FILE_PATH",
+        description="File of trained weights; leave it empty for the weights that ship",
     )
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -101,10 +103,10 @@ class Preferences(bpy.types.AddonPreferences):
 
 @dataclass(frozen=True)
 class Settings:
-    """A plain copy of what one generation needs; objects and the collection by ``name_full``, None where there is none.
+    """A plain copy of what one generation needs; objects and the collection by ``name_full``, None where unset.
 
-    ``mode``: None takes the armature's property frame by frame, a word overrules it. ``frame_start`` and ``frame_end`` are
-    both generated. ``lower_seed``: None goes with ``seed``.
+    ``mode``: None takes the armature's property frame by frame, a word overrules it. ``frame_start`` and ``frame_end``
+    are both generated. ``lower_seed``: None goes with ``seed``.
     """
 
     armature: str
@@ -127,12 +129,13 @@ class Settings:
             raise InputError(f"The mode '{self.mode}' is unknown; choose {', '.join(MODES)}.")
         if self.frame_end < self.frame_start:
             raise InputError(
-                f"The frame range ends at {self.frame_end}, before its start at {self.frame_start}; set the end after the start."
+                f"The frame range ends at {self.frame_end}, before its start at {self.frame_start}; "
+                "set the end after the start."
             )
 
 
 def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides: Any) -> Settings:
-    """The settings of a character (its ``Object.dafnet``) in a scene; ``overrides`` replace fields of ``Settings`` by name."""
+    """The settings of a character (``Object.dafnet``) in a scene; ``overrides`` replace fields of ``Settings``."""
     own = armature.dafnet
     links = ("root", "furniture", "head", "hand_left", "hand_right", "upper_body_source")
     values: dict[str, Any] = {name: target.name_full if (target := getattr(own, name)) else None for name in links}
@@ -148,7 +151,7 @@ def find_scene(settings: Settings) -> bpy.types.Scene:
     """The scene of the settings; ``InputError`` where it is gone."""
     scene = next((s for s in bpy.data.scenes if s.name_full == settings.scene), None)
     if scene is None:
-        raise InputError(f"The scene '{settings.scene}' is not in this file any more; generate again from another scene.")
+        raise InputError(f"The scene '{settings.scene}' is not in this file any more; generate again from another.")
     return scene
 
 
@@ -167,7 +170,7 @@ def find_collection(name: str) -> bpy.types.Collection:
     """The collection of this ``name_full``; ``InputError`` where it is gone."""
     found = next((c for c in bpy.data.collections if c.name_full == name), None)
     if found is None:
-        raise InputError(f"The furniture collection '{name}' is not in this file; choose another one in the DAFNet panel.")
+        raise InputError(f"The furniture collection '{name}' is not in this file; choose another in the DAFNet panel.")
     return found
 
 

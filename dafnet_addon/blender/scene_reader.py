@@ -1,12 +1,14 @@
 """The scene as plain arrays: evaluated furniture, the root, targets, mode and source pose, frame by frame, in metres.
 
-One unit of Blender is ``metres_per_unit`` metres; everything handed to the core is in metres. The evaluated scene is read, so
-keys, constraints, drivers, modifiers and instances all count; what is hidden in the viewport does not exist.
+One unit of Blender is ``metres_per_unit`` metres; everything handed to the core is in metres. The evaluated scene is
+read, so keys, constraints, drivers, modifiers and instances all count; what is hidden in the viewport does not exist.
 """
 
+from collections import defaultdict
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 import bpy
 import numpy as np
@@ -17,9 +19,10 @@ from ..core.root import POSITION_SIGMA, YAW_SIGMA, root_from_joints, root_from_m
 from ..core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
 from ..core.solids import Mesh, Scene
 from ..core.take import Controls
-from .armature import FACING, metres_per_unit, missing_bones
+from .armature import metres_per_unit, missing_bones
 from .baker import require_bakeable
 from .compat import action_curves
+from .mannequin import FACING
 from .properties import Settings, find_collection, find_object, find_scene
 
 __all__ = ["ReadScene", "read_steps", "read_scene"]
@@ -40,7 +43,10 @@ class ReadScene:
 
 @dataclass
 class _Piece:
-    """One evaluated mesh, an object's own or an instance: where to find it again, its geometry, its matrix per frame."""
+    """One evaluated mesh, an object's own (``source``) or an instance, with its matrix in each frame.
+
+    ``key`` finds it again. ``vertices`` (V, 3), ``triangles`` (F, 3): in its own space, Blender units.
+    """
 
     key: tuple
     name: str
@@ -63,15 +69,15 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> ReadScene:
 def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[float, None, ReadScene]:
     """Read the scene; yields progress in [0, 1], at which the current frame is as it was.
 
-    Furniture: every mesh of the collection and of the collections in it, as the viewport evaluates it at the first frame, with
-    its matrix for each frame if it moves; shapes that change over time are warned about. The character, what is parented to
-    it or deformed by it, the root and the targets are never furniture.
+    Furniture: every mesh of the collection and of the collections in it, as the viewport evaluates it at the first
+    frame, with its matrix for each frame if it moves; shapes that change over time are warned about. The character,
+    what is parented to it or deformed by it, the root and the targets are never furniture.
 
-    Targets: the empties' places. Their rotations count where they are keyed, or where a target was ever turned in its parent's
-    space; a target that was only moved leaves head and hands free to turn.
+    Targets: the empties' places. Their rotations count where they are keyed, or where a target was ever turned in its
+    parent's space; a target that was only moved leaves head and hands free to turn.
 
-    Upper body: the source's bones, carried from the source's root onto this character's and to its size. The source's root is
-    its object if it is one of our characters, else it is found from hips and shoulders.
+    Upper body: the source's bones, carried from the source's root onto this character's and to its size. The source's
+    root is its object if it is one of our characters, else it is found from hips and shoulders.
 
     ``InputError``: something that is needed is missing, gone, linked, empty or not a number.
     """
@@ -84,17 +90,16 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     if settings.root is None:
         raise InputError(f"The character '{armature.name}' has no root; choose its root object in the DAFNet panel.")
     root = find_object(settings, settings.root, "root")
-    targets = {
-        role: find_object(settings, name, label) for role, label in _TARGETS.items() if (name := getattr(settings, role))
-    }
+    names = {role: name for role in _TARGETS if (name := getattr(settings, role))}
+    targets = {role: find_object(settings, name, _TARGETS[role]) for role, name in names.items()}
     source = _upper_body_source(settings, armature)
     own = {armature, root, *targets.values(), *armature.children_recursive}
-    collection = find_collection(settings.furniture) if settings.furniture else None
+    furniture = _Furniture(find_collection(settings.furniture), armature, own) if settings.furniture else None
 
     frames = range(settings.frame_start, settings.frame_end + 1)
     pieces: list[_Piece] = []
     modes: list[str] = []
-    tracks: dict[str, list[np.ndarray]] = {name: [] for name in ("root", *targets, *(f"{role} local" for role in targets))}
+    tracks = defaultdict(list)
     bones: list[np.ndarray] = []
     bodies: list[np.ndarray] = []
     for start in range(0, len(frames), _BATCH):
@@ -102,8 +107,8 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
             for frame in frames[start : start + _BATCH]:
                 scene.frame_set(frame)
                 depsgraph = context.evaluated_depsgraph_get()
-                if frame == frames[0] and collection:
-                    pieces = _furniture(depsgraph, collection, armature, own, unit)
+                if frame == frames[0] and furniture:
+                    pieces = furniture.pieces(depsgraph)
                 _follow(depsgraph, pieces)
                 modes.append(settings.mode or armature.dafnet.mode)
                 tracks["root"].append(_array(root.evaluated_get(depsgraph).matrix_world))
@@ -117,11 +122,15 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
                     bones.append(np.array([evaluated.pose.bones[name].head for name in JOINTS]))
         yield min(start + _BATCH, len(frames)) / (len(frames) + 1)
 
-    with _frame_kept(scene):
-        warnings = _deforming(context, scene, frames, collection, armature, own, unit, pieces)
+    warnings: tuple[str, ...] = ()
+    if furniture:
+        with _frame_kept(scene):
+            warnings = furniture.deforming(context, frames, pieces)
+    else:
+        warnings = ("No furniture is chosen; the character moves on a bare floor.",)
     fps = scene.render.fps / scene.render.fps_base
     root_matrices = _rigid(np.array(tracks["root"]), unit, f"root '{root.name}'")
-    given: dict[str, np.ndarray] = {}
+    given: dict[str, Any] = {}
     for role, target in targets.items():
         matrices = _rigid(np.array(tracks[role]), unit, f"{_TARGETS[role]} '{target.name}'")
         given[role] = matrices[:, :3, 3]
@@ -130,13 +139,11 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     if source and "FULL" in modes:
         given["upper_body"] = _carried(source, np.array(bones), np.array(bodies), unit, root_matrices, size, fps)
     elif "FULL" in modes:
-        raise InputError(f"The mode of '{armature.name}' is FULL but it has no source; choose the armature to copy from.")
+        raise InputError(f"The mode of '{armature.name}' is FULL but no source is set; choose one to copy from.")
     mode = modes[0] if len(set(modes)) == 1 else tuple(modes)
     controls = Controls(fps=fps, root=root_matrices, mode=mode, scale=size, **given)
 
     solids = tuple(_solid(piece, unit) for piece in pieces)
-    if collection is None:
-        warnings += ("No furniture is chosen; the character moves on a bare floor.",)
     yield 1.0
     return ReadScene(Scene(solids), controls, warnings)
 
@@ -165,22 +172,6 @@ def _key(instance: bpy.types.DepsgraphObjectInstance) -> tuple:
     return (_owner(instance).name_full, instance.object.original.name_full, place)
 
 
-def _meshes(
-    depsgraph: bpy.types.Depsgraph, collection: bpy.types.Collection, armature: bpy.types.Object, own: set[bpy.types.Object],
-) -> Iterator[bpy.types.DepsgraphObjectInstance]:
-    """Every evaluated mesh of the collection that is furniture, instances among them."""
-    members = set(collection.all_objects) - own
-    for instance in depsgraph.object_instances:
-        if instance.object.type != "MESH" or not (instance.is_instance or instance.show_self):
-            continue
-        if _owner(instance) in members and instance.object.original not in own and not _deformed_by(instance.object, armature):
-            yield instance
-
-
-def _deformed_by(candidate: bpy.types.Object, armature: bpy.types.Object) -> bool:
-    return any(m.type == "ARMATURE" and m.object and m.object.original == armature for m in candidate.original.modifiers)
-
-
 def _geometry(evaluated: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (V, 3) and triangles (F, 3) in the object's own space."""
     mesh = evaluated.to_mesh()
@@ -195,30 +186,66 @@ def _geometry(evaluated: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3)
 
 
-def _furniture(
-    depsgraph: bpy.types.Depsgraph, collection: bpy.types.Collection, armature: bpy.types.Object,
-    own: set[bpy.types.Object], unit: float,
-) -> list[_Piece]:
-    """The collection's meshes with faces; instances of one mesh share its arrays."""
-    shapes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-    pieces: list[_Piece] = []
-    seen = False
-    for instance in _meshes(depsgraph, collection, armature, own):
-        seen = True
-        pointer = instance.object.data.as_pointer()
-        if pointer not in shapes:
-            shapes[pointer] = _geometry(instance.object)
-        vertices, triangles = shapes[pointer]
-        if len(triangles):
-            source = None if instance.is_instance else instance.object.original
-            pieces.append(_Piece(_key(instance), _owner(instance).name, source, vertices, triangles))
-    if not seen:
-        raise InputError(
-            f"The furniture collection '{collection.name}' has no visible mesh; put furniture into it or choose none."
+class _Furniture:
+    """A collection's evaluated meshes, without the character and what is its ``own``."""
+
+    def __init__(
+        self, collection: bpy.types.Collection, armature: bpy.types.Object, own: set[bpy.types.Object],
+    ) -> None:
+        self.collection, self.armature, self.own = collection, armature, own
+        self.members = set(collection.all_objects) - own
+
+    def _deformed(self, candidate: bpy.types.Object) -> bool:
+        """Whether the character's armature deforms it, as clothes are."""
+        return any(m.type == "ARMATURE" and m.object == self.armature for m in candidate.modifiers)
+
+    def meshes(self, depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.DepsgraphObjectInstance]:
+        """Every evaluated mesh that is furniture, instances among them."""
+        for instance in depsgraph.object_instances:
+            if instance.object.type != "MESH" or not (instance.is_instance or instance.show_self):
+                continue
+            made_of = instance.object.original
+            if _owner(instance) in self.members and made_of not in self.own and not self._deformed(made_of):
+                yield instance
+
+    def pieces(self, depsgraph: bpy.types.Depsgraph) -> list[_Piece]:
+        """The meshes with faces; instances of one mesh share its arrays."""
+        shapes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        pieces: list[_Piece] = []
+        seen = False
+        for instance in self.meshes(depsgraph):
+            seen = True
+            pointer = instance.object.data.as_pointer()
+            if pointer not in shapes:
+                shapes[pointer] = _geometry(instance.object)
+            vertices, triangles = shapes[pointer]
+            if len(triangles):
+                source = None if instance.is_instance else instance.object.original
+                pieces.append(_Piece(_key(instance), _owner(instance).name, source, vertices, triangles))
+        name = self.collection.name
+        if not seen:
+            raise InputError(f"The furniture collection '{name}' has no visible mesh; fill it or choose none.")
+        if not pieces:
+            raise InputError(f"The meshes of the furniture collection '{name}' have no faces; give them some.")
+        return pieces
+
+    def deforming(self, context: bpy.types.Context, frames: range, pieces: list[_Piece]) -> tuple[str, ...]:
+        """Warnings about meshes whose shape differs in the middle or at the end of the range."""
+        shapes = {piece.key: piece for piece in pieces}
+        changed: dict[str, None] = {}
+        for frame in dict.fromkeys((frames[len(frames) // 2], frames[-1])):
+            context.scene.frame_set(frame)
+            for instance in self.meshes(context.evaluated_depsgraph_get()):
+                piece = shapes.get(_key(instance))
+                if piece is None:
+                    continue
+                vertices, _ = _geometry(instance.object)
+                tolerance = 1e-3 * np.ptp(piece.vertices, axis=0).max()
+                if vertices.shape != piece.vertices.shape or np.abs(vertices - piece.vertices).max() > tolerance:
+                    changed[piece.name] = None
+        return tuple(
+            f"The shape of '{name}' changes during the shot; its shape at the first frame is used." for name in changed
         )
-    if not pieces:
-        raise InputError(f"The meshes of the furniture collection '{collection.name}' have no faces; give them some.")
-    return pieces
 
 
 def _follow(depsgraph: bpy.types.Depsgraph, pieces: list[_Piece]) -> None:
@@ -234,29 +261,6 @@ def _follow(depsgraph: bpy.types.Depsgraph, pieces: list[_Piece]) -> None:
             piece.matrices.append(_array(piece.source.evaluated_get(depsgraph).matrix_world))
         else:
             piece.matrices.append(found[piece.key] if piece.key in found else piece.matrices[-1])
-
-
-def _deforming(
-    context: bpy.types.Context, scene: bpy.types.Scene, frames: range, collection: bpy.types.Collection | None,
-    armature: bpy.types.Object, own: set[bpy.types.Object], unit: float, pieces: list[_Piece],
-) -> tuple[str, ...]:
-    """Warnings about furniture whose shape differs in the middle or at the end of the range."""
-    if collection is None:
-        return ()
-    shapes = {piece.key: piece for piece in pieces}
-    changed: dict[str, None] = {}
-    for frame in dict.fromkeys((frames[len(frames) // 2], frames[-1])):
-        scene.frame_set(frame)
-        for instance in _meshes(context.evaluated_depsgraph_get(), collection, armature, own):
-            piece = shapes.get(_key(instance))
-            if piece is None:
-                continue
-            vertices, _ = _geometry(instance.object)
-            if vertices.shape != piece.vertices.shape or not np.allclose(vertices, piece.vertices, atol=1e-4 / unit):
-                changed[piece.name] = None
-    return tuple(
-        f"The shape of '{name}' changes during the shot; its shape at the first frame is used throughout." for name in changed
-    )
 
 
 def _solid(piece: _Piece, unit: float) -> Mesh:
@@ -293,16 +297,23 @@ def _upper_body_source(settings: Settings, armature: bpy.types.Object) -> bpy.ty
         return None
     source = find_object(settings, settings.upper_body_source, "upper body's source")
     if source.type != "ARMATURE" or source == armature:
-        raise InputError(f"'{source.name}' cannot be the upper body's source; choose another armature than the character.")
+        raise InputError(f"'{source.name}' cannot be the upper body's source; choose another armature.")
     if missing := missing_bones(source):
-        raise InputError(f"The upper body's source '{source.name}' has no bone '{missing[0]}'; rename its bones as the character's.")
+        raise InputError(
+            f"The upper body's source '{source.name}' has no bone '{missing[0]}'; name its bones as the character's."
+        )
     return source
 
 
 def _carried(
-    source: bpy.types.Object, heads: np.ndarray, bodies: np.ndarray, unit: float, root: np.ndarray, size: float, fps: float,
+    source: bpy.types.Object, heads: np.ndarray, bodies: np.ndarray,
+    unit: float, root: np.ndarray, size: float, fps: float,
 ) -> np.ndarray:
-    """Upper body (T, 14, 3) in world metres on this character's root, of the source's bone heads (T, 22, 3) in its own space."""
+    """Upper body (T, 14, 3), world metres, on this character's ``root`` (T, 4, 4) and of its ``size``.
+
+    ``heads`` (T, 22, 3): the source's bones in its own space; ``bodies`` (T, 4, 4): its object's matrices; both in
+    Blender units.
+    """
     what = f"upper body's source '{source.name}'"
     if not np.isfinite(heads).all() or not np.isfinite(bodies).all():
         raise InputError(f"The {what} has a transform that is not a number; clear its transform or fix what drives it.")
