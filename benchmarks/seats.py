@@ -43,7 +43,7 @@ def seat(height: float, back: bool) -> Scene:
             solids.append(box((x, y, 0.0), (x + 0.04, y + 0.04, height - 0.05)))
     if back:
         solids.append(box((-0.22, -0.25, height - 0.05), (0.22, -0.21, height + 0.42)))
-    return Scene(solids)
+    return Scene(tuple(solids))
 
 
 def _takes(scene: Scene, walked: Route, weights: Any) -> Iterator[tuple[float, Take]]:

@@ -272,7 +272,8 @@ def _material(name: str) -> bpy.types.Material:
         found = bpy.data.materials.new(name)
         colour = (*_COLOURS[name], 1.0)
         found.diffuse_color = colour
-        found.use_nodes = True
+        if found.node_tree is None:  # before 5.0
+            found.use_nodes = True
         shader = next(node for node in found.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
         shader.inputs["Base Color"].default_value = colour
         shader.inputs["Roughness"].default_value = 0.6
