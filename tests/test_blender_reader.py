@@ -188,6 +188,19 @@ def test_the_root_follows_whatever_drives_it(stage: Stage) -> None:
     assert stage.read().controls.fps == pytest.approx(30 / 1.001)
 
 
+def test_a_hidden_root_moves_and_a_disabled_one_is_refused(stage: Stage) -> None:
+    stage.ann.dafnet.furniture = None
+    root = stage.ann.dafnet.root
+    key(root, "location", (1, (0, 0, 0)), (10, (9, 0, 0)))
+    root.hide_set(True)
+    assert np.ptp(stage.read().controls.root[:, 0, 3]) == pytest.approx(9.0)
+    root.hide_viewport = True
+    stage.refused("'Ann Root'.*disabled in viewports")
+    root.hide_viewport = False
+    stage.bpy.context.view_layer.layer_collection.children["Ann"].exclude = True
+    stage.refused("'Ann'.*disabled in viewports")
+
+
 def test_targets_and_when_their_rotation_counts(stage: Stage) -> None:
     own = stage.ann.dafnet
     stage.cube("Chair")

@@ -14,7 +14,7 @@ FACING = np.diag([-1.0, -1.0, 1.0])
 
 _LIGHT, _DARK = 0, 1
 _MATERIALS = (("Mannequin", (0.62, 0.56, 0.50, 1.0)), ("Mannequin Joints", (0.16, 0.15, 0.15, 1.0)))
-_RINGS, _SEGMENTS = 16, 20
+_RINGS, _SEGMENTS = 14, 16
 
 # Bone, material, axis, and sections along that axis: the place on it, the centre's two other coordinates, half widths.
 _PARTS = (

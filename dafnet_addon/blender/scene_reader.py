@@ -107,8 +107,9 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
             for frame in frames[start : start + _BATCH]:
                 scene.frame_set(frame)
                 depsgraph = context.evaluated_depsgraph_get()
-                if frame == frames[0] and furniture:
-                    pieces = furniture.pieces(depsgraph)
+                if frame == frames[0]:
+                    _require_alive(depsgraph, [armature, root, *targets.values(), *([source] if source else [])])
+                    pieces = furniture.pieces(depsgraph) if furniture else []
                 _follow(depsgraph, pieces)
                 modes.append(settings.mode or armature.dafnet.mode)
                 tracks["root"].append(_array(root.evaluated_get(depsgraph).matrix_world))
@@ -156,6 +157,14 @@ def _frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
         yield
     finally:
         scene.frame_set(frame, subframe=subframe)
+
+
+def _require_alive(depsgraph: bpy.types.Depsgraph, needed: list[bpy.types.Object]) -> None:
+    """Blender does not move objects that are disabled in viewports; those hidden with H it does."""
+    alive = {each.original for each in depsgraph.ids}
+    for each in needed:
+        if each not in alive:
+            raise InputError(f"'{each.name}' or its collection is disabled in viewports; enable it, or hide it with H.")
 
 
 def _array(matrix: Matrix) -> np.ndarray:
@@ -249,7 +258,7 @@ class _Furniture:
 
 
 def _follow(depsgraph: bpy.types.Depsgraph, pieces: list[_Piece]) -> None:
-    """Add this frame's matrices; an instance that is gone stays where it was."""
+    """Add this frame's matrices; what is gone or disabled by now stays where it was."""
     found: dict[tuple, np.ndarray] = {}
     if any(piece.source is None for piece in pieces):
         wanted = {piece.key for piece in pieces if piece.source is None}
@@ -258,9 +267,8 @@ def _follow(depsgraph: bpy.types.Depsgraph, pieces: list[_Piece]) -> None:
                 found[key] = _array(instance.matrix_world)
     for piece in pieces:
         if piece.source is not None:
-            piece.matrices.append(_array(piece.source.evaluated_get(depsgraph).matrix_world))
-        else:
-            piece.matrices.append(found[piece.key] if piece.key in found else piece.matrices[-1])
+            found[piece.key] = _array(piece.source.evaluated_get(depsgraph).matrix_world)
+        piece.matrices.append(found[piece.key] if piece.key in found else piece.matrices[-1])
 
 
 def _solid(piece: _Piece, unit: float) -> Mesh:
