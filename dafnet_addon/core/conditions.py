@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .distance import prepared, scaled
+from .distance import prepared, rigid_split, scaled
 from .errors import InputError
 from .occupancy import distance, occupancy
 from .resampling import MODEL_FPS, covering_frames, frame_times, resample_nearest, resample_positions, resample_rigid
@@ -136,8 +136,10 @@ def _at_model_rate(scene: Scene, times: np.ndarray, target: np.ndarray) -> Scene
                 moved = resample_rigid(frames, times, target)
                 solid = replace(solid, center=moved[:, :3, 3], rotation=moved[:, :3, :3])
         elif np.ndim(solid.matrix) == 3 and len(solid.matrix) > 1:
-            # Scale and shear are those of the first frame (``prepared`` warns); only the rigid motion is mixed.
-            solid = replace(solid, matrix=resample_positions(np.asarray(solid.matrix, float), times, target))
+            rigid, linear = rigid_split(np.asarray(solid.matrix, float))
+            full = resample_rigid(rigid, times, target)
+            full[:, :3, :3] = full[:, :3, :3] @ resample_positions(linear, times, target)
+            solid = replace(solid, matrix=full)
         solids.append(solid)
     return Scene(tuple(solids))
 

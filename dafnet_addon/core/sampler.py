@@ -189,9 +189,9 @@ class Sampler:
             back = array(f"{name}.lstm.weight_hh_l{i}", 4 * width, width).T
             total = array(f"{name}.lstm.bias_ih_l{i}", 4 * width) + array(f"{name}.lstm.bias_hh_l{i}", 4 * width)
             if i == 0:
-                # Rows of the input: half a pose, actions, velocity, code, observation (upper part first), mask.
+                # Rows of the input: half a pose, actions, velocity, observation (upper part first), mask, code.
                 fresh = [np.arange(half + self.actions)]
-                start = half + self.actions + 3 + c["code"]
+                start = half + self.actions + 3
                 if size == _LOWER_SIZE:
                     # The upper slots of the observation are the upper body just made: known only now.
                     fresh.append(np.arange(start, start + _UPPER_SIZE))
@@ -239,7 +239,7 @@ class Sampler:
                 hidden = occupancy @ first[0] + first[1]
                 codes.append((hidden * (hidden > 0)) @ second[0] + second[1])
             for k, step in enumerate(part.steps):
-                known = xp.concatenate([moving, codes[k % len(codes)], seen, one], axis=-1)
+                known = xp.concatenate([moving, seen, codes[k % len(codes)], one], axis=-1)
                 step.coupling.known = known @ step.coupling.static
                 step.coupling.state = [(empty, empty) for _ in step.coupling.layers]
         self._past = self._to(np.zeros((takes, self.history * _POSE_SIZE)))

@@ -125,10 +125,10 @@ def _seats(rng: np.random.Generator, rests: list[Rest], points: np.ndarray) -> l
 def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> Window | None:
     """One augmented, furnished window, around frame ``focus`` where given; None where this draw cannot be used."""
     total = len(motion.joints)
-    if total < _FRAMES + 2:
-        return None
     speed = rng.uniform(0.85, 1.2) if rng.random() < 0.4 else 1.0
     span = int(np.ceil(_FRAMES * speed)) + 2
+    if total < span:
+        return None
     if focus is None:
         start = int(rng.integers(0, max(1, total - span)))
     else:

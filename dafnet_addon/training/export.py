@@ -18,7 +18,7 @@ __all__ = ["tensors_of", "export"]
 
 
 def tensors_of(flow: TwoPartFlow, predictor: ActionPredictor, statistics: Statistics) -> dict[str, np.ndarray]:
-    """Every array that the sampler needs, by the names that it knows them by, in single precision."""
+    """Every array that the sampler needs, by the names that it knows them by."""
     out: dict[str, np.ndarray] = {name: value.astype(np.float32) for name, value in asdict(statistics).items()}
     for name, tensor in predictor.state_dict().items():
         out[f"predictor.{name}"] = tensor.numpy()
