@@ -1,19 +1,15 @@
 """Everything in which Blender 4.2, 4.5, 5.0 and 5.2 differ for this add-on.
 
-Actions have slots from 4.4 on, and ``Action.fcurves`` is gone in 5.0; EEVEE changed its name twice; video is a media
-type of its own from 5.0 on.
+Actions have slots from 4.4 on, and ``Action.fcurves`` is gone in 5.0; video is a media type of its own from 5.0 on.
 """
 
 from collections.abc import Callable
 
 import bpy
 
-__all__ = ["EEVEE", "new_action", "assign_action", "action_curves", "output_video"]
+__all__ = ["new_action", "assign_action", "action_curves", "output_video"]
 
 _SLOTS = bpy.app.version >= (4, 4, 0)
-
-EEVEE = "BLENDER_EEVEE" if bpy.app.version >= (5, 0, 0) else "BLENDER_EEVEE_NEXT"
-"""Identifier of the EEVEE render engine."""
 
 
 def new_action(
