@@ -3,7 +3,7 @@
 Run as ``dafnet bench seats``. Nothing here is part of the demo: other paths, other furniture, boxes only.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +13,12 @@ from dafnet_addon import Box, Controls, Scene, Take, generate, load_weights
 from dafnet_addon.core.metrics import Seat, seat_report, standing_pelvis_height
 from dafnet_addon.core.paths import Route, Stop, facing, route
 from dafnet_addon.core.root import root_from_matrices
+from dafnet_addon.core.weights import Weights
 
-HEIGHTS = np.linspace(0.35, 0.65, 10)
-NOISE = [(0.0, 0)] + [(0.8, seed) for seed in range(1, 6)]
+Noise = Sequence[tuple[float, int]]
+
+HEIGHTS: list[float] = np.linspace(0.35, 0.65, 10).tolist()
+NOISE: Noise = [(0.0, 0)] + [(0.8, seed) for seed in range(1, 6)]
 """Temperature and seed of every take of a situation."""
 TOLERANCE = 0.08
 _SEAT = Stop((0.0, 0.0), 0.0, 3.0, seated=True, name="seat")
@@ -46,33 +49,35 @@ def seat(height: float, back: bool) -> Scene:
     return Scene(tuple(solids))
 
 
-def _takes(scene: Scene, walked: Route, weights: Any) -> Iterator[tuple[float, Take]]:
+def _takes(scene: Scene, walked: Route, weights: Weights, noise: Noise) -> Iterator[tuple[float, Take]]:
     controls = Controls(fps=30, root=walked.path.matrices())
-    for temperature, seed in NOISE:
+    for temperature, seed in noise:
         yield temperature, generate(scene, controls, weights, seed=seed, temperature=temperature)
 
 
-def measure(file: Path | None, progress: Callable[[float], None]) -> tuple[dict[str, Any], str]:
+def measure(
+    file: Path | None, progress: Callable[[float], None], heights: Sequence[float] = HEIGHTS, noise: Noise = NOISE
+) -> tuple[dict[str, Any], str]:
     """Run the benchmark with the weights in ``file`` (None: those that ship); the report and its summary in words."""
     weights = load_weights(file)
     ways = approaches()
-    situations = [(height, back, way) for height in HEIGHTS for back in (False, True) for way in ways]
+    situations = [(height, back, way) for height in heights for back in (False, True) for way in ways]
     count = len(situations) + len(ways)
     seated: list[dict[str, Any]] = []
     for done, (height, back, way) in enumerate(situations):
         progress(done / count)
-        for temperature, take in _takes(seat(float(height), back), ways[way], weights):
+        for temperature, take in _takes(seat(height, back), ways[way], weights, noise):
             path, _ = root_from_matrices(take.root)
             error = seat_report(take.joints, path, take.fps, [Seat("seat", np.array([0.0, 0.0, height]))])[0]["error"]
             seated.append({
-                "height": round(float(height), 3), "back": back, "approach": way, "temperature": temperature,
+                "height": round(height, 3), "back": back, "approach": way, "temperature": temperature,
                 "error": None if error is None else round(float(error), 4),
             })
     empty: list[dict[str, Any]] = []
     for done, way in enumerate(ways):
         progress((len(situations) + done) / count)
         rest = ways[way].rests[-1]
-        for temperature, take in _takes(Scene(), ways[way], weights):
+        for temperature, take in _takes(Scene(), ways[way], weights, noise):
             path, _ = root_from_matrices(take.root)
             drop = standing_pelvis_height(take.joints, path, take.fps) - take.joints[rest.first : rest.last, 0, 2].min()
             empty.append({"approach": way, "temperature": temperature, "drop": round(float(drop), 4)})
@@ -85,10 +90,10 @@ def measure(file: Path | None, progress: Callable[[float], None]) -> tuple[dict[
     report = {
         "tolerance": TOLERANCE,
         "sits": share(),
-        "sits_at_temperature": {f"{t:g}": share(temperature=t) for t in sorted({t for t, _ in NOISE})},
+        "sits_at_temperature": {f"{t:g}": share(temperature=t) for t in sorted({t for t, _ in noise})},
         "sits_by_approach": {way: share(approach=way) for way in ways},
         "sits_by_back": {name: share(back=back) for name, back in (("with", True), ("without", False))},
-        "sits_by_height": {f"{h:.3f}": share(height=round(float(h), 3)) for h in HEIGHTS},
+        "sits_by_height": {f"{h:.3f}": share(height=round(h, 3)) for h in heights},
         "largest_drop_without_seat": max(each["drop"] for each in empty),
         "takes": seated, "takes_without_seat": empty,
     }

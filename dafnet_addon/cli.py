@@ -84,6 +84,13 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     info = command("info", _info, "say what a weights file is")
     info.add_argument("weights", type=Path, nargs="?", metavar="WEIGHTS", help="else the weights that ship")
 
+    prepare = command("prepare", _prepare, "make a training set from motion files, or go on making it")
+    prepare.add_argument("folder", type=Path, metavar="FOLDER", help="holds the motion files")
+    prepare.add_argument("-o", "--output", type=Path, required=True, metavar="DATASET")
+    prepare.add_argument("--windows", type=int, default=12000, help="how many training windows")
+    prepare.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    prepare.add_argument("--seed", type=int, default=0)
+
     bench = command("bench", _bench, "measure: 'seats' sits on ten heights from three sides")
     bench.add_argument("name", choices=["seats"])
     bench.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
@@ -233,13 +240,31 @@ def _info(options: argparse.Namespace) -> None:
         print(f"{key}: {value if isinstance(value, str | int) else json.dumps(value)}")
 
 
+def _prepare(options: argparse.Namespace) -> None:
+    _require_checkout("data")
+    from .data.prepare import prepare
+
+    if not any(options.folder.glob("*.npz")):
+        raise InputError(f"The folder '{options.folder}' holds no motion files (.npz); choose the one that does.")
+    with _Bar() as bar:
+        prepare(options.folder, options.output, options.windows, options.processes, options.seed, bar)
+    if options.json:
+        print((options.output / "dataset.json").read_text())
+    else:
+        print(f"Written to {options.output}")
+
+
 def _bench(options: argparse.Namespace) -> None:
+    _require_checkout("../benchmarks")
     script = Path(__file__).parents[1] / "benchmarks" / f"{options.name}.py"
-    if not script.exists():
-        raise InputError("Benchmarks are not part of the extension; run this from a checkout of the project.")
     with _Bar() as bar:
         report, summary = runpy.run_path(str(script))["measure"](options.weights, bar)
     print(json.dumps(report, indent=2) if options.json else summary)
+
+
+def _require_checkout(folder: str) -> None:
+    if not (Path(__file__).parent / folder).is_dir():
+        raise InputError("This command is not part of the extension; run it from a checkout of the project.")
 
 
 def _require_bpy() -> None:
