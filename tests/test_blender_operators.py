@@ -103,7 +103,7 @@ def test_the_job_tells_progress_seconds_and_warnings(shot: Shot, addon) -> None:
         result = done.value
     assert progress == sorted(progress) and progress[-1] == 1.0 and len(progress) > 4
     assert {"reading", "conditions", "sampling", "baking"} <= result.seconds.keys()
-    assert any("No furniture" in warning for warning in result.warnings)
+    assert any("no furniture" in warning for warning in result.warnings)
     assert result.action == shot.ann.animation_data.action and len(result.take) == 24
 
 

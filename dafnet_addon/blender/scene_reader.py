@@ -127,8 +127,6 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     if furniture:
         with _frame_kept(scene):
             warnings = furniture.deforming(context, frames, pieces)
-    else:
-        warnings = ("No furniture is chosen; the character moves on a bare floor.",)
     fps = scene.render.fps / scene.render.fps_base
     root_matrices = _rigid(np.array(tracks["root"]), unit, f"root '{root.name}'")
     given: dict[str, Any] = {}
