@@ -78,10 +78,12 @@ def demo_report(
     generated = summary(
         take.joints, take.fps, floor=floor, targets=targets, distance=lambda points: distance(scene, points, floor)
     )
-    return {
+    report = {
         "seats": seat_report(take.joints, path, take.fps, SEATS),
         "standing_pelvis_height": standing_pelvis_height(take.joints, path, take.fps),
         "metrics": {"generated": generated, "ground_truth": json.loads(weights.metadata.get("ground_truth", "{}"))},
         "note": "ground_truth was measured on held-out motion capture with the same code; the weights file carries it.",
-        "seconds": {stage: round(spent, 4) for stage, spent in seconds.items()},
+        "seconds": seconds,
     }
+    rounded: dict[str, Any] = json.loads(json.dumps(report), parse_float=lambda digits: round(float(digits), 5))
+    return rounded
