@@ -95,8 +95,6 @@ def generate_steps(
 
     poses, actions = made[PREROLL:, 0], actions[PREROLL:, 0]
     switches = np.flatnonzero(shot.modes[1:] != shot.modes[:-1]) + 1
-    if kept is not None:
-        switches = np.union1d(switches, [len(kept) - PREROLL])
     local, pelvis = _onto_bones(poses, shot, controls, switches)
     yield 0.97
 

@@ -11,7 +11,7 @@ import numpy as np
 from .rotations import normalised, rotate, transpose, yaw_matrix
 from .skeleton import joint
 
-__all__ = ["RootPath", "root_from_joints", "root_from_matrices", "smoothed", "velocities", "integrate", "to_root", "to_world"]
+__all__ = ["RootPath", "raw_root_from_joints", "root_from_joints", "root_from_matrices", "smoothed", "velocities", "integrate", "to_root", "to_world"]
 
 POSITION_SIGMA, YAW_SIGMA = 3.0, 6.0
 _MAX_TURN = np.radians(15.0)
@@ -76,8 +76,8 @@ def _held_yaw(forward: np.ndarray, certainty: np.ndarray) -> np.ndarray:
     return yaw
 
 
-def root_from_joints(joints: np.ndarray, floor: float = 0.0) -> RootPath:
-    """Root path of world joints (T, 22, 3), smoothed: pelvis on the ground, heading from shoulders and hips.
+def raw_root_from_joints(joints: np.ndarray, floor: float = 0.0) -> RootPath:
+    """Root path of world joints (T, 22, 3), not smoothed: pelvis on the ground, heading from shoulders and hips.
 
     Paper, section 4.1; the heading is held where shoulders and hips give none, as in lying.
     """
@@ -87,7 +87,12 @@ def root_from_joints(joints: np.ndarray, floor: float = 0.0) -> RootPath:
     forward = np.cross(across, [0.0, 0.0, 1.0])
     position = joints[:, 0].copy()
     position[:, 2] = floor
-    return smoothed(RootPath(position.astype(float), _held_yaw(forward, np.linalg.norm(forward[:, :2], axis=-1))))
+    return RootPath(position.astype(float), _held_yaw(forward, np.linalg.norm(forward[:, :2], axis=-1)))
+
+
+def root_from_joints(joints: np.ndarray, floor: float = 0.0) -> RootPath:
+    """R^τ of world joints (T, 22, 3): their raw root path, smoothed."""
+    return smoothed(raw_root_from_joints(joints, floor))
 
 
 def root_from_matrices(matrices: np.ndarray) -> tuple[RootPath, float]:

@@ -23,6 +23,7 @@ _UPPER_SIZE, _LOWER_SIZE = 3 * len(UPPER), 3 * len(LOWER)
 _POSE_SIZE = _UPPER_SIZE + _LOWER_SIZE
 _ORDER = np.array([3 * j + k for j in UPPER + LOWER for k in range(3)])
 _INVERSE = np.argsort(_ORDER)
+_PASSING = 10  # frames in which a resumed take's noise becomes its own
 
 
 def model_order(poses: np.ndarray) -> np.ndarray:
@@ -294,18 +295,22 @@ class Sampler:
         """Poses (T, B, 66) in SMPL order, metres, and action probabilities (T, B, K); yields progress in [0, 1].
 
         ``z`` (B, 66): one noise vector a take, upper part first, held constant. ``kept`` (N, B, 66), SMPL order, metres: the
-        first N frames as they are to stay; the model goes on from them.
+        first N frames as they are to stay; the model goes on from them, its noise passing over ten frames from the one that
+        the last kept pose is made of to ``z``, so that nothing jumps.
         """
         noise = self._to(z)
         self.start(conditions, takes=len(z))
-        first = 0 if kept is None else len(kept)
-        known = None if kept is None else self._to(self.standardised(kept))
+        known = self._to(np.zeros((0, *z.shape)) if kept is None else self.standardised(kept))
+        first, last = len(known), noise
         poses, actions = [], []
         for t in range(len(conditions)):
-            if known is not None and t < first:
-                pose, (_, action) = known[t], self.absorb(t, known[t])
+            if t < first:
+                pose = known[t]
+                last, action = self.absorb(t, pose)
             else:
-                pose, action = self.frame(t, noise[:, :_UPPER_SIZE], noise[:, _UPPER_SIZE:])
+                share = min(1.0, (t - first + 1) / _PASSING)
+                now = last + (noise - last) * (share * share * (3.0 - 2.0 * share))
+                pose, action = self.frame(t, now[:, :_UPPER_SIZE], now[:, _UPPER_SIZE:])
             poses.append(pose)
             actions.append(action)
             yield (t + 1) / len(conditions)

@@ -15,7 +15,7 @@ from . import boxes as box_module
 from .canonical import pose_legs
 from .furniture import Rest, probes, resting, scattered, seat_for
 
-__all__ = ["HISTORY", "LENGTH", "Motion", "Window", "motion_of", "draw", "mirrored", "at_seat_height"]
+__all__ = ["HISTORY", "LENGTH", "Motion", "Window", "motion_of", "draw", "seats_for", "mirrored", "at_seat_height"]
 
 HISTORY, LENGTH = 10, 70
 _FRAMES = HISTORY + LENGTH
@@ -112,7 +112,7 @@ def _animated_by_hand(rng: np.random.Generator, path: RootPath) -> RootPath:
     return path
 
 
-def _seats(rng: np.random.Generator, rests: list[Rest], points: np.ndarray) -> list[np.ndarray]:
+def seats_for(rng: np.random.Generator, rests: list[Rest], points: np.ndarray) -> list[np.ndarray]:
     """A seat for every place of rest (places within 0.25 m share one); empty where one cannot be had."""
     places: list[Rest] = []
     for rest in rests:
@@ -153,7 +153,7 @@ def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> 
     points = probes(joints)
     furniture = [box_module.NO_BOXES]
     if seated:
-        seats = _seats(rng, resting(joints, path), points)
+        seats = seats_for(rng, resting(joints, path), points)
         if not seats:
             return None
         furniture += seats

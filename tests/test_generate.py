@@ -1,0 +1,239 @@
+"""From controls to takes with the weights that ship: modes, frame rates, sizes, resuming, and what bad input is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dafnet_addon import Box, Controls, InputError, Mesh, Scene, Take, generate, generate_steps, load_weights
+from dafnet_addon.core.metrics import bone_length_variation, end_effector_distance
+from dafnet_addon.core.paths import Stop, route
+from dafnet_addon.core.root import RootPath
+from dafnet_addon.core.skeleton import END_EFFECTORS, UPPER
+
+
+@pytest.fixture(scope="module")
+def weights():
+    return load_weights()
+
+
+def _walk(fps: float = 30.0, seconds: float = 4.0, **more) -> Controls:
+    walked = route(Stop((0.0, 0.0), 0.0, 0.5), Stop((0.0, 3.0), 0.0, 1.0), fps=fps).path
+    count = min(len(walked), int(seconds * fps))
+    return Controls(fps=fps, root=RootPath(walked.position[:count], walked.yaw[:count]).matrices(), **more)
+
+
+def _seated(height: float = 0.45, mode="FREE", **more) -> tuple[Scene, Controls]:
+    walked = route(Stop((-1.0, 2.5), np.pi, 0.4), Stop((0.0, 0.0), 0.0, 2.0, seated=True)).path
+    seat = Box(center=np.array([0.0, 0.0, height / 2]), half_size=np.array([0.22, 0.22, height / 2]))
+    return Scene((seat,)), Controls(fps=30, root=walked.matrices(), mode=mode, **more)
+
+
+def test_walking_stands_and_bones_keep_their_length(weights):
+    take = generate(Scene(), _walk(), weights)
+    assert take.joints.shape == (len(_walk()), 22, 3) and np.isfinite(take.joints).all()
+    assert 0.85 < np.median(take.joints[:, 0, 2]) < 1.02 and bone_length_variation(take.joints) < 1e-6
+    assert np.linalg.norm(take.joints[:, 0, :2] - take.root[:, :2, 3], axis=1).max() < 0.25
+    assert np.allclose(np.linalg.norm(take.rotations, axis=-1), 1) and np.allclose(take.action.sum(-1), 1, atol=1e-5)
+    assert any("no furniture" in w for w in take.warnings)
+
+
+def test_sits_on_a_seat_and_stands_without_it(weights):
+    scene, controls = _seated()
+    on, off = generate(scene, controls, weights), generate(Scene(), controls, weights)
+    assert abs(on.joints[-15, 0, 2] - (0.45 + 0.12)) < 0.08
+    assert off.joints[-15, 0, 2] > 0.85
+
+
+def test_the_same_seed_is_the_same_take_and_another_is_not(weights):
+    scene, controls = _seated()
+    one, two, other = (generate(scene, controls, weights, seed=s, temperature=0.8) for s in (3, 3, 4))
+    assert (one.joints == two.joints).all() and np.abs(one.joints - other.joints).max() > 0.02
+
+
+def test_the_legs_vary_under_the_same_noise_of_the_trunk(weights):
+    one = generate(*_seated(), weights, seed=1, lower_seed=1, temperature=1.0)
+    two = generate(*_seated(), weights, seed=1, lower_seed=2, temperature=1.0)
+    legs, trunk = ([4, 5, 7, 8], [9, 12, 15])
+    assert np.abs(one.joints[:, legs] - two.joints[:, legs]).mean() > np.abs(one.joints[:, trunk] - two.joints[:, trunk]).mean()
+
+
+def test_ee_draws_the_hand_to_its_target(weights):
+    controls = _walk()
+    free = generate(Scene(), controls, weights)
+    target = free.joints[:, 20] + [0.0, 0.25, 0.25]
+    asked = generate(Scene(), replace(controls, mode="EE", hand_left=target), weights)
+    before = end_effector_distance(free.joints, {"hand_left": target})
+    assert end_effector_distance(asked.joints, {"hand_left": target}) < 0.5 * before
+
+
+def test_ee_without_targets_is_free(weights):
+    controls = _walk()
+    nothing = np.full((len(controls), 3), np.nan)
+    free, empty = generate(Scene(), controls, weights), generate(Scene(), replace(controls, mode="EE", head=nothing), weights)
+    assert np.abs(free.joints - empty.joints).max() < 1e-9
+
+
+def test_full_follows_an_upper_body(weights):
+    source = generate(*_seated(0.55), weights)
+    scene, controls = _seated(0.55, mode="FULL", upper_body=source.joints[:, list(UPPER)])
+    take = generate(scene, controls, weights)
+    error = np.linalg.norm(take.joints - source.joints, axis=-1)[:, list(UPPER)].mean()
+    assert error < 0.12
+    free_pelvis = generate(scene, replace(controls, pelvis_given=False), weights)
+    assert np.abs(free_pelvis.joints - take.joints).max() > 1e-4
+
+
+def test_a_mode_for_each_frame_changes_without_a_pop(weights):
+    controls = _walk()
+    half = len(controls) // 2
+    target = generate(Scene(), controls, weights).joints[:, 20] + [0.0, 0.3, 0.4]
+    modes = ["FREE"] * half + ["EE"] * (len(controls) - half)
+    take = generate(Scene(), replace(controls, mode=modes, hand_left=target), weights)
+    wrist = take.joints[:, 20] - take.joints[:, 0]
+    step = np.linalg.norm(np.diff(wrist, axis=0), axis=1)
+    assert step[half - 1] < 0.08 and step.max() < 0.15
+
+
+@pytest.mark.parametrize("fps", [23.976, 24, 25, 60])
+def test_any_frame_rate_gives_the_same_motion(weights, fps):
+    reference, other = generate(Scene(), _walk(30.0), weights), generate(Scene(), _walk(fps), weights)
+    seconds = 2.0
+    a, b = reference.joints[round(seconds * 30)], other.joints[round(seconds * fps)]
+    assert len(other) == len(_walk(fps)) and np.abs(a - b).max() < 0.12
+
+
+def test_a_smaller_character_is_the_same_motion_smaller(weights):
+    scene, controls = _seated()
+    root = controls.root.copy()
+    root[:, :3, 3] *= 0.5
+    small = Scene(tuple(replace(s, center=s.center * 0.5, half_size=s.half_size * 0.5) for s in scene.solids))
+    whole, half = generate(scene, controls, weights), generate(small, replace(controls, root=root, scale=0.5), weights)
+    assert np.abs(half.joints - 0.5 * whole.joints).max() < 1e-6
+
+
+def test_an_upper_storey_is_the_ground_floor_moved_up(weights):
+    scene, controls = _seated()
+    root = controls.root.copy()
+    root[:, 2, 3] += 3.0
+    up = Scene(tuple(replace(s, center=s.center + [0, 0, 3.0]) for s in scene.solids))
+    low, high = generate(scene, controls, weights), generate(up, replace(controls, root=root), weights)
+    assert np.abs(high.joints - low.joints - [0, 0, 3.0]).max() < 1e-3
+
+
+def test_furniture_that_moves_along_is_seen_where_it_is(weights):
+    scene, controls = _seated()
+    box = scene.solids[0]
+    away = np.tile(box.center, (len(controls), 1))
+    away[:, 0] += 5.0
+    moving = Scene((replace(box, center=away, rotation=np.tile(np.eye(3), (len(controls), 1, 1))),))
+    assert generate(moving, controls, weights).joints[-15, 0, 2] > 0.85
+
+
+def test_resuming_keeps_what_was_and_goes_on(weights):
+    scene, controls = _seated()
+    first = generate(scene, controls, weights, seed=2, temperature=0.8)
+    same = generate(scene, controls, weights, seed=2, temperature=0.8, resume=first, resume_frame=100)
+    assert np.abs(same.joints - first.joints).max() < 2e-3
+    other = generate(scene, controls, weights, seed=9, temperature=0.8, resume=first, resume_frame=100)
+    assert np.abs(other.joints[:95] - first.joints[:95]).max() < 2e-3
+    assert np.abs(other.joints[100:] - first.joints[100:]).max() > 0.02
+    step = np.linalg.norm(np.diff(other.joints, axis=0), axis=-1).max(1)
+    assert step[98:103].max() < 0.15
+
+
+def test_progress_rises_to_one(weights):
+    steps, seen = generate_steps(Scene(), _walk(seconds=1.0), weights), []
+    while True:
+        try:
+            seen.append(next(steps))
+        except StopIteration as done:
+            assert isinstance(done.value, Take)
+            break
+    assert seen[0] == 0.0 and seen[-1] == 1.0 and all(a <= b for a, b in zip(seen, seen[1:], strict=False))
+
+
+def _changed(**values) -> Controls:
+    return replace(_walk(seconds=1.0), **values)
+
+
+def _broken_root() -> np.ndarray:
+    root = _walk(seconds=1.0).root.copy()
+    root[4, 0, 3] = np.nan
+    return root
+
+
+@pytest.mark.parametrize(
+    ("controls", "words"),
+    [
+        (lambda: _changed(root=_broken_root()), "frame 4"),
+        (lambda: _changed(root=np.zeros((0, 4, 4))), "at least one frame"),
+        (lambda: _changed(fps=0.0), "frame rate"),
+        (lambda: _changed(scale=-1.0), "scale"),
+        (lambda: _changed(mode="HALF"), "FREE, EE or FULL"),
+        (lambda: _changed(mode=["FREE"] * 3), "3 modes"),
+        (lambda: _changed(mode="FULL"), "no upper body"),
+        (lambda: _changed(mode="EE", head=np.zeros((2, 3))), "head"),
+    ],
+)
+def test_bad_controls_are_refused_in_one_sentence(weights, controls, words):
+    with pytest.raises(InputError, match=words) as caught:
+        generate(Scene(), controls(), weights)
+    assert str(caught.value).endswith(".") and "\n" not in str(caught.value)
+
+
+def test_bad_temperature_and_bad_mesh_are_refused(weights):
+    with pytest.raises(InputError, match="temperature"):
+        generate(Scene(), _walk(seconds=1.0), weights, temperature=-1.0)
+    with pytest.raises(InputError, match="not a number"):
+        Mesh(np.full((3, 3), np.nan), np.array([[0, 1, 2]]), name="broken")
+
+
+def _warned(scene: Scene, controls: Controls, weights, words: str) -> Take:
+    take = generate(scene, controls, weights)
+    assert any(words in w for w in take.warnings), take.warnings
+    assert np.isfinite(take.joints).all() and len(take) == len(controls)
+    return take
+
+
+def test_a_still_root_stands(weights):
+    take = _warned(Scene(), _changed(root=np.tile(np.eye(4), (40, 1, 1))), weights, "does not move")
+    assert take.joints[:, 0, 2].min() > 0.85
+
+
+def test_a_single_frame_is_a_pose(weights):
+    _warned(Scene(), _changed(root=np.eye(4)[None]), weights, "only one frame")
+
+
+def test_a_tilted_root_is_flattened(weights):
+    controls = _walk(seconds=1.0)
+    tilt = np.eye(4)
+    c, s = np.cos(0.4), np.sin(0.4)
+    tilt[:3, :3] = [[1, 0, 0], [0, c, -s], [0, s, c]]
+    tilted = _warned(Scene(), replace(controls, root=controls.root @ tilt), weights, "tilts")
+    assert np.abs(tilted.joints - generate(Scene(), controls, weights).joints).max() < 1e-6
+
+
+def test_a_jump_is_told(weights):
+    root = _walk(seconds=2.0).root.copy()
+    root[30:, 1, 3] += 5.0
+    _warned(Scene(), _changed(root=root), weights, "jumps 5.")
+
+
+def test_a_root_through_furniture_is_told(weights):
+    block = Box(center=np.array([0.0, 1.5, 0.75]), half_size=np.array([0.3, 0.3, 0.75]))
+    _warned(Scene((block,)), _walk(), weights, "runs through furniture")
+
+
+def test_targets_far_away_are_reached_for(weights):
+    controls = _walk(seconds=2.0)
+    far = np.tile([10.0, 0.0, 1.0], (len(controls), 1))
+    take = _warned(Scene(), replace(controls, mode="EE", hand_right=far), weights, "reached for")
+    free = generate(Scene(), controls, weights)
+    hand = END_EFFECTORS["hand_right"]
+    assert take.joints[:, hand, 0].mean() > free.joints[:, hand, 0].mean() + 0.1
+
+
+def test_a_crowded_room_is_told(weights):
+    block = Box(center=np.array([0.0, 1.0, 1.0]), half_size=np.array([3.0, 3.0, 1.0]))
+    _warned(Scene((block,)), _walk(), weights, "more than the sensor can tell")
