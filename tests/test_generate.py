@@ -1,6 +1,7 @@
 """From controls to takes with the weights that ship: modes, frame rates, sizes, resuming, and what bad input is told."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -116,7 +117,7 @@ def test_an_upper_storey_is_the_ground_floor_moved_up(weights):
     scene, controls = _seated()
     root = controls.root.copy()
     root[:, 2, 3] += 3.0
-    up = Scene(tuple(replace(s, center=s.center + [0, 0, 3.0]) for s in scene.solids))
+    up = Scene(tuple(replace(s, center=s.center + np.array([0, 0, 3.0])) for s in scene.solids))
     low, high = generate(scene, controls, weights), generate(up, replace(controls, root=root), weights)
     assert np.abs(high.joints - low.joints - [0, 0, 3.0]).max() < 1e-3
 
@@ -150,7 +151,7 @@ def test_progress_rises_to_one(weights):
         except StopIteration as done:
             assert isinstance(done.value, Take)
             break
-    assert seen[0] == 0.0 and seen[-1] == 1.0 and all(a <= b for a, b in zip(seen, seen[1:], strict=False))
+    assert seen[0] == 0.0 and seen[-1] == 1.0 and all(a <= b for a, b in pairwise(seen))
 
 
 def _changed(**values) -> Controls:

@@ -61,7 +61,7 @@ def _check(controls: Controls) -> None:
         raise InputError(f"The frame rate is {controls.fps}; give a positive number of frames a second.")
     if not np.isfinite(controls.scale) or controls.scale <= 0:
         raise InputError(f"The character's scale is {controls.scale}; give a positive number.")
-    shapes = {"upper_body": (frames, len(UPPER), 3), **{name: (frames, 3) for name in END_EFFECTORS}}
+    shapes = {"upper_body": (frames, len(UPPER), 3), **dict.fromkeys(END_EFFECTORS, (frames, 3))}
     for name, shape in shapes.items():
         value = getattr(controls, name)
         if value is not None and np.shape(value) != shape:

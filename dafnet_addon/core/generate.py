@@ -9,7 +9,12 @@ from .conditions import PREROLL, Shot, shot_of
 from .errors import InputError
 from .kinematics import blend_switches, fit, forward_kinematics, global_from_local, local_from_global
 from .resampling import (
-    MODEL_FPS, covering_frames, frame_times, resample_path, resample_positions, resample_rotations,
+    MODEL_FPS,
+    covering_frames,
+    frame_times,
+    resample_path,
+    resample_positions,
+    resample_rotations,
 )
 from .root import RootPath, to_root, to_world
 from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix
@@ -54,9 +59,8 @@ def _onto_bones(poses: np.ndarray, shot: Shot, controls: Controls, switches: np.
     """Local quaternions (N, 22, 4) and pelvis (N, 3), canonical metres, of poses (N, 66), eased over mode switches."""
     joints = to_world(shot.path, poses.reshape(-1, 22, 3))
     target = frame_times(len(joints), MODEL_FPS)
-    pelvis, frames = fit(joints, **{
-        name: _rotation(controls, name, target) for name in ("head_rotation", "hand_left_rotation", "hand_right_rotation")
-    })
+    turned = (_rotation(controls, name, target) for name in ("head_rotation", "hand_left_rotation", "hand_right_rotation"))
+    pelvis, frames = fit(joints, 1.0, *turned)
     local = continuous_signs(quaternion_from_matrix(local_from_global(frames)))
     return blend_switches(local, pelvis, shot.path, switches) if len(switches) else (local, pelvis)
 

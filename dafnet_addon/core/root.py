@@ -11,7 +11,10 @@ import numpy as np
 from .rotations import normalised, rotate, transpose, yaw_matrix
 from .skeleton import joint
 
-__all__ = ["RootPath", "raw_root_from_joints", "root_from_joints", "root_from_matrices", "smoothed", "velocities", "integrate", "to_root", "to_world"]
+__all__ = [
+    "RootPath", "raw_root_from_joints", "root_from_joints", "root_from_matrices", "smoothed", "velocities", "integrate",
+    "to_root", "to_world",
+]
 
 POSITION_SIGMA, YAW_SIGMA = 3.0, 6.0
 _MAX_TURN = np.radians(15.0)

@@ -63,12 +63,13 @@ def yaw_matrix(angle: np.ndarray) -> np.ndarray:
 
 def quaternion_from_matrix(m: np.ndarray) -> np.ndarray:
     """Unit quaternions (…, 4), w x y z, of rotation matrices."""
-    m00, m11, m22 = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = (np.moveaxis(m[..., i, :], -1, 0) for i in range(3))
+    # Four forms, one from each component; the longest is the one that does not divide by little.
     candidates = np.stack([
-        np.stack([1 + m00 + m11 + m22, m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]], -1),
-        np.stack([m[..., 2, 1] - m[..., 1, 2], 1 + m00 - m11 - m22, m[..., 1, 0] + m[..., 0, 1], m[..., 0, 2] + m[..., 2, 0]], -1),
-        np.stack([m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] + m[..., 0, 1], 1 - m00 + m11 - m22, m[..., 2, 1] + m[..., 1, 2]], -1),
-        np.stack([m[..., 1, 0] - m[..., 0, 1], m[..., 0, 2] + m[..., 2, 0], m[..., 2, 1] + m[..., 1, 2], 1 - m00 - m11 + m22], -1),
+        np.stack([1 + xx + yy + zz, zy - yz, xz - zx, yx - xy], -1),
+        np.stack([zy - yz, 1 + xx - yy - zz, yx + xy, xz + zx], -1),
+        np.stack([xz - zx, yx + xy, 1 - xx + yy - zz, zy + yz], -1),
+        np.stack([yx - xy, xz + zx, zy + yz, 1 - xx - yy + zz], -1),
     ], axis=-2)
     best = np.argmax(np.linalg.norm(candidates, axis=-1), axis=-1)
     return normalised(np.take_along_axis(candidates, best[..., None, None], axis=-2)[..., 0, :])

@@ -261,7 +261,7 @@ class Sampler:
         """Standardised pose (B, 66) and action probabilities (B, K) of the next frame: noise to pose, upper then lower."""
         xp = self.xp
         actions = self._act(index)
-        parts = []
+        parts: list[Array] = []
         for part, z in ((self._upper, z_upper), (self._lower, z_lower)):
             for step in reversed(part.steps):
                 passed = z[:, : step.half]

@@ -20,7 +20,8 @@ class Controls:
     ``mode``: FREE, EE or FULL, one word or one for each frame. ``head``, ``hand_left``, ``hand_right`` (T, 3): targets of the
     head and wrist joints, NaN where free; the matching ``…_rotation`` (T, 3, 3) turn head and hands (y where the face looks
     or the fingers point, z the crown or the back of the hand), NaN where free. ``upper_body`` (T, 14, 3): the joints
-    ``skeleton.UPPER`` for FULL; ``pelvis_given``: whether its pelvis counts, or only the rest of it. ``scale``: the character's size over the canonical body of 1.75 m.
+    ``skeleton.UPPER`` for FULL; ``pelvis_given``: whether its pelvis counts, or only the rest of it. ``scale``: the
+    character's size over the canonical body of 1.75 m.
     """
 
     fps: float

@@ -38,7 +38,7 @@ _MIN_REST = 8
 
 @dataclass(frozen=True)
 class Rest:
-    """A seated episode: frames ``start`` to ``end`` (exclusive) in which the pelvis rests at ``position`` (3,), facing ``yaw``."""
+    """A seated episode: in frames ``start`` to ``end`` (exclusive) the pelvis rests at ``position`` (3,), facing ``yaw``."""
 
     start: int
     end: int

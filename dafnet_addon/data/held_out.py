@@ -21,8 +21,8 @@ _OTHERS = 40  # clips without a seat
 
 @dataclass(frozen=True)
 class HeldClip:
-    """``joints`` (T, 22, 3): ground truth, 30 fps. ``path``: its raw root. ``scene``: its furniture. ``rests``: seated episodes.
-    ``unseen``: whether the body has no clip in training.
+    """``joints`` (T, 22, 3): ground truth, 30 fps. ``path``: its raw root. ``scene``: its furniture. ``rests``: seated
+    episodes. ``unseen``: whether the body has no clip in training.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """From motion files to a training set: clips on the canonical body, and a pool of augmented, furnished windows on disk.
 
-A dataset is a folder: ``dataset.json`` (what it was made from), ``pool-NNN.npz`` (training windows) and ``held.npz`` (windows of
-bodies that training never sees, their furniture fitted once and frozen).
+A dataset is a folder: ``dataset.json`` (what it was made from), ``pool-NNN.npz`` (training windows) and ``held.npz`` (windows
+of held-out clips, for the likelihood).
 """
 
 import json

@@ -161,7 +161,7 @@ def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> 
         furniture.append(scattered(rng, points, path, int(rng.integers(1, 5))))
     if rng.random() < 0.5:
         path = _animated_by_hand(rng, path)
-    first = int(round((start - low) / speed))
+    first = round((start - low) / speed)
     cut = slice(min(first, len(joints) - _FRAMES), min(first, len(joints) - _FRAMES) + _FRAMES)
     poses = to_root(path, joints)[cut].reshape(_FRAMES, -1)
     recent = RootPath(path.position[cut][HISTORY:], path.yaw[cut][HISTORY:])

@@ -9,11 +9,13 @@ POSE_SIZE, UPPER_SIZE, LOWER_SIZE, VELOCITY_SIZE, SENSOR_SIZE = 66, 42, 24, 3, 2
 
 @dataclass(frozen=True)
 class ModelConfig:
-    """``actions``: K of the action predictor. ``predictor_code``, ``predictor_width``: its environment code and its layers.
+    """Sizes and switches.
+
+    ``actions``: K of the action predictor. ``predictor_code``, ``predictor_width``: its environment code and its layers.
     ``latent``: the GMVAE's. ``steps_upper``, ``steps_lower``: flow steps of each part. ``width``, ``layers``: the coupling's
     LSTM. ``code``: the flow's environment code. ``shared_encoder``: one environment encoder for all couplings of a part
-    (else one each). ``mask``: 22 values beside the observation say which joints are given. ``action_temperature``: softmax temperature
-    after training (paper, section 4.2). ``history``: past frames that the predictor sees.
+    (else one each). ``mask``: 22 values beside the observation say which joints are given. ``action_temperature``: softmax
+    temperature after training (paper, section 4.2). ``history``: past frames that the predictor sees.
     """
 
     actions: int = 10

@@ -6,6 +6,7 @@ Every transform keeps one small contract. ``forward(x, condition)`` goes from po
 """
 
 import math
+from typing import cast
 
 import torch
 from torch import Tensor, nn
@@ -82,9 +83,9 @@ class Coupling(nn.Module):
 
     def __init__(self, size: int, condition: int, width: int, layers: int) -> None:
         super().__init__()
-        self.half = size // 2
-        self.lstm = nn.LSTM(self.half + condition, width, layers, batch_first=True)
-        self.out = nn.Linear(width, 2 * (size - self.half))
+        self.passes = size // 2
+        self.lstm = nn.LSTM(self.passes + condition, width, layers, batch_first=True)
+        self.out = nn.Linear(width, 2 * (size - self.passes))
         nn.init.zeros_(self.out.weight)
         nn.init.zeros_(self.out.bias)
 
@@ -94,12 +95,12 @@ class Coupling(nn.Module):
         return shift, torch.sigmoid(raw + 2.0) + 1e-6, state
 
     def forward(self, x: Tensor, condition: Tensor, state: LSTMState | None = None) -> tuple[Tensor, Tensor, LSTMState]:
-        passed, changed = x[..., : self.half], x[..., self.half :]
+        passed, changed = x[..., : self.passes], x[..., self.passes :]
         shift, scale, state = self._affine(passed, condition, state)
         return torch.cat([passed, (changed + shift) * scale], dim=-1), scale.log().sum(-1), state
 
     def inverse(self, y: Tensor, condition: Tensor, state: LSTMState | None = None) -> tuple[Tensor, LSTMState]:
-        passed, changed = y[..., : self.half], y[..., self.half :]
+        passed, changed = y[..., : self.passes], y[..., self.passes :]
         shift, scale, state = self._affine(passed, condition, state)
         return torch.cat([passed, changed / scale - shift], dim=-1), state
 
@@ -119,6 +120,13 @@ class PartFlow(nn.Module):
             Coupling(size, config.condition_size, config.width, config.layers) for _ in range(steps)
         )
 
+    def steps(self) -> list[tuple[ActNorm, InvertibleLinear, Coupling]]:
+        """The flow steps in order, pose to noise."""
+        return cast(
+            "list[tuple[ActNorm, InvertibleLinear, Coupling]]",
+            list(zip(self.norms, self.linears, self.couplings, strict=True)),
+        )
+
     def _conditions(self, condition: Tensor, occupancy: Tensor) -> list[Tensor]:
         """One condition for each step: with a shared encoder, the same one."""
         each = [torch.cat([condition, encoder(occupancy)], dim=-1) for encoder in self.encoders]
@@ -131,7 +139,7 @@ class PartFlow(nn.Module):
         conditions = self._conditions(condition, occupancy)
         total = x.new_zeros(x.shape[:-1])
         after = []
-        for k, (norm, linear, coupling) in enumerate(zip(self.norms, self.linears, self.couplings, strict=True)):
+        for k, (norm, linear, coupling) in enumerate(self.steps()):
             if initialise:
                 norm.initialise(x)
             x, a = norm(x)
@@ -146,9 +154,9 @@ class PartFlow(nn.Module):
     ) -> tuple[Tensor, list[LSTMState]]:
         conditions = self._conditions(condition, occupancy)
         after: list[LSTMState] = []
-        for k in reversed(range(len(self.norms))):
-            z, state = self.couplings[k].inverse(z, conditions[k], None if states is None else states[k])
-            z = self.norms[k].inverse(self.linears[k].inverse(z))
+        for k, (norm, linear, coupling) in reversed(list(enumerate(self.steps()))):
+            z, state = coupling.inverse(z, conditions[k], None if states is None else states[k])
+            z = norm.inverse(linear.inverse(z))
             after.insert(0, state)
         return z, after
 

@@ -26,7 +26,7 @@ def tensors_of(flow: TwoPartFlow, predictor: ActionPredictor, statistics: Statis
         part: PartFlow = getattr(flow, part_name)
         for name, tensor in part.encoders.state_dict().items():
             out[f"{part_name}.encoders.{name}"] = tensor.numpy()
-        for k, (norm, linear, coupling) in enumerate(zip(part.norms, part.linears, part.couplings, strict=True)):
+        for k, (norm, linear, coupling) in enumerate(part.steps()):
             prefix = f"{part_name}.{k}"
             out[f"{prefix}.bias"], out[f"{prefix}.log_scale"] = norm.bias.detach().numpy(), norm.log_scale.detach().numpy()
             out[f"{prefix}.weight"] = linear.weight().detach().numpy()
@@ -48,6 +48,6 @@ def export(
     }
     tensors = {}
     for name, array in tensors_of(flow, predictor, statistics).items():
-        keep = array.size < 1000 or name.count(".") == 2 and name.endswith(".weight") and name[:5] in ("upper", "lower")
+        keep = array.size < 1000 or (name.count(".") == 2 and name.endswith(".weight") and name[:5] in ("upper", "lower"))
         tensors[name] = array if keep else array.astype(np.float16)
     write_safetensors(file, tensors, {"format": FORMAT, "config": json.dumps(description), **words})

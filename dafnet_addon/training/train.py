@@ -199,13 +199,13 @@ def train_part(
         run.step += 1
         run.seconds += time.monotonic() - begin
         if run.step % config.save_every == 0 or run.share >= 1.0:
+            mean = float(np.mean(recent))
             values = {
-                "part": part, "step": run.step, "minutes": run.seconds / 60, "loss": float(np.mean(recent)),
-                "held_out": run.held_loss(held),
+                "part": part, "step": run.step, "minutes": run.seconds / 60, "loss": mean, "held_out": run.held_loss(held),
             }
             with (folder / "log.jsonl").open("a") as f:
                 f.write(json.dumps(values) + "\n")
-            progress(part, run.share, values["loss"])
+            progress(part, run.share, mean)
             recent.clear()
             run.save()
     return run
