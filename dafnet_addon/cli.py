@@ -91,6 +91,16 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     prepare.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     prepare.add_argument("--seed", type=int, default=0)
 
+    train = command("train", _train, "train a model, or go on with a run, and write its weights")
+    train.add_argument("config", type=Path, metavar="CONFIG.toml", help="sizes and budgets; see configs/")
+    train.add_argument("dataset", type=Path, metavar="DATASET", help="made by 'prepare'")
+    train.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="folder of the run")
+
+    evaluate = command("evaluate", _evaluate, "measure weights on held-out clips, beside the clips themselves")
+    evaluate.add_argument("folder", type=Path, metavar="FOLDER", help="holds the motion files")
+    evaluate.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
+    evaluate.add_argument("--save", action="store_true", help="write the figures into the weights' metadata")
+
     bench = command("bench", _bench, "measure: 'seats' sits on ten heights from three sides")
     bench.add_argument("name", choices=["seats"])
     bench.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
@@ -252,6 +262,36 @@ def _prepare(options: argparse.Namespace) -> None:
         print((options.output / "dataset.json").read_text())
     else:
         print(f"Written to {options.output}")
+
+
+def _train(options: argparse.Namespace) -> None:
+    _require_checkout("training")
+    from .training.export import export
+    from .training.train import read_config, train, trained
+
+    model, config = read_config(options.config)
+    with _Bar() as bar:
+        train(options.dataset, options.output, model, config, bar)
+    file = options.output / "dafnet.safetensors"
+    flow, predictor, statistics = trained(options.output)
+    export(file, flow, predictor, statistics, {})
+    print(json.dumps({"weights": str(file)}) if options.json else f"Written to {file}")
+
+
+def _evaluate(options: argparse.Namespace) -> None:
+    _require_checkout("training")
+    from .core.weights import load_weights
+    from .data.held_out import held_out
+    from .training.evaluate import evaluate, table
+    from .training.export import annotate
+
+    weights = load_weights(options.weights)
+    with _Bar() as bar:
+        rows = evaluate(weights, held_out(options.folder), bar)
+    if options.save:
+        ground_truth = rows["ground_truth"]
+        annotate(weights.path, {"ground_truth": json.dumps(ground_truth), "held_out": json.dumps(rows)})
+    print(json.dumps(rows, indent=2) if options.json else table(rows))
 
 
 def _bench(options: argparse.Namespace) -> None:

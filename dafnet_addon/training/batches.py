@@ -32,7 +32,7 @@ class Statistics:
 
     @staticmethod
     def of(poses: np.ndarray, velocity: np.ndarray) -> "Statistics":
-        flat, speed = poses.reshape(-1, 66)[:, _COORDINATES], velocity.reshape(-1, 3)
+        flat, speed = poses.reshape(-1, 66)[:, _COORDINATES].astype(float), velocity.reshape(-1, 3).astype(float)
         return Statistics(
             flat.mean(0), np.maximum(flat.std(0), 0.01), speed.mean(0), np.maximum(speed.std(0), 1e-3)
         )

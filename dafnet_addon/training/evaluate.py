@@ -14,7 +14,7 @@ from ..core.take import Controls
 from ..core.weights import Weights
 from ..data.held_out import HeldClip
 
-__all__ = ["evaluate"]
+__all__ = ["evaluate", "table"]
 
 _SITS_WITHIN = 0.06
 _STANDS_ABOVE = 0.86
@@ -87,3 +87,13 @@ def evaluate(
             progress(done / total)
         rows[name] = _row(chosen, made)
     return rows
+
+
+def table(rows: dict[str, dict[str, Any]]) -> str:
+    """The rows as a Markdown table."""
+    names = list(rows["ground_truth"])
+    lines = ["| | " + " | ".join(name.replace("_", " ") for name in names) + " |", "|---" * (len(names) + 1) + "|"]
+    for label, row in rows.items():
+        cells = ["–" if row[name] is None else f"{row[name]:g}" for name in names]
+        lines.append(f"| {label.replace('_', ' ')} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from ..core.skeleton import JOINTS, OFFSETS
-from ..core.weights import FORMAT, write_safetensors
+from ..core.weights import FORMAT, read_safetensors, write_safetensors
 from ..model.config import ModelConfig
 from ..model.flow import PartFlow, TwoPartFlow
 from ..model.predictor import ActionPredictor
 from .batches import NOISE, Statistics
 
-__all__ = ["tensors_of", "export"]
+__all__ = ["tensors_of", "export", "annotate"]
 
 
 def tensors_of(flow: TwoPartFlow, predictor: ActionPredictor, statistics: Statistics) -> dict[str, np.ndarray]:
@@ -51,3 +51,11 @@ def export(
         keep = array.size < 1000 or (name.count(".") == 2 and name.endswith(".weight") and name[:5] in ("upper", "lower"))
         tensors[name] = array if keep else array.astype(np.float16)
     write_safetensors(file, tensors, {"format": FORMAT, "config": json.dumps(description), **words})
+
+
+def annotate(file: Path, words: Mapping[str, str]) -> None:
+    """Add to, or replace, words of a weights file's metadata; its tensors stay as they are, to the bit."""
+    tensors, metadata = read_safetensors(file)
+    part = file.with_suffix(".part")
+    write_safetensors(part, tensors, {**metadata, **words})
+    part.rename(file)

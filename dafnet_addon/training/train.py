@@ -11,7 +11,7 @@ import os
 import time
 import tomllib
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -153,7 +153,7 @@ class Run:
         state, rng = torch.get_rng_state(), self.rng
         torch.manual_seed(1)
         self.rng = np.random.default_rng(1)
-        loss = float(self.loss(batch_of(held, np.arange(windows), self.statistics, self.model.history)))
+        loss = float(self.loss(batch_of(held, np.arange(min(windows, len(held["poses"]))), self.statistics, self.model.history)))
         self.rng = rng
         torch.set_rng_state(state)
         return loss
@@ -211,13 +211,21 @@ def train_part(
     return run
 
 
-def train(dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig) -> None:
+def train(
+    dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig,
+    progress: Callable[[float], None] = lambda share: None,
+) -> None:
     """Train the predictor, then both parts of the flow in two processes; what a folder holds is gone on with."""
-    train_part("predictor", dataset, folder, model, config)
+    whole = max(config.minutes_predictor + config.minutes_flow, 1e-9)
+    first = config.minutes_predictor / whole
+    train_part("predictor", dataset, folder, model, config, progress=lambda part, share, loss: progress(first * share))
     threads = max(1, (os.cpu_count() or 2) // 2)
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(2, mp_context=context) as pool:
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        begin = time.monotonic()
         parts = [pool.submit(train_part, part, dataset, folder, model, config, threads) for part in ("upper", "lower")]
+        while wait(parts, timeout=2.0).not_done:
+            spent = (time.monotonic() - begin) / max(60.0 * config.minutes_flow, 1e-9)
+            progress(first + (1.0 - first) * min(1.0, spent))
         for done in parts:
             done.result()
 

@@ -1,0 +1,177 @@
+"""Composing training data: boxes, fitted furniture, retargeted heights, windows; and the real motion files where they are."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dafnet_addon.core.errors import InputError
+from dafnet_addon.core.occupancy import occupancy as sensor_occupancy
+from dafnet_addon.core.root import RootPath, root_from_joints
+from dafnet_addon.core.rotations import yaw_matrix
+from dafnet_addon.core.skeleton import OFFSETS, PARENTS, REST, SEAT_TO_PELVIS, TOE_HEIGHT, joint
+from dafnet_addon.core.solids import Box, Scene
+from dafnet_addon.data import boxes as b
+from dafnet_addon.data.canonical import LEG, calibrate, canonical
+from dafnet_addon.data.furniture import probes, resting, scattered, seat_for
+from dafnet_addon.data.mocap import Clip, read_clips
+from dafnet_addon.data.windows import at_seat_height, draw, mirrored, motion_of
+
+MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
+BONES = np.linalg.norm(OFFSETS[1:], axis=1)
+
+
+def _lengths(joints: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(joints[:, 1:] - joints[:, list(PARENTS[1:])], axis=-1)
+
+
+def _sit_down(seated: float = 0.55, frames: int = 150) -> np.ndarray:
+    """A made-up sit-down on the canonical body: the pelvis goes back and down, legs by two-bone IK, then rests."""
+    t = np.clip((np.arange(frames) - 40) / 40, 0, 1)
+    ease = (t * t * (3 - 2 * t))[:, None]
+    arms_down = REST.copy()
+    for side, sign in (("left_", -1), ("right_", 1)):
+        hanging = np.array([sign * 0.05, 0.0, -np.sqrt(0.26**2 - 0.05**2)])
+        arms_down[joint(side + "elbow")] = REST[joint(side + "shoulder")] + hanging
+        arms_down[joint(side + "wrist")] = arms_down[joint(side + "elbow")] + np.array([0.0, 0.15, -0.2])
+    joints = np.repeat(arms_down[None], frames, axis=0)
+    legs = [joint(s + n) for s in ("left_", "right_") for n in ("ankle", "foot")]
+    feet = joints[:, legs].copy()
+    joints += np.array([0.0, -0.42, seated - REST[0, 2]]) * ease[..., None]
+    joints[:, legs] = feet
+    knees = [joint("left_knee"), joint("right_knee")]
+    joints[:, knees] += np.array([0.0, 0.4, 0.2]) * ease[..., None]
+    return at_seat_height(joints, seated, seated)
+
+
+def test_occupancy_of_upright_boxes_is_the_sensors():
+    rng = np.random.default_rng(0)
+    rows = rng.uniform((-1, -1, 0.1, 0.05, 0.05, 0.05, -3), (1, 1, 1.2, 0.6, 0.6, 0.6, 3), (6, 7))
+    path = RootPath(np.c_[rng.uniform(-0.5, 0.5, (20, 2)), np.zeros(20)], rng.uniform(-3, 3, 20))
+    scene = Scene(tuple(Box(r[:3], r[3:6], yaw_matrix(np.array(r[6]))) for r in rows))
+    assert np.abs(b.occupancy(rows, path) - sensor_occupancy(scene, path)).max() < 1e-5
+
+
+def test_box_distances_are_exact():
+    row = b.placed(b.box((0, 0, 0.5), (0.4, 0.2, 1.0))[None], np.array([1.0, 2.0]), np.pi / 2)
+    points = np.array([[1.0, 2.0, 0.5], [1.0, 2.5, 0.5], [1.4, 2.0, 0.5], [1.0, 2.0, 2.0]])
+    assert np.allclose(b.distances(row, points)[0], [-0.1, 0.3, 0.3, 1.0])
+
+
+def test_a_rest_is_found_and_a_seat_put_under_it_that_never_cuts_the_body():
+    joints = _sit_down()
+    path = root_from_joints(joints)
+    (rest,) = resting(joints, path)
+    assert rest.start > 60 and rest.end == len(joints) and abs(rest.position[2] - 0.55) < 0.01
+    points, found = probes(joints), 0
+    for seed in range(20):
+        seat = seat_for(np.random.default_rng(seed), rest, points)
+        if seat is None:
+            continue
+        found += 1
+        tops = seat[:, 2] + seat[:, 5]
+        assert np.abs(tops - (rest.position[2] - SEAT_TO_PELVIS)).min() < 0.02
+        legs = joints[:, [joint(s + n) for s in ("left_", "right_") for n in ("knee", "ankle", "foot")]].reshape(-1, 3)
+        assert b.distances(seat, legs).min() > -0.01
+    assert found >= 15
+
+
+def test_nothing_is_scattered_into_the_body():
+    joints = _sit_down()
+    path, points = root_from_joints(joints), probes(joints)
+    for seed in range(10):
+        pieces = scattered(np.random.default_rng(seed), points, path, 4)
+        if len(pieces):
+            assert b.distances(pieces, joints.reshape(-1, 3)).min() > 0.03
+
+
+@pytest.mark.parametrize("wanted", [0.42, 0.50, 0.65, 0.80])
+def test_other_seat_heights_keep_feet_and_bones(wanted):
+    joints = _sit_down()
+    moved = at_seat_height(joints, 0.55, wanted)
+    feet = [joint("left_foot"), joint("right_foot")]
+    assert abs(moved[-1, 0, 2] - wanted) < 1e-6 and np.abs(moved[0] - joints[0]).max() < 1e-6
+    assert np.abs(moved[:, feet] - joints[:, feet]).max() < 0.02
+    legs = [joint(s + n) - 1 for s in ("left_", "right_") for n in ("knee", "ankle")]
+    assert np.abs(_lengths(moved)[:, legs] - BONES[legs]).max() < 1e-6
+
+
+def test_a_mirror_swaps_sides_and_is_its_own_inverse():
+    joints = _sit_down()
+    joints[:, joint("left_wrist"), 2] += 0.3
+    other = mirrored(joints)
+    assert np.allclose(mirrored(other), joints)
+    assert np.allclose(other[:, joint("right_wrist"), 2], joints[:, joint("left_wrist"), 2])
+    assert (root_from_joints(other).yaw + root_from_joints(joints).yaw).max() < 1e-9
+
+
+def test_windows_hold_the_motion_they_were_drawn_from():
+    motion = motion_of("made up", "test", "nobody", "sit_down", _sit_down())
+    rng, drawn = np.random.default_rng(1), 0
+    for _ in range(30):
+        window = draw(rng, motion, focus=100)
+        if window is None:
+            continue
+        drawn += 1
+        joints = window.poses.reshape(80, 22, 3)
+        assert np.abs(_lengths(joints) - BONES).max() < 0.03, "turning and mirroring keep lengths; re-timing nearly"
+        assert joints[..., 2].min() > TOE_HEIGHT - 0.03 and window.occupancy.shape == (70, 2640)
+        assert window.occupancy.max() > 200, "a seat is seen"
+    assert drawn > 15
+
+
+def test_a_canonical_body_keeps_planted_toes():
+    joints = _sit_down()
+    clip = Clip("made up", "test", "nobody", "", "sit_down", "train", "none", joints * 1.1)
+    body = calibrate([clip])
+    out = canonical(clip, body)
+    assert abs(body.scale - LEG / (LEG * 1.1)) < 1e-3
+    assert np.abs(_lengths(out) - BONES).max() < 1e-6
+    toe = joint("left_foot")
+    assert np.abs(np.diff(out[:, toe, :2], axis=0)).max() < 2e-3 and abs(np.median(out[:, toe, 2]) - TOE_HEIGHT) < 0.01
+
+
+def test_a_folder_without_motion_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no motion files"):
+        list(read_clips(tmp_path))
+
+
+@pytest.fixture(scope="module")
+def real_clips():
+    if not MOCAP.is_dir():
+        pytest.skip(f"needs the motion capture at {MOCAP}")
+    return [c for c in read_clips(MOCAP) if c.source in ("rocketbox", "ui_prmd")]
+
+
+def test_real_sit_downs_become_canonical(real_clips):
+    clips = [c for c in real_clips if c.source == "rocketbox" and c.subject == "male"]
+    body = calibrate(clips)
+    for clip in (c for c in clips if c.category == "sit_down"):
+        joints = canonical(clip, body)
+        assert np.abs(_lengths(joints) - BONES).max() < 1e-6
+        assert 0.88 < joints[0, 0, 2] < 1.0 and joints[-1, 0, 2] < 0.7
+        (rest, *_) = resting(joints, root_from_joints(joints))
+        assert rest.end - rest.start >= 8
+
+
+def test_real_windows_are_in_the_roots_frame(real_clips):
+    clips = [c for c in real_clips if c.source == "rocketbox" and c.subject == "male"]
+    body = calibrate(clips)
+    clip = next(c for c in clips if c.category == "sit_down")
+    motion = motion_of(clip.name, clip.source, clip.subject, clip.category, canonical(clip, body))
+    rng = np.random.default_rng(0)
+    windows = [w for w in (draw(rng, motion, motion.rests[0].start) for _ in range(20)) if w is not None]
+    assert len(windows) > 8
+    pelvis = np.stack([w.poses.reshape(80, 22, 3)[:, 0] for w in windows])
+    assert np.abs(pelvis[..., :2]).max() < 0.35 and np.abs(np.median(pelvis[..., :2])) < 0.05
+
+
+def test_the_split_is_by_body():
+    if not MOCAP.is_dir():
+        pytest.skip(f"needs the motion capture at {MOCAP}")
+    from dafnet_addon.data.prepare import TRAINED_ON_PARTLY, load_motions
+
+    train = {f"{m.source}/{m.subject}" for m in load_motions(MOCAP, "train")}
+    test = {f"{m.source}/{m.subject}" for m in load_motions(MOCAP, "test")}
+    both = {body for body in train & test if body not in TRAINED_ON_PARTLY and body.split("/")[0] not in TRAINED_ON_PARTLY}
+    assert not both and not any(body.startswith("hdm05") for body in train)
