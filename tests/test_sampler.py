@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dafnet_addon.core.progress import drained
 from dafnet_addon.core.sampler import Conditions, Sampler, model_order, smpl_order
 from dafnet_addon.core.weights import load_weights
 
@@ -17,14 +18,6 @@ def _conditions(frames: int, seed: int = 0) -> Conditions:
     given[frames // 3 : frames // 2, 12:14] = 1.0
     observation = np.tile(rng.normal(size=66) * 0.1 + np.tile([0.0, 0.2, 1.0], 22), (frames, 1))
     return Conditions(smooth, occupancy, observation, given)
-
-
-def _drain(steps):
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            return done.value
 
 
 def test_orders_are_inverse():
@@ -53,7 +46,7 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     tensors = tensors_of(flow, predictor, statistics)
     weights = Weights(tensors, {"model": config.as_dict()}, {"format": FORMAT}, tmp_path)
     conditions, z = _conditions(30), rng.normal(size=(2, 66))
-    made, actions = _drain(Sampler(weights, dtype="float64").run(conditions, z))
+    made, actions = drained(Sampler(weights, dtype="float64").run(conditions, z))
 
     # The same, by the model's own forward: poses must go back to the noise that they were made from.
     poses = torch.from_numpy((model_order(made).transpose(1, 0, 2) - tensors["pose_mean"]) / tensors["pose_std"])
@@ -81,15 +74,15 @@ def weights():
 def test_numpy_and_torch_agree_over_300_frames(weights):
     pytest.importorskip("torch")
     z = 0.7 * np.random.default_rng(1).normal(size=(1, 66))
-    ours, _ = _drain(Sampler(weights).run(_conditions(300), z))
-    theirs, _ = _drain(Sampler(weights, device="cpu").run(_conditions(300), z))
+    ours, _ = drained(Sampler(weights).run(_conditions(300), z))
+    theirs, _ = drained(Sampler(weights, device="cpu").run(_conditions(300), z))
     assert np.abs(ours - theirs).max() < 1e-4
 
 
 def test_shipped_weights_invert(weights):
     sampler = Sampler(weights)
     conditions, z = _conditions(100), 0.7 * np.random.default_rng(1).normal(size=(1, 66))
-    made, _ = _drain(sampler.run(conditions, z))
+    made, _ = drained(sampler.run(conditions, z))
     again = Sampler(weights)
     again.start(conditions)
     standard = again.standardised(made).astype(np.float32)
@@ -99,22 +92,22 @@ def test_shipped_weights_invert(weights):
 
 def test_a_batch_is_its_single_takes(weights):
     z = np.random.default_rng(2).normal(size=(3, 66))
-    together, _ = _drain(Sampler(weights).run(_conditions(40), z))
-    alone, _ = _drain(Sampler(weights).run(_conditions(40), z[1:2]))
+    together, _ = drained(Sampler(weights).run(_conditions(40), z))
+    alone, _ = drained(Sampler(weights).run(_conditions(40), z[1:2]))
     assert np.abs(together[:, 1] - alone[:, 0]).max() < 1e-4
 
 
 def test_resuming_goes_on_as_if_never_stopped(weights):
     conditions, z = _conditions(160), 0.5 * np.random.default_rng(4).normal(size=(1, 66))
-    whole, _ = _drain(Sampler(weights).run(conditions, z))
-    resumed, _ = _drain(Sampler(weights).run(conditions, z, kept=whole[:90]))
+    whole, _ = drained(Sampler(weights).run(conditions, z))
+    resumed, _ = drained(Sampler(weights).run(conditions, z, kept=whole[:90]))
     assert np.abs(resumed - whole).max() < 1e-3
 
 
 def test_lower_noise_leaves_the_upper_body_alone_at_the_first_frame(weights):
     z = np.zeros((2, 66))
     z[1, 42:] = 1.0
-    made, _ = _drain(Sampler(weights).run(_conditions(1), z))
+    made, _ = drained(Sampler(weights).run(_conditions(1), z))
     upper = model_order(made)[..., :42]
     assert np.abs(upper[0, 0] - upper[0, 1]).max() < 1e-5
     assert np.abs(made[0, 0] - made[0, 1]).max() > 1e-3

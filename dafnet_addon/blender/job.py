@@ -6,11 +6,12 @@ A job knows objects by name only and looks them up at each stage, since they may
 from collections.abc import Generator
 from dataclasses import dataclass
 from time import perf_counter
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import bpy
 
 from .. import generate_steps, load_weights
+from ..core.progress import drained, within
 from ..core.take import Take
 from .armature import metres_per_unit
 from .baker import bake
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from ..core.weights import Weights
 
 __all__ = ["Result", "Settings", "settings_of", "steps", "run"]
-
-_T = TypeVar("_T")
 
 _READ, _GENERATED = 0.1, 0.98
 """Progress after the scene is read and after the take is generated."""
@@ -55,10 +54,10 @@ def steps(
     if weights is None:
         weights = load_weights(weights_path(context))
     started = perf_counter()
-    read = yield from _scaled(read_steps(context, settings), 0.0, _READ)
+    read = yield from within(read_steps(context, settings), 0.0, _READ)
     seconds = {"reading": perf_counter() - started}
 
-    take = yield from _scaled(
+    take = yield from within(
         generate_steps(
             read.scene, read.controls, weights,
             seed=settings.seed, lower_seed=settings.lower_seed, temperature=settings.temperature,
@@ -75,19 +74,4 @@ def steps(
 
 def run(context: bpy.types.Context, settings: Settings, weights: "Weights | None" = None) -> Result:
     """``steps`` drained."""
-    job = steps(context, settings, weights)
-    while True:
-        try:
-            next(job)
-        except StopIteration as done:
-            return done.value
-
-
-def _scaled(stage: Generator[float, None, _T], start: float, end: float) -> Generator[float, None, _T]:
-    """A stage whose progress is mapped from [0, 1] to [start, end]."""
-    while True:
-        try:
-            progress = next(stage)
-        except StopIteration as done:
-            return done.value
-        yield start + (end - start) * progress
+    return drained(steps(context, settings, weights))

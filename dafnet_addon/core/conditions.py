@@ -1,5 +1,6 @@
 """From the animator's controls and the scene to what the model is told at each frame, at 30 fps and on the canonical body."""
 
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from .skeleton import END_EFFECTORS, LOWER, UPPER
 from .solids import Box, Mesh, Scene
 from .take import MODES, Controls
 
-__all__ = ["Shot", "shot_of", "PREROLL"]
+__all__ = ["Shot", "shot_steps", "PREROLL"]
 
 PREROLL = 70
 """Frames for which the root stands still before the first one, so that the model's memory has settled."""
@@ -163,8 +164,8 @@ def _look_around(scene: Scene, path: RootPath, occupied: np.ndarray, warnings: l
         )
 
 
-def shot_of(scene: Scene, controls: Controls) -> Shot:
-    """Everything that the model is told. Raises InputError for controls that cannot be used."""
+def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]:
+    """Everything that the model is told; yields progress in [0, 1], solid by solid. Raises InputError for bad controls."""
     _check(controls)
     warnings: list[str] = []
     modes = _checked_modes(controls.mode, len(controls))
@@ -174,9 +175,14 @@ def shot_of(scene: Scene, controls: Controls) -> Shot:
     modes = resample_nearest(modes, times, target)
     observation, given = _observed(controls, modes, times, target, path, warnings)
 
-    scene, said = prepared(_at_model_rate(scene, times, target), float(np.median(path.position[:, 2])) * controls.scale)
-    warnings += said
-    scene = scaled(scene, 1.0 / controls.scale)
+    floor = float(np.median(path.position[:, 2])) * controls.scale
+    solids: list[Box | Mesh] = []
+    for solid in _at_model_rate(scene, times, target).solids:
+        known, said = prepared(Scene((solid,)), floor)
+        solids += known.solids
+        warnings += said
+        yield len(solids) / len(scene.solids)
+    scene = scaled(Scene(tuple(solids)), 1.0 / controls.scale)
     occupied = occupancy(scene, path)
     _look_around(scene, path, occupied, warnings)
 

@@ -5,9 +5,10 @@ from time import perf_counter
 
 import numpy as np
 
-from .conditions import PREROLL, Shot, shot_of
+from .conditions import PREROLL, Shot, shot_steps
 from .errors import InputError
 from .kinematics import blend_switches, fit, forward_kinematics, global_from_local, local_from_global
+from .progress import drained, within
 from .resampling import (
     MODEL_FPS,
     covering_frames,
@@ -26,6 +27,8 @@ from .weights import Weights
 __all__ = ["generate", "generate_steps"]
 
 _UPPER_SIZE = 42
+_CONDITIONED, _SAMPLED = 0.1, 0.97
+"""Progress when the conditions are known and when the poses are made."""
 
 
 def noise_of(seed: int, lower_seed: int | None, temperature: float) -> np.ndarray:
@@ -79,7 +82,7 @@ def generate_steps(
         raise InputError(f"The temperature is {temperature}; give 0 or a small positive number such as 0.8.")
     started = perf_counter()
     yield 0.0
-    shot = shot_of(scene, controls)
+    shot = yield from within(shot_steps(scene, controls), 0.0, _CONDITIONED)
     conditioned = perf_counter()
     sampler = Sampler(weights, device)
     z = noise_of(seed, lower_seed, temperature)
@@ -87,21 +90,12 @@ def generate_steps(
     if resume is not None and resume_frame > 0:
         held = _kept(resume, resume_frame, shot.path)
         kept = np.concatenate([np.repeat(held[:1], PREROLL, axis=0), held])[:, None]
-    run = sampler.run(shot.conditions, z, kept)
-    while True:
-        try:
-            share = next(run)
-        except StopIteration as done:
-            made, actions = done.value
-            break
-        yield 0.05 + 0.9 * share
+    made, actions = yield from within(sampler.run(shot.conditions, z, kept), _CONDITIONED, _SAMPLED)
     sampled = perf_counter()
 
     poses, actions = made[PREROLL:, 0], actions[PREROLL:, 0]
     switches = np.flatnonzero(shot.modes[1:] != shot.modes[:-1]) + 1
     local, pelvis = _onto_bones(poses, shot, controls, switches)
-    yield 0.97
-
     # From 30 frames a second to the controls' own rate, and to the character's own size.
     source, target = frame_times(len(poses), MODEL_FPS), frame_times(len(controls), controls.fps)
     rotations = resample_rotations(local, source, target)
@@ -124,13 +118,7 @@ def generate(
     temperature: float = 0.0, resume: Take | None = None, resume_frame: int = 0, device: str | None = None,
 ) -> Take:
     """Drain ``generate_steps``, whose arguments these are, and return its take."""
-    steps = generate_steps(
+    return drained(generate_steps(
         scene, controls, weights, seed=seed, lower_seed=lower_seed, temperature=temperature, resume=resume,
         resume_frame=resume_frame, device=device,
-    )
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            take: Take = done.value
-            return take
+    ))

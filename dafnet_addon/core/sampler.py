@@ -13,6 +13,7 @@ import numpy as np
 
 from .errors import WeightsError
 from .skeleton import LOWER, UPPER
+from .threads import one_thread
 from .weights import Weights
 
 __all__ = ["Conditions", "Sampler", "model_order", "smpl_order"]
@@ -304,13 +305,14 @@ class Sampler:
         first, last = len(known), noise
         poses, actions = [], []
         for t in range(len(conditions)):
-            if t < first:
-                pose = known[t]
-                last, action = self.absorb(t, pose)
-            else:
-                share = min(1.0, (t - first + 1) / _PASSING)
-                now = last + (noise - last) * (share * share * (3.0 - 2.0 * share))
-                pose, action = self.frame(t, now[:, :_UPPER_SIZE], now[:, _UPPER_SIZE:])
+            with one_thread():  # frame by frame: whoever drains this generator has the threads back in between
+                if t < first:
+                    pose = known[t]
+                    last, action = self.absorb(t, pose)
+                else:
+                    share = min(1.0, (t - first + 1) / _PASSING)
+                    now = last + (noise - last) * (share * share * (3.0 - 2.0 * share))
+                    pose, action = self.frame(t, now[:, :_UPPER_SIZE], now[:, _UPPER_SIZE:])
             poses.append(pose)
             actions.append(action)
             yield (t + 1) / len(conditions)

@@ -153,7 +153,8 @@ class Run:
         state, rng = torch.get_rng_state(), self.rng
         torch.manual_seed(1)
         self.rng = np.random.default_rng(1)
-        loss = float(self.loss(batch_of(held, np.arange(min(windows, len(held["poses"]))), self.statistics, self.model.history)))
+        rows = np.arange(min(windows, len(held["poses"])))
+        loss = float(self.loss(batch_of(held, rows, self.statistics, self.model.history)))
         self.rng = rng
         torch.set_rng_state(state)
         return loss
