@@ -10,12 +10,13 @@ import json
 import os
 import runpy
 import sys
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from .core.errors import DafnetError, InputError
+from .core.progress import drained
 from .core.take import MODES
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = ["main", "run"]
 
-_T = TypeVar("_T")
 _FURTHER_TAKES = 0.8  # temperature of every take but the first, where none is asked for
 
 
@@ -155,7 +155,8 @@ def _bake(options: argparse.Namespace) -> None:
         for index in range(options.takes):
             settings = job.settings_of(armature, bpy.context.scene, **_overrides(options, armature, index))
             label = f"take {index + 1} of {options.takes}" if options.takes > 1 else ""
-            results.append((settings, _drain(job.steps(bpy.context, settings, weights), label)))
+            with _Bar(label) as bar:
+                results.append((settings, drained(job.steps(bpy.context, settings, weights), bar)))
         assign_action(armature, results[0][1].action)
         options.output.parent.mkdir(parents=True, exist_ok=True)
         bpy.ops.wm.save_as_mainfile(filepath=str(options.output.resolve()), copy=options.in_blender)
@@ -335,16 +336,6 @@ class _Bar:
 
     def __exit__(self, *_: object) -> None:
         print(file=sys.stderr, flush=True)
-
-
-def _drain(steps: Generator[float, None, _T], label: str = "") -> _T:
-    """Run a job to its end and show its progress."""
-    with _Bar(label) as bar:
-        while True:
-            try:
-                bar(next(steps))
-            except StopIteration as done:
-                return done.value
 
 
 @contextmanager

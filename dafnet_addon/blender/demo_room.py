@@ -1,7 +1,7 @@
 """The example: a room from tables of parts, a character, its keyed root and hand target, a take and its preview."""
 
 import json
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import cos, radians, sin
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 from mathutils import Euler, Matrix
 
 from ..core.paths import Route
+from ..core.progress import drained
 from ..core.root import smoothed
 from ..core.weights import load_weights
 from ..demo import FPS, PLACES, Place, demo_report, demo_route, hand_target
@@ -193,7 +194,7 @@ def run_demo(
     use_workbench(room.scene)
     settings = job.settings_of(room.armature, room.scene, seed=seed, temperature=temperature)
     generating = 0.2 if preview else 1.0
-    result = _drained(job.steps(bpy.context, settings, loaded), lambda part: progress(generating * part))
+    result = drained(job.steps(bpy.context, settings, loaded), lambda part: progress(generating * part))
 
     folder.mkdir(parents=True, exist_ok=True)
     read = read_scene(bpy.context, settings)
@@ -207,14 +208,6 @@ def run_demo(
         render_sheet(room.scene, folder / "sheet.png", frames)
         render_film(room.scene, folder / "preview.mp4", 2, lambda part: progress(generating + (1 - generating) * part))
     return report
-
-
-def _drained(steps: Generator[float, None, job.Result], progress: Callable[[float], None]) -> job.Result:
-    while True:
-        try:
-            progress(next(steps))
-        except StopIteration as done:
-            return done.value
 
 
 def _collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:

@@ -1,6 +1,6 @@
 """Long jobs are generators that yield their progress in [0, 1] and return their result."""
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from typing import TypeVar
 
 __all__ = ["drained", "within"]
@@ -8,11 +8,11 @@ __all__ = ["drained", "within"]
 _T = TypeVar("_T")
 
 
-def drained(steps: Generator[float, None, _T]) -> _T:
-    """Run a job to its end and give its result."""
+def drained(steps: Generator[float, None, _T], progress: Callable[[float], None] = lambda share: None) -> _T:
+    """Run a job to its end and give its result; ``progress`` is called with every share done."""
     while True:
         try:
-            next(steps)
+            progress(next(steps))
         except StopIteration as done:
             return done.value
 

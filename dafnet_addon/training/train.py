@@ -33,7 +33,9 @@ __all__ = ["TrainingConfig", "read_config", "Run", "train", "train_part", "train
 class TrainingConfig:
     """``minutes_predictor``, ``minutes_flow``: time budgets. Learning rates rise over ``warmup`` steps to ``peak`` and fall
     along a cosine to ``final``. ``slot_dropout``: share of past-pose slots hidden from the predictor while it learns.
-    ``environment_dropout``: share of sensor values hidden from both. ``clip_norm``: largest gradient norm.
+    ``environment_dropout``: share of sensor values hidden from both, in a share ``dropout_windows`` of the windows (the paper
+    hides them in all; then only whole layers of spheres are told apart, and seats are met to 12 cm). ``clip_norm``: largest
+    gradient norm.
     """
 
     minutes_predictor: float = 5.0
@@ -44,6 +46,7 @@ class TrainingConfig:
     final: float = 1e-4
     slot_dropout: float = 0.95
     environment_dropout: float = 0.5
+    dropout_windows: float = 0.5
     clip_norm: float = 50.0
     save_every: int = 100
     seed: int = 0
@@ -124,8 +127,9 @@ class Run:
         return rate * min(1.0, (self.step + 1) / c.warmup)
 
     def hidden(self, occupancy: torch.Tensor) -> torch.Tensor:
-        """Occupancy with a share of its values dropped (paper, Appendix A); nothing is rescaled."""
-        return occupancy * (torch.rand_like(occupancy) >= self.config.environment_dropout)
+        """Occupancy (B, …, 2640) with a share of its values dropped (paper, Appendix A); nothing is rescaled."""
+        spared = torch.rand(len(occupancy), *[1] * (occupancy.ndim - 1)) >= self.config.dropout_windows
+        return occupancy * (spared | (torch.rand_like(occupancy) >= self.config.environment_dropout))
 
     def loss(self, batch: Batch, initialise: bool = False) -> torch.Tensor:
         """The GMVAE's loss, or the part's negative log-likelihood a frame with the predictor frozen."""
