@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 SCANS = ROOT.parent / "shared" / "data" / "furniture"
-SEATS = {"Stool": ((-1.6, 0.6), 0.58), "Sofa": ((1.4, 0.5), 0.50)}
+SEATS = {"Stool": ((-1.6, 0.6), 0.58), "Sofa": ((1.4, 0.34), 0.52)}
 
 BUILD = '''
 import sys
@@ -31,7 +31,7 @@ scene.render.fps = 24
 furniture = bpy.data.collections.new("Furniture")
 scene.collection.children.link(furniture)
 for name, file, place, turn in (
-    ("Stool", "painted_wooden_stool", (-1.6, 0.6), 0.0), ("Sofa", "sofa_03", (1.4, 0.35), pi),
+    ("Stool", "painted_wooden_stool", (-1.6, 0.6), 0.0), ("Sofa", "sofa_03", (1.4, 0.5), 0.0),
     ("Table", "wooden_table_02", (0.0, 2.2), 0.0),
 ):
     before = set(bpy.data.objects)
@@ -47,7 +47,7 @@ for name, file, place, turn in (
 armature = create_character(bpy.context, "Walker")
 walked = route(
     Stop((0.4, -2.2), 0.0, 0.5), Stop((-1.6, 0.6), pi, 2.5, seated=True, name="Stool"),
-    (-0.4, -0.7), Stop((1.4, 0.5), pi, 2.5, seated=True, name="Sofa"), fps=24,
+    (-0.4, -0.7), Stop((1.4, 0.34), pi, 2.5, seated=True, name="Sofa"), fps=24,
 )
 root = armature.dafnet.root
 root.rotation_mode = "XYZ"

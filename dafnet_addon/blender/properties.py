@@ -34,9 +34,9 @@ class CharacterSettings(bpy.types.PropertyGroup):
         name="Mode", default="FREE",
         description="What drives the upper body. Keyframe it to change it during the shot",
         items=[
-            ("FREE", "Free", "Only the root is given; the whole body follows from it"),
-            ("EE", "Targets", "Head and hands reach for their targets; each of them that is set counts"),
-            ("FULL", "Upper Body", "The whole upper body is copied from another armature; only the legs are generated"),
+            ("FREE", "FREE", "Only the root is given; the whole body follows from it"),
+            ("EE", "EE", "End effectors: head and hands reach for their targets; each of them that is set counts"),
+            ("FULL", "FULL", "The whole upper body is copied from another armature; only the legs are generated"),
         ],
     )
     furniture: PointerProperty(
