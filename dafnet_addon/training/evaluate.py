@@ -9,7 +9,7 @@ import numpy as np
 from ..core.generate import generate
 from ..core.metrics import summary
 from ..core.occupancy import distance
-from ..core.skeleton import END_EFFECTORS
+from ..core.skeleton import END_EFFECTORS, UPPER
 from ..core.take import Controls
 from ..core.weights import Weights
 from ..data.held_out import HeldClip
@@ -60,15 +60,18 @@ def _row(clips: list[HeldClip], made: list[np.ndarray]) -> dict[str, Any]:
 def evaluate(
     weights: Weights, clips: list[HeldClip], progress: Callable[[float], None] = lambda share: None, seed: int = 0
 ) -> dict[str, dict[str, Any]]:
-    """Rows of metrics: ground truth first, then FREE and EE at temperature 0 and 1, on unseen bodies; last, FREE on clips
-    of bodies that are also in training.
+    """Rows of metrics: ground truth first, then FREE and EE at temperature 0 and 1 and FULL at 0, on unseen bodies; last,
+    FREE on clips of bodies that are also in training.
 
-    The true root is given in all modes, the true head and hands in EE. ``end_effector_error`` in FREE is no fault, it says
+    The true root is given in all modes, the true head and hands in EE, the true upper body in FULL. ``end_effector_error`` in FREE is no fault, it says
     how far an unconstrained body is from the real one.
     """
     unseen, partly = [c for c in clips if c.unseen], [c for c in clips if not c.unseen]
-    runs = [("free_t0", unseen, "FREE", 0.0), ("ee_t0", unseen, "EE", 0.0), ("free_t1", unseen, "FREE", 1.0),
-            ("ee_t1", unseen, "EE", 1.0), ("free_t0_bodies_in_training", partly, "FREE", 0.0)]
+    runs = [
+        ("free_t0", unseen, "FREE", 0.0), ("ee_t0", unseen, "EE", 0.0), ("free_t1", unseen, "FREE", 1.0),
+        ("ee_t1", unseen, "EE", 1.0), ("full_t0", unseen, "FULL", 0.0),
+        ("free_t0_bodies_in_training", partly, "FREE", 0.0),
+    ]
     rows = {
         "ground_truth": _row(unseen, [c.joints for c in unseen]),
         "ground_truth_bodies_in_training": _row(partly, [c.joints for c in partly]),
@@ -80,7 +83,7 @@ def evaluate(
             targets = {effector: clip.joints[:, j] for effector, j in END_EFFECTORS.items()}
             controls = Controls(
                 fps=30.0, root=clip.path.matrices(), mode=mode, head=targets["head"], hand_left=targets["hand_left"],
-                hand_right=targets["hand_right"],
+                hand_right=targets["hand_right"], upper_body=clip.joints[:, list(UPPER)],
             )
             made.append(generate(clip.scene, controls, weights, seed=seed, temperature=temperature).joints)
             done += 1
