@@ -63,8 +63,8 @@ def evaluate(
     """Rows of metrics: ground truth first, then FREE and EE at temperature 0 and 1 and FULL at 0, on unseen bodies; last,
     FREE on clips of bodies that are also in training.
 
-    The true root is given in all modes, the true head and hands in EE, the true upper body in FULL. ``end_effector_error`` in FREE is no fault, it says
-    how far an unconstrained body is from the real one.
+    The true root is given in all modes, the true head and hands in EE, the true upper body in FULL.
+    ``end_effector_error`` in FREE is no fault, it says how far an unconstrained body is from the real one.
     """
     unseen, partly = [c for c in clips if c.unseen], [c for c in clips if not c.unseen]
     runs = [
