@@ -53,13 +53,18 @@ def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
 def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:
     """Size of the character over the canonical body; ``unit`` is a Blender unit in metres.
 
-    ``InputError``: bones are missing or their proportions were edited, or the object is scaled unevenly.
+    ``InputError``: bones are missing, their proportions, parents or inheritance were edited, or the object is scaled
+    unevenly.
     """
     if armature.mode == "EDIT":
         raise InputError(f"The armature '{armature.name}' is in edit mode; leave it and try again.")
     if missing := missing_bones(armature):
         raise InputError(f"The armature '{armature.name}' has no bone '{missing[0]}'; use one that Add Character made.")
-    heads = np.array([armature.data.bones[name].head_local for name in JOINTS])
+    bones = [armature.data.bones[name] for name in JOINTS]
+    chained = [bone.parent and bone.parent.name for bone in bones] == [JOINTS[p] if p >= 0 else None for p in PARENTS]
+    if not chained or not all(bone.use_inherit_rotation and bone.use_local_location for bone in bones):
+        raise InputError(f"The bones of '{armature.name}' got other parents or inheritance; add a new character.")
+    heads = np.array([bone.head_local for bone in bones])
     offsets = heads[1:] - heads[list(PARENTS[1:])]
     canonical = OFFSETS[1:] @ FACING
     scale = float((offsets * canonical).sum() / (canonical**2).sum())

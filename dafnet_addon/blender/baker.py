@@ -13,7 +13,9 @@ from .armature import character_scale
 from .compat import action_curves, assign_action, new_action
 from .mannequin import FACING
 
-__all__ = ["bake", "require_bakeable"]
+__all__ = ["bake", "laid_over", "require_bakeable"]
+
+_TRANSFORMS = ("location", "rotation", "scale")
 
 
 def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
@@ -24,12 +26,30 @@ def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
         raise InputError(f"The armature '{armature.name}' is linked or a library override; make it local first.")
     if armature.parent:
         raise InputError(f"The armature '{armature.name}' has a parent; clear it, and parent the root object instead.")
-    if any(not constraint.mute for constraint in armature.constraints):
-        raise InputError(f"The armature '{armature.name}' has object constraints; mute them and constrain the root.")
+    if any(not constraint.mute for constraint in armature.constraints) or _driven(armature, _TRANSFORMS):
+        raise InputError(
+            f"The armature '{armature.name}' has object constraints or drivers; mute them and constrain the root."
+        )
     delta = (*armature.delta_location, *armature.delta_rotation_euler, *(s - 1.0 for s in armature.delta_scale))
     if any(delta):
         raise InputError(f"The armature '{armature.name}' has delta transforms; apply them and try again.")
+    if armature.data.pose_position == "REST":
+        raise InputError(f"The armature '{armature.name}' shows its rest position; set it to Pose Position.")
+    data = armature.animation_data
+    if data and (data.use_tweak_mode or any(track.is_solo for track in data.nla_tracks)):
+        raise InputError(f"The armature '{armature.name}' plays an NLA strip in tweak or solo mode; leave it first.")
     return character_scale(armature, unit)
+
+
+def laid_over(armature: bpy.types.Object) -> bool:
+    """Whether constraints or drivers of bones change what an action plays."""
+    constraints = (constraint for name in JOINTS for constraint in armature.pose.bones[name].constraints)
+    return any(not constraint.mute for constraint in constraints) or _driven(armature, "pose.bones[")
+
+
+def _driven(armature: bpy.types.Object, paths: str | tuple[str, ...]) -> bool:
+    drivers = armature.animation_data.drivers if armature.animation_data else ()
+    return any(not driver.mute and driver.data_path.startswith(paths) for driver in drivers)
 
 
 def bake(take: Take, armature: bpy.types.Object, frame_start: int, name: str, unit: float = 1.0) -> bpy.types.Action:
@@ -76,7 +96,9 @@ def bake(take: Take, armature: bpy.types.Object, frame_start: int, name: str, un
         previous.use_fake_user = True
     armature.rotation_mode = "XYZ"
     for joint_name in JOINTS:
-        armature.pose.bones[joint_name].rotation_mode = "QUATERNION"
+        bone = armature.pose.bones[joint_name]
+        bone.matrix_basis.identity()
+        bone.rotation_mode = "QUATERNION"
     assign_action(armature, action)
     return action
 

@@ -32,9 +32,10 @@ def new_action(
 
 
 def assign_action(owner: bpy.types.Object, action: bpy.types.Action) -> None:
-    """Let ``owner`` play ``action``; a slot that is not assigned plays nothing."""
+    """Let ``owner`` play ``action`` and nothing mixed into it; a slot that is not assigned plays nothing."""
     data = owner.animation_data_create()
     data.action = action
+    data.action_blend_type, data.action_influence = "REPLACE", 1.0
     if _SLOTS:
         data.action_slot = action.slots[0]
 
