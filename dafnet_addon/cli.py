@@ -37,6 +37,9 @@ def main(argv: Sequence[str] | None = None, in_blender: bool = False) -> int:
     except DafnetError as error:
         print(f"dafnet: {error}", file=sys.stderr)
         return 1
+    except OSError as error:
+        print(f"dafnet: {error.filename or 'A file'} cannot be used ({error.strerror}); check its path.", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print("dafnet: stopped.", file=sys.stderr)
         return 130
@@ -108,10 +111,11 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
 
 
 def _frames(text: str) -> tuple[int, int]:
-    first, colon, last = text.partition(":")
-    if not colon:
-        raise argparse.ArgumentTypeError(f"'{text}' is no range; write it as FIRST:LAST")
-    return int(first), int(last)
+    first, _, last = text.partition(":")
+    try:
+        return int(first), int(last)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"'{text}' is no range; write it as FIRST:LAST") from error
 
 
 def _demo(options: argparse.Namespace) -> None:
@@ -152,14 +156,14 @@ def _bake(options: argparse.Namespace) -> None:
         if options.file is not None:
             _open(options.file)
         armature = _character(bpy.context.scene, options.character)
+        options.output.parent.mkdir(parents=True, exist_ok=True)
         for index in range(options.takes):
             settings = job.settings_of(armature, bpy.context.scene, **_overrides(options, armature, index))
             label = f"take {index + 1} of {options.takes}" if options.takes > 1 else ""
             with _Bar(label) as bar:
                 results.append((settings, drained(job.steps(bpy.context, settings, weights), bar)))
         assign_action(armature, results[0][1].action)
-        options.output.parent.mkdir(parents=True, exist_ok=True)
-        bpy.ops.wm.save_as_mainfile(filepath=str(options.output.resolve()), copy=options.in_blender)
+        _save(options.output, copy=options.in_blender)
     report: dict[str, Any] = {
         "output": str(options.output),
         "takes": [
@@ -209,6 +213,15 @@ def _open(file: Path) -> None:
         bpy.ops.wm.open_mainfile(filepath=str(file.resolve()))
     except RuntimeError as error:
         raise InputError(f"Blender cannot open '{file}'; save it again with this Blender or an older one.") from error
+
+
+def _save(file: Path, copy: bool) -> None:
+    import bpy
+
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(file.resolve()), copy=copy)
+    except RuntimeError as error:
+        raise InputError(f"Blender cannot write '{file}'; choose a folder that you may write to.") from error
 
 
 def _character(scene: "bpy.types.Scene", name: str | None) -> "bpy.types.Object":

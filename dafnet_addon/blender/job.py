@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 import bpy
 
 from .. import generate_steps, load_weights
+from ..core.errors import InputError
 from ..core.progress import drained, within
 from ..core.take import Take
 from .armature import metres_per_unit
 from .baker import bake
-from .properties import Settings, find_object, find_scene, settings_of, weights_path
+from .properties import Settings, find_object, find_scene, names_in_use, settings_of, weights_path
 from .scene_reader import read_steps
 
 if TYPE_CHECKING:
@@ -54,7 +55,11 @@ def steps(
     if weights is None:
         weights = load_weights(weights_path(context))
     started = perf_counter()
-    read = yield from within(read_steps(context, settings), 0.0, _READ)
+    used = names_in_use(settings)
+    try:
+        read = yield from within(read_steps(context, settings), 0.0, _READ)
+    except ReferenceError as error:
+        raise InputError("Something was deleted while the scene was read; generate again.") from error
     seconds = {"reading": perf_counter() - started}
 
     take = yield from within(
@@ -65,6 +70,8 @@ def steps(
         _READ, _GENERATED,
     )
     started = perf_counter()
+    if gone := used - names_in_use(settings):
+        raise InputError(f"'{min(gone)}' is not in the scene any more; generate again.")
     armature = find_object(settings, settings.armature, "character")
     action = bake(take, armature, settings.frame_start, f"{armature.name} take", metres_per_unit(find_scene(settings)))
     seconds |= take.seconds | {"baking": perf_counter() - started}

@@ -12,7 +12,7 @@ from ..core.take import MODES
 
 __all__ = [
     "ADDON", "CharacterSettings", "Preferences", "Settings", "settings_of", "find_scene", "find_object",
-    "find_collection", "register", "unregister", "ensure_registered", "weights_path",
+    "find_collection", "names_in_use", "register", "unregister", "ensure_registered", "weights_path",
 ]
 
 ADDON = (__package__ or "").removesuffix(".dafnet_addon.blender")
@@ -172,6 +172,17 @@ def find_collection(name: str) -> bpy.types.Collection:
     if found is None:
         raise InputError(f"The furniture collection '{name}' is not in this file; choose another in the DAFNet panel.")
     return found
+
+
+def names_in_use(settings: Settings) -> set[str]:
+    """Names of all that a generation with these settings uses and that is there: objects, furniture, its collection."""
+    named = {settings.armature, settings.root, settings.head, settings.hand_left, settings.hand_right}
+    named.add(settings.upper_body_source)
+    used = {o.name_full for o in find_scene(settings).objects if o.name_full in named}
+    for collection in bpy.data.collections:
+        if collection.name_full == settings.furniture:
+            used |= {collection.name_full, *(o.name_full for o in collection.all_objects)}
+    return used
 
 
 def weights_path(context: bpy.types.Context) -> str | None:

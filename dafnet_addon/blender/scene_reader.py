@@ -20,7 +20,7 @@ from ..core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
 from ..core.solids import Mesh, Scene
 from ..core.take import Controls
 from .armature import metres_per_unit, missing_bones
-from .baker import require_bakeable
+from .baker import laid_over, require_bakeable
 from .compat import action_curves
 from .mannequin import FACING
 from .properties import Settings, find_collection, find_object, find_scene
@@ -84,6 +84,8 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     scene = find_scene(settings)
     if context.scene != scene:
         raise InputError(f"The scene '{settings.scene}' is not the active one; make it active and generate again.")
+    if scene.render.frame_map_old != scene.render.frame_map_new:
+        raise InputError(f"The scene '{settings.scene}' stretches time; set its Time Stretching back to 100 : 100.")
     unit = metres_per_unit(scene)
     armature = find_object(settings, settings.armature, "character")
     size = require_bakeable(armature, unit)
@@ -92,6 +94,9 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     root = find_object(settings, settings.root, "root")
     names = {role: name for role in _TARGETS if (name := getattr(settings, role))}
     targets = {role: find_object(settings, name, _TARGETS[role]) for role, name in names.items()}
+    for driver, role in ((root, "root"), *((target, _TARGETS[name]) for name, target in targets.items())):
+        if armature in _followed(driver):
+            raise InputError(f"The {role} '{driver.name}' follows the character itself; let it follow something else.")
     source = _upper_body_source(settings, armature)
     own = {armature, root, *targets.values(), *armature.children_recursive}
     furniture = _Furniture(find_collection(settings.furniture), armature, own) if settings.furniture else None
@@ -123,10 +128,10 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
                     bones.append(np.array([evaluated.pose.bones[name].head for name in JOINTS]))
         yield min(start + _BATCH, len(frames)) / (len(frames) + 1)
 
-    warnings: tuple[str, ...] = ()
+    warnings = tuple(_told(armature, pieces))
     if furniture:
         with _frame_kept(scene):
-            warnings = furniture.deforming(context, frames, pieces)
+            warnings += furniture.deforming(context, frames, pieces)
     fps = scene.render.fps / scene.render.fps_base
     root_matrices = _rigid(np.array(tracks["root"]), unit, f"root '{root.name}'")
     given: dict[str, Any] = {}
@@ -163,6 +168,26 @@ def _require_alive(depsgraph: bpy.types.Depsgraph, needed: list[bpy.types.Object
     for each in needed:
         if each not in alive:
             raise InputError(f"'{each.name}' or its collection is disabled in viewports; enable it, or hide it with H.")
+
+
+def _followed(follower: bpy.types.Object) -> set[bpy.types.Object]:
+    """The object itself and all that it follows by parents and constraints, and what those follow."""
+    found: set[bpy.types.Object] = set()
+    waiting = [follower]
+    while waiting:
+        each = waiting.pop()
+        if each is not None and each not in found:
+            found.add(each)
+            waiting += [each.parent, *(getattr(c, "target", None) for c in each.constraints if not c.mute)]
+    return found
+
+
+def _told(armature: bpy.types.Object, pieces: list[_Piece]) -> Iterator[str]:
+    """Warnings about what can be used, but hardly as it was meant."""
+    if laid_over(armature):
+        yield f"Bones of '{armature.name}' have constraints or drivers, which change the take; mute them to see it as made."
+    for name in dict.fromkeys(p.name for p in pieces if not np.any(np.abs(np.array(p.matrices)[:, :3, :3]) > 1e-9)):
+        yield f"'{name}' is scaled to zero, so it is not there for the character; give it a scale."
 
 
 def _array(matrix: Matrix) -> np.ndarray:
@@ -211,8 +236,8 @@ class _Furniture:
         for instance in depsgraph.object_instances:
             if instance.object.type != "MESH" or not (instance.is_instance or instance.show_self):
                 continue
-            made_of = instance.object.original
-            if _owner(instance) in self.members and made_of not in self.own and not self._deformed(made_of):
+            owner, made_of = _owner(instance), instance.object.original
+            if owner in self.members and owner.visible_get() and made_of not in self.own and not self._deformed(made_of):
                 yield instance
 
     def pieces(self, depsgraph: bpy.types.Depsgraph) -> list[_Piece]:
@@ -231,7 +256,9 @@ class _Furniture:
                 pieces.append(_Piece(_key(instance), _owner(instance).name, source, vertices, triangles))
         name = self.collection.name
         if not seen:
-            raise InputError(f"The furniture collection '{name}' has no visible mesh; fill it or choose none.")
+            raise InputError(
+                f"The furniture collection '{name}' has no visible mesh besides the character's own; fill it or choose none."
+            )
         if not pieces:
             raise InputError(f"The meshes of the furniture collection '{name}' have no faces; give them some.")
         return pieces

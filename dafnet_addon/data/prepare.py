@@ -15,8 +15,9 @@ import numpy as np
 from ..core.rotations import frame_from, normalised
 from ..core.skeleton import OFFSETS, PARENTS
 from .canonical import calibrate, canonical
+from .compose import entrance, joined, matches
 from .mocap import Clip, read_clips
-from .windows import Motion, Window, draw, motion_of
+from .windows import Motion, Window, draw, mirrored, motion_of
 
 __all__ = ["load_motions", "prepare", "load_pool", "TRAINED_ON_PARTLY"]
 
@@ -25,8 +26,12 @@ _STAND = {"standing", "standing_idle", "standing_gesture", "social_gesture", "gr
           "reach-hand-task"}
 _SIT = {"sit-stand", "sit_down", "stand_up", "seated", "seated_chair", "seated_table"}
 _AVOID = ("jump", "uneven", "hop", "march", "kick", "flip", "squat", "balance", "crouch", "swing legs", "lie")
-_SHARES = {"descend": 0.36, "sit": 0.12, "walk": 0.34, "stand": 0.18}
-"""Shares of windows: around a sit-down or stand-up, seated, walking, standing."""
+_SHARES = {"approach": 0.20, "descend": 0.29, "sit": 0.10, "walk": 0.27, "stand": 0.14}
+"""Shares of windows: walking up to a seat and sitting down (composed), around a captured sit-down or stand-up, seated,
+walking, standing.
+"""
+_COMPOSED = "composed"
+_TRIES, _JOINS = 60, 8  # walks tried and joins kept for each captured sit-down and its mirror image
 
 _SHARE_ALIKE = {"hdm05_cuts"}
 _ONE_RIG = {"cmu_daz", "cmu_expmap", "gazebo_actors", "snu_tiling", "snu_ys2010"}
@@ -88,15 +93,42 @@ def load_motions(folder: Path, split: str) -> list[Motion]:
     return motions
 
 
+def _approaches(motions: list[Motion]) -> list[Motion]:
+    """Composed motions that walk up to a seat (see ``compose``), from every sit-down and its mirror image."""
+    rng = np.random.default_rng(11)
+    walks = [m for m in motions if m.category in _WALK and len(m.joints) > 60 and m.valid.all()]
+    made = []
+    for m in motions:
+        if m.category not in _SIT or not m.rests or m.source in _ARMS_RAISED or not walks:
+            continue
+        entry = entrance(m.joints, m.rests[0].start)
+        if entry is None:
+            continue
+        for sit in (m.joints, mirrored(m.joints)):
+            kept = 0
+            for k in rng.permutation(len(walks))[:_TRIES]:
+                at = matches(walks[k].joints, sit[entry : entry + 1])
+                if at is None or kept == _JOINS:
+                    continue
+                whole = joined(walks[k].joints, at, sit, entry)
+                motion = motion_of(f"{walks[k].name} + {m.name}", _COMPOSED, m.subject, m.category, whole)
+                if motion.rests:
+                    made.append(motion)
+                    kept += 1
+    return made
+
+
 class _Draws:
     """Where to draw from: weights by kind of moment, clips in proportion to what they hold of it."""
 
     def __init__(self, motions: list[Motion]) -> None:
-        self.motions = motions
+        self.motions = motions = motions + _approaches(motions)
         self.focus: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         found: dict[str, list[tuple[int, int, float]]] = {kind: [] for kind in _SHARES}
         for i, m in enumerate(motions):
-            if m.category in _SIT:
+            if m.source == _COMPOSED:
+                found["approach"] += [(i, f, 1.0) for f in range(60, m.rests[0].start + 10, 5)]
+            elif m.category in _SIT:
                 if not m.rests:
                     continue
                 height = m.joints[:, 0, 2]
