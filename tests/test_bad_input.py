@@ -353,11 +353,9 @@ def _jump(shot: Shot) -> None:
 WARNINGS: dict[str, tuple[Change, str]] = {
     "no furniture": (lambda s: setattr(s.own, "furniture", None), "no furniture"),
     "a still root": (lambda s: s.own.root.animation_data_clear(), "does not move"),
-    "a tilted root": (lambda s: setattr(s.own.root, "rotation_euler", (0.5, 0, 0)), "tilts by up to 29"),
-    "a root on its side": (lambda s: setattr(s.own.root, "rotation_euler", (np.pi / 2, 0, 0)), "tilts by up to 90"),
+    "a tilted root": (lambda s: setattr(s.own.root, "rotation_euler", (np.pi / 2, 0, 0)), "tilts by up to 90"),
     "a jump of 5 m": (_jump, "jumps"),
-    "through furniture": (_crowd, "runs through furniture"),
-    "crowded furniture": (_crowd, "more than the sensor can tell"),
+    "a room full of furniture": (_crowd, "runs through furniture.*more than the sensor can tell"),
     "targets 10 m away": (_far_targets, "'hand left' is up to 10.*reached for"),
     "a single frame": (lambda s: setattr(s.scene, "frame_end", 1), "only one frame"),
     "furniture scaled to zero": (lambda s: setattr(s.chair, "scale", (0, 0, 0)), "'Chair' is scaled to zero"),
@@ -380,7 +378,7 @@ def test_warnings_are_the_same_at_both_doors(shot: Shot, capfd: pytest.CaptureFi
     capfd.readouterr()
     assert shot.bpy.ops.dafnet.generate() == {"FINISHED"}
     reported = [line.removeprefix("Warning: ") for line in capfd.readouterr().out.splitlines() if "Warning: " in line]
-    assert any(re.search(words, warning) for warning in reported), reported
+    assert re.search(words, " ".join(reported)), reported
     assert shot.scene.frame_current == 5
     values = [point.co for curve in shot.curves(shot.ann) for point in curve.keyframe_points]
     assert len(values) == (6 + 3 + 22 * 4) * shot.scene.frame_end and np.isfinite(values).all()
@@ -431,34 +429,28 @@ UNHARMED: dict[str, Change] = {
     "furniture without any solid": _nothing_solid,
     "a pose by hand": _posed_by_hand,
     "NLA strips and an action that adds": _nla_below_an_added_action,
-    "a hidden armature": lambda s: s.ann.hide_set(True),
+    "a hidden armature": lambda s: [s.ann.hide_set(True), setattr(s.shown("Ann"), "hide_viewport", True)],
     "a disabled armature": lambda s: setattr(s.ann, "hide_viewport", True),
-    "a hidden character": lambda s: setattr(s.shown("Ann"), "hide_viewport", True),
     "pose mode": lambda s: s.bpy.ops.object.mode_set(mode="POSE"),
     "a scaled, mirrored root": lambda s: setattr(s.own.root, "scale", (-3, 0.5, 2)),
     "the root as a hand that is not asked for": lambda s: setattr(s.own, "hand_left", s.own.root),
+    "centimetres": lambda s: s.ann.dimensions,
     "a target on another": lambda s: setattr(s.own.head, "parent", s.own.root),
 }
 
 
-@pytest.mark.parametrize("case", UNHARMED)
-def test_what_makes_no_difference(shot: Shot, case: str) -> None:
-    assert shot.bpy.ops.dafnet.generate() == {"FINISHED"}
-    expected = shot.heads()
-    UNHARMED[case](shot)
-    job = shot.addon("dafnet_addon.blender.job")
-    result = job.run(shot.bpy.context, job.settings_of(shot.ann, shot.scene))
-    shot.ann.hide_viewport = False
-    assert result.warnings == () and np.abs(shot.heads() - expected).max() < 1e-5
-
-
-def test_centimetres(shot: Shot, blender: ModuleType, addon, tmp_path: Path) -> None:
+def test_what_makes_no_difference(shot: Shot, blender: ModuleType, addon: Callable[[str], Any], tmp_path: Path) -> None:
+    job = addon("dafnet_addon.blender.job")
     assert blender.ops.dafnet.generate() == {"FINISHED"}
     expected = shot.heads()
-    blender.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    small = Shot(blender, addon, tmp_path, unit=0.01)
-    assert blender.ops.dafnet.generate() == {"FINISHED"}
-    assert small.ann.dimensions.z > 100.0 and np.abs(small.heads() - expected).max() < 1e-4
+    for case, change in UNHARMED.items():
+        blender.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        other = Shot(blender, addon, tmp_path, unit=0.01 if case == "centimetres" else 1.0)
+        change(other)
+        result = job.run(blender.context, job.settings_of(other.ann, other.scene))
+        other.ann.hide_viewport = False
+        assert result.warnings == (), case
+        assert np.abs(other.heads() - expected).max() < 1e-4, case
 
 
 def test_one_empty_for_root_and_hand_crouches(shot: Shot) -> None:
