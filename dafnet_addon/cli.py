@@ -281,14 +281,14 @@ def _prepare(options: argparse.Namespace) -> None:
 def _train(options: argparse.Namespace) -> None:
     _require_checkout("training")
     from .training.export import export
-    from .training.train import read_config, train, trained
+    from .training.train import account, read_config, train, trained
 
     model, config = read_config(options.config)
     with _Bar() as bar:
         train(options.dataset, options.output, model, config, bar)
     file = options.output / "dafnet.safetensors"
     flow, predictor, statistics = trained(options.output)
-    export(file, flow, predictor, statistics, {})
+    export(file, flow, predictor, statistics, account(options.output, options.dataset))
     print(json.dumps({"weights": str(file)}) if options.json else f"Written to {file}")
 
 

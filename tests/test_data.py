@@ -1,5 +1,6 @@
 """Composing training data: boxes, fitted furniture, retargeted heights, windows; and the real motion files where they are."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from dafnet_addon.core.skeleton import OFFSETS, PARENTS, REST, SEAT_TO_PELVIS, T
 from dafnet_addon.core.solids import Box, Scene
 from dafnet_addon.data import boxes as b
 from dafnet_addon.data.canonical import LEG, calibrate, canonical
+from dafnet_addon.data.compose import entrance, joined, matches
 from dafnet_addon.data.furniture import probes, resting, scattered, seat_for
 from dafnet_addon.data.mocap import Clip, read_clips
 from dafnet_addon.data.windows import at_seat_height, draw, mirrored, motion_of
@@ -166,6 +168,19 @@ def test_real_windows_are_in_the_roots_frame(real_clips):
     assert np.abs(pelvis[..., :2]).max() < 0.35 and np.abs(np.median(pelvis[..., :2])) < 0.05
 
 
+def test_a_walk_is_joined_to_a_sit_down_without_a_jump():
+    sit = _sit_down()
+    walk = np.repeat(sit[:1], 120, axis=0)
+    glide = np.clip((np.arange(120) - 20) / 60, 0, 1)[:, None, None] * np.array([0.0, 1.0, 0.0])
+    walk = (walk + glide) @ yaw_matrix(np.array(0.7)).T
+    entry = entrance(sit, 100)
+    at = matches(walk, sit[entry : entry + 1])
+    assert entry is not None and 30 < entry < 60 and at is not None and at >= 80
+    whole = joined(walk, at, sit, entry)
+    step = np.linalg.norm(np.diff(whole, axis=0), axis=-1).max()
+    assert step < 0.05 and whole[-1, 0, 2] < 0.6 and np.abs(_lengths(whole) - BONES).max() < 0.01
+
+
 def test_the_split_is_by_body():
     if not MOCAP.is_dir():
         pytest.skip(f"needs the motion capture at {MOCAP}")
@@ -175,3 +190,22 @@ def test_the_split_is_by_body():
     test = {f"{m.source}/{m.subject}" for m in load_motions(MOCAP, "test")}
     both = {body for body in train & test if body not in TRAINED_ON_PARTLY and body.split("/")[0] not in TRAINED_ON_PARTLY}
     assert not both and not any(body.startswith("hdm05") for body in train)
+
+
+def test_a_dataset_is_made_and_gone_on_with(tmp_path):
+    if not MOCAP.is_dir():
+        pytest.skip(f"needs the motion capture at {MOCAP}")
+    from dafnet_addon.data.prepare import load_pool, prepare
+
+    folder, out = tmp_path / "mocap", tmp_path / "dataset"
+    folder.mkdir()
+    (folder / "rocketbox.npz").symlink_to(MOCAP / "rocketbox.npz")
+    prepare(folder, out, windows=24)
+    pool = load_pool([out / "pool-000.npz"])
+    assert pool["poses"].shape == (24, 80, 66) and pool["occupancy"].dtype == np.uint8
+    assert {"walk", "stand"} & set(pool["kinds"]) and {"approach", "descend", "sit"} & set(pool["kinds"])
+    described = json.loads((out / "dataset.json").read_text())
+    assert described["train"] == ["rocketbox/male"] and described["held_out"] == ["rocketbox/female"]
+    stamp = (out / "pool-000.npz").stat().st_mtime_ns
+    prepare(folder, out, windows=24)
+    assert (out / "pool-000.npz").stat().st_mtime_ns == stamp, "finished shards are kept"

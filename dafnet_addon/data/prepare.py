@@ -31,6 +31,11 @@ _SHARES = {"approach": 0.20, "descend": 0.29, "sit": 0.10, "walk": 0.27, "stand"
 walking, standing.
 """
 _COMPOSED = "composed"
+_COMPOSITION = (
+    "walks joined to sit-downs; seats moved to other heights; mirrored, reversed, re-timed; arms lent to the UI-PRMD bodies; "
+    "all furniture"
+)
+"""What in the training motion nobody ever did in one piece; said on the weights' card."""
 _TRIES, _JOINS = 60, 8  # walks tried and joins kept for each captured sit-down and its mirror image
 
 _SHARE_ALIKE = {"hdm05_cuts"}
@@ -195,15 +200,17 @@ def prepare(
     out.mkdir(parents=True, exist_ok=True)
     shards = max(1, windows // _SHARD)
     train = [(out / f"pool-{i:03d}.npz", seed * 1000 + i, min(_SHARD, windows)) for i in range(shards)]
-    for split, tasks in (("test", [(out / "held.npz", 99, 600)]), ("train", train)):
+    for split, tasks in (("test", [(out / "held.npz", 99, min(600, windows))]), ("train", train)):
         with Pool(processes, _start, (folder, split)) as pool:
             for done, _ in enumerate(pool.imap_unordered(_shard, tasks)):
                 progress((done + 1) / len(tasks))
     used = {f"{m.source}/{m.subject}" for m in load_motions(folder, "train")}
     held = {f"{m.source}/{m.subject}" for m in load_motions(folder, "test")}
-    (out / "dataset.json").write_text(
-        json.dumps({"windows": shards * _SHARD, "train": sorted(used), "held_out": sorted(held), "shares": _SHARES}, indent=1)
-    )
+    described = {
+        "windows": sum(count for _, _, count in train), "train": sorted(used), "held_out": sorted(held), "shares": _SHARES,
+        "composed": _COMPOSITION,
+    }
+    (out / "dataset.json").write_text(json.dumps(described, indent=1))
 
 
 def load_pool(files: Iterator[Path] | list[Path]) -> dict[str, np.ndarray]:

@@ -26,7 +26,7 @@ from ..model.flow import TwoPartFlow
 from ..model.predictor import GMVAE, ActionPredictor, gumbel_temperature
 from .batches import Batch, Statistics, batch_of, observation_for
 
-__all__ = ["TrainingConfig", "read_config", "Run", "train", "train_part", "trained"]
+__all__ = ["TrainingConfig", "read_config", "Run", "account", "train", "train_part", "trained"]
 
 
 @dataclass(frozen=True)
@@ -241,3 +241,14 @@ def trained(folder: Path) -> tuple[TwoPartFlow, ActionPredictor, Statistics]:
     flow = runs["upper"].flow
     flow.lower = runs["lower"].flow.lower
     return flow, runs["predictor"].gmvae.predictor, runs["predictor"].statistics
+
+
+def account(folder: Path, dataset: Path) -> dict[str, str]:
+    """What a weights file says of its making, as metadata: licence, data, and training."""
+    runs = {part: Run.load(part, folder) for part in ("predictor", "upper", "lower")}
+    training = {part: {"steps": run.step, "minutes": round(run.seconds / 60, 1)} for part, run in runs.items()}
+    return {
+        "licence": "CC-BY-4.0; provenance in LICENSE-WEIGHTS.md",
+        "data": (dataset / "dataset.json").read_text(),
+        "training": json.dumps({**training, "settings": asdict(runs["upper"].config)}),
+    }
