@@ -184,8 +184,11 @@ def test_bad_controls_are_refused_in_one_sentence(weights, controls, words):
 
 
 def test_bad_temperature_and_bad_mesh_are_refused(weights):
-    with pytest.raises(InputError, match="temperature"):
-        generate(Scene(), _walk(seconds=1.0), weights, temperature=-1.0)
+    for temperature in (-1.0, 1e9, float("nan")):
+        with pytest.raises(InputError, match="temperature"):
+            generate(Scene(), _walk(seconds=1.0), weights, temperature=temperature)
+    with pytest.raises(InputError, match="millions of metres"):
+        Mesh(np.array([[0, 0, 0], [1, 0, 0], [0, 1e30, 0]]), np.array([[0, 1, 2]]), name="torn")
     with pytest.raises(InputError, match="not a number"):
         Mesh(np.full((3, 3), np.nan), np.array([[0, 1, 2]]), name="broken")
 
@@ -218,7 +221,7 @@ def test_a_tilted_root_is_flattened(weights):
 def test_a_jump_is_told(weights):
     root = _walk(seconds=2.0).root.copy()
     root[30:, 1, 3] += 5.0
-    _warned(Scene(), _changed(root=root), weights, "jumps 5.")
+    _warned(Scene(), _changed(root=root), weights, "jumps 5.0 m, 30 frames")
 
 
 def test_a_root_through_furniture_is_told(weights):

@@ -1,12 +1,15 @@
 """The sampler against the torch model it was exported from, NumPy against torch, resuming, and seeds."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from dafnet_addon.core.errors import WeightsError
 from dafnet_addon.core.progress import drained
 from dafnet_addon.core.sampler import Conditions, Sampler, model_order, smpl_order
+from dafnet_addon.core.skeleton import OFFSETS
 from dafnet_addon.core.weights import load_weights
 
 
@@ -44,7 +47,8 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     statistics = Statistics(rng.normal(size=66), rng.uniform(0.1, 0.3, 66), rng.normal(size=3) * 0.01, np.full(3, 0.02))
     flow.double(), predictor.double()
     tensors = tensors_of(flow, predictor, statistics)
-    weights = Weights(tensors, {"model": config.as_dict()}, {"format": FORMAT}, tmp_path)
+    description = {"model": config.as_dict(), "fps": 30, "offsets": OFFSETS.tolist()}
+    weights = Weights(tensors, description, {"format": FORMAT}, tmp_path)
     conditions, z = _conditions(30), rng.normal(size=(2, 66))
     made, actions = drained(Sampler(weights, dtype="float64").run(conditions, z))
 
@@ -111,3 +115,29 @@ def test_lower_noise_leaves_the_upper_body_alone_at_the_first_frame(weights):
     upper = model_order(made)[..., :42]
     assert np.abs(upper[0, 0] - upper[0, 1]).max() < 1e-5
     assert np.abs(made[0, 0] - made[0, 1]).max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"layers": 0}, "size"), ({"steps_upper": -1}, "size"), ({"width": float("inf")}, "size"), ({"code": "many"}, "size"),
+        ({"action_temperature": 0}, "temperature"), ({"action_temperature": float("nan")}, "temperature"),
+    ],
+)
+def test_a_model_that_cannot_be_is_refused(weights, changed, words):
+    odd = replace(weights, config={**weights.config, "model": {**weights.config["model"], **changed}})
+    with pytest.raises(WeightsError, match=words):
+        Sampler(odd)
+
+
+def test_another_skeleton_or_rate_is_refused(weights):
+    for changed in ({"fps": 60}, {"offsets": (OFFSETS * 1.1).tolist()}, {"model": None}):
+        with pytest.raises(WeightsError, match="cannot be used"):
+            Sampler(replace(weights, config={**weights.config, **changed}))
+
+
+@pytest.mark.parametrize("name", ["pose_std", "velocity_std", "upper.0.weight", "lower.1.log_scale"])
+def test_numbers_that_cannot_be_inverted_are_refused(weights, name):
+    spoilt = np.full_like(weights.tensors[name], 2000.0) if name.endswith("log_scale") else weights.tensors[name] * 0.0
+    with pytest.raises(WeightsError, match="cannot be used"):
+        Sampler(replace(weights, tensors={**weights.tensors, name: spoilt}))

@@ -23,7 +23,7 @@ PREROLL = 70
 
 _ORDER = UPPER + LOWER
 _EFFECTORS = {name: _ORDER.index(j) for name, j in END_EFFECTORS.items()}
-_TILT, _JUMP = np.radians(5.0), 0.35  # radians; metres in a 30-fps frame, a fast sprint's
+_TILT, _SPRINT = np.radians(5.0), 10.5  # radians; metres a second
 _REACH_FROM, _REACH = np.array([0.0, 0.0, 1.0]), 1.25  # a sphere that holds every head and wrist of the training poses
 _STILL, _CROWDED = 0.02, 0.35
 _TRUNK = (0.95, 1.15, 1.35)
@@ -74,18 +74,19 @@ def _path_of(controls: Controls, times: np.ndarray, target: np.ndarray, warnings
     raw, tilt = root_from_matrices(np.asarray(controls.root, float))
     if tilt > _TILT:
         warnings.append(f"The root tilts by up to {np.degrees(tilt):.0f}°; only its heading and position were used.")
+    moved = np.ptp(raw.position, axis=0).max() / controls.scale
+    if len(raw) == 1:
+        warnings.append("There is only one frame, so the result is a pose; widen the frame range to get motion.")
+    elif moved < _STILL and np.ptp(raw.yaw) < _STILL:
+        warnings.append("The root does not move, so the character stays where it is; animate the root to make it walk.")
+    step = np.linalg.norm(np.diff(raw.position, axis=0), axis=1) / controls.scale
+    if len(step) and step.max() > _SPRINT / controls.fps:
+        frame = int(np.argmax(step)) + 1
+        warnings.append(
+            f"The root jumps {step.max() * controls.scale:.1f} m, {frame} frames after the first; slow it down there."
+        )
     position = resample_positions(raw.position / controls.scale, times, target)
     path = RootPath(position, resample_positions(raw.yaw, times, target))
-    step = np.linalg.norm(np.diff(path.position, axis=0), axis=1)
-    if len(path) == 1:
-        warnings.append("There is only one frame, so the result is a pose; widen the frame range to get motion.")
-    elif np.ptp(path.position, axis=0).max() < _STILL and np.ptp(path.yaw) < _STILL:
-        warnings.append("The root does not move, so the character stays where it is; animate the root to make it walk.")
-    if len(step) and step.max() > _JUMP:
-        frame = int(np.argmax(step) / MODEL_FPS * controls.fps)
-        warnings.append(
-            f"The root jumps {step.max() * controls.scale:.1f} m near frame {frame} of the range; slow it down there."
-        )
     return smoothed(path)
 
 

@@ -6,7 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from .conditions import PREROLL, Shot, shot_steps
-from .errors import InputError
+from .errors import InputError, WeightsError
 from .kinematics import blend_switches, fit, forward_kinematics, global_from_local, local_from_global
 from .progress import drained, within
 from .resampling import (
@@ -27,6 +27,7 @@ from .weights import Weights
 __all__ = ["generate", "generate_steps"]
 
 _UPPER_SIZE = 42
+_HOTTEST = 10.0
 _CONDITIONED, _SAMPLED = 0.1, 0.97
 """Progress when the conditions are known and when the poses are made."""
 
@@ -39,11 +40,12 @@ def noise_of(seed: int, lower_seed: int | None, temperature: float) -> np.ndarra
 
 
 def _kept(resume: Take, frame: int, path: RootPath) -> np.ndarray:
-    """The resumed take's poses (N, 66) before a frame of the shot, in the new path's frames."""
-    count = min(covering_frames(frame, resume.fps), len(resume.poses), len(path))
+    """The resumed take's poses (PREROLL + N, 66) before a frame of the shot, in the new path's frames."""
+    count = min(covering_frames(frame, resume.fps), len(resume.path), len(path))
     old = RootPath(resume.path.position[:count], resume.path.yaw[:count])
     new = RootPath(path.position[:count], path.yaw[:count])
-    return to_root(new, to_world(old, resume.poses[:count].reshape(count, 22, 3))).reshape(count, 66)
+    shot = resume.poses[PREROLL : PREROLL + count].reshape(count, 22, 3)
+    return np.concatenate([resume.poses[:PREROLL], to_root(new, to_world(old, shot)).reshape(count, 66)])
 
 
 def _rotation(controls: Controls, name: str, target: np.ndarray) -> np.ndarray | None:
@@ -78,7 +80,7 @@ def generate_steps(
     take whose motion before ``resume_frame`` (a frame of the controls) is kept, and gone on from. ``device``: None runs on
     NumPy, else on that torch device. Raises InputError for what cannot be used, WeightsError for weights that do not fit.
     """
-    if not np.isfinite(temperature) or temperature < 0:
+    if not 0 <= temperature <= _HOTTEST:
         raise InputError(f"The temperature is {temperature}; give 0 or a small positive number such as 0.8.")
     started = perf_counter()
     yield 0.0
@@ -88,16 +90,17 @@ def generate_steps(
     z = noise_of(seed, lower_seed, temperature)
     kept = None
     if resume is not None and resume_frame > 0:
-        held = _kept(resume, resume_frame, shot.path)
-        kept = np.concatenate([np.repeat(held[:1], PREROLL, axis=0), held])[:, None]
+        kept = _kept(resume, resume_frame, shot.path)[:, None]
     made, actions = yield from within(sampler.run(shot.conditions, z, kept), _CONDITIONED, _SAMPLED)
+    if not np.isfinite(made).all():
+        raise WeightsError(f"The weights '{weights.path}' give poses that are no numbers; choose another file.")
     sampled = perf_counter()
 
-    poses, actions = made[PREROLL:, 0], actions[PREROLL:, 0]
+    poses, actions = made[:, 0], actions[PREROLL:, 0]
     switches = np.flatnonzero(shot.modes[1:] != shot.modes[:-1]) + 1
-    local, pelvis = _onto_bones(poses, shot, controls, switches)
+    local, pelvis = _onto_bones(poses[PREROLL:], shot, controls, switches)
     # From 30 frames a second to the controls' own rate, and to the character's own size.
-    source, target = frame_times(len(poses), MODEL_FPS), frame_times(len(controls), controls.fps)
+    source, target = frame_times(len(shot.path), MODEL_FPS), frame_times(len(controls), controls.fps)
     rotations = resample_rotations(local, source, target)
     pelvis = resample_positions(pelvis, source, target)
     root = resample_path(shot.path, MODEL_FPS, controls.fps, len(controls))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .errors import WeightsError
-from .skeleton import LOWER, UPPER
+from .skeleton import LOWER, OFFSETS, UPPER
 from .threads import one_thread
 from .weights import Weights
 
@@ -24,6 +24,9 @@ _UPPER_SIZE, _LOWER_SIZE = 3 * len(UPPER), 3 * len(LOWER)
 _POSE_SIZE = _UPPER_SIZE + _LOWER_SIZE
 _ORDER = np.array([3 * j + k for j in UPPER + LOWER for k in range(3)])
 _INVERSE = np.argsort(_ORDER)
+_SIZES = (
+    "actions", "history", "predictor_code", "predictor_width", "steps_upper", "steps_lower", "width", "layers", "code",
+)
 _PASSING = 10  # frames in which a resumed take's noise becomes its own
 
 
@@ -52,6 +55,27 @@ class Conditions:
 
     def __len__(self) -> int:
         return len(self.velocity)
+
+
+def _unusable(weights: Weights, what: str) -> WeightsError:
+    return WeightsError(f"The weights '{weights.path}' cannot be used: {what}; choose another file.")
+
+
+def _sizes(weights: Weights) -> dict[str, int]:
+    """The model's sizes by name, checked: positive, finite, of this skeleton and frame rate."""
+    config: dict[str, Any] = weights.config
+    model, fps, offsets = config.get("model"), config.get("fps"), config.get("offsets", [])
+    if not isinstance(model, dict) or not {"mask", "shared_encoder", *_SIZES} <= model.keys():
+        raise _unusable(weights, "they do not say how their model is built")
+    sizes = {name: model[name] for name in _SIZES}
+    if not all(isinstance(size, int) and 0 < size <= 65536 for size in sizes.values()):
+        raise _unusable(weights, "a size of their model is no number from 1 to 65536")
+    temperature = model.get("action_temperature")
+    if not isinstance(temperature, int | float) or not 1e-3 < temperature < 1e3:
+        raise _unusable(weights, "their action temperature is no positive number")
+    if fps != 30 or np.shape(offsets) != OFFSETS.shape or not np.allclose(offsets, OFFSETS):
+        raise _unusable(weights, "they were made for another skeleton or frame rate")
+    return sizes
 
 
 def _sigmoid(xp: ModuleType, x: Array) -> Array:
@@ -114,11 +138,12 @@ class Sampler:
     """The model of one weights file, ready to run on one array library.
 
     ``device`` is None for NumPy, else a torch device ('cpu', 'cuda', …). ``dtype``: 'float32' or 'float64'. Raises
-    WeightsError where the file lacks a tensor or has one of the wrong shape.
+    WeightsError where the file does not describe a model of this skeleton and frame rate, lacks a tensor or has one of the
+    wrong shape, or has a matrix that cannot be inverted.
     """
 
     def __init__(self, weights: Weights, device: str | None = None, dtype: str = "float32") -> None:
-        self.config = weights.config.get("model", {})
+        self.weights, self.config = weights, weights.config.get("model", {})
         self.device, self.dtype = device, dtype
         if device is None:
             self.xp: ModuleType = np
@@ -126,17 +151,9 @@ class Sampler:
             import torch
 
             self.xp = torch
-        try:
-            c = {name: int(self.config[name]) for name in (
-                "actions", "history", "predictor_code", "predictor_width", "steps_upper", "steps_lower", "width", "layers",
-                "code",
-            )}
-            self.mask, shared = bool(self.config["mask"]), bool(self.config["shared_encoder"])
-            self.action_temperature = float(self.config["action_temperature"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise WeightsError(
-                f"The weights '{weights.path}' do not say how their model is built ({error}); choose another file."
-            ) from error
+        c = _sizes(weights)
+        self.mask, shared = bool(self.config["mask"]), bool(self.config["shared_encoder"])
+        self.action_temperature = float(self.config["action_temperature"])
         self.actions, self.history, self.width = c["actions"], c["history"], c["width"]
 
         def array(name: str, *shape: int) -> np.ndarray:
@@ -144,6 +161,8 @@ class Sampler:
 
         self.pose_mean, self.pose_std = array("pose_mean", _POSE_SIZE), array("pose_std", _POSE_SIZE)
         self.velocity_mean, self.velocity_std = array("velocity_mean", 3), array("velocity_std", 3)
+        if min(self.pose_std.min(), self.velocity_std.min()) < 1e-6:
+            raise _unusable(weights, "its deviations are not positive")
 
         poses = self.history * _POSE_SIZE
         scene = poses + 3 * (self.history + 1)
@@ -181,8 +200,11 @@ class Sampler:
         half, width = size // 2, c["width"]
         observed = _POSE_SIZE + (22 if self.mask else 0)
         condition = self.actions + 3 + c["code"] + observed
-        bias, exponent = array(f"{name}.bias", size), np.exp(array(f"{name}.log_scale", size))
+        bias, log_scale = array(f"{name}.bias", size), array(f"{name}.log_scale", size)
         weight = array(f"{name}.weight", size, size)
+        if np.abs(log_scale).max() > 30 or np.linalg.cond(weight) > 1e8:
+            raise _unusable(self.weights, f"'{name}' cannot be inverted")
+        exponent = np.exp(log_scale)
         inverse = np.linalg.inv(weight)
         layers = []
         for i in range(c["layers"]):

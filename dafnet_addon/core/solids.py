@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Box", "Mesh", "Scene", "box_distance"]
 
+_FARTHEST = 1e9  # vertex times matrix; grids of single-precision numbers mean nothing long before
+
 
 @dataclass(frozen=True)
 class Box:
@@ -53,6 +55,8 @@ class Mesh:
             raise InputError(f"The mesh '{self.name}' has triangles that name missing vertices; clean it up and try again.")
         if not np.isfinite(self.vertices).all() or not np.isfinite(self.matrix).all():
             raise InputError(f"The mesh '{self.name}' has a coordinate that is not a number; fix its geometry or transform.")
+        if len(self.vertices) and float(np.abs(self.vertices).max()) * float(np.abs(self.matrix).max()) > _FARTHEST:
+            raise InputError(f"The mesh '{self.name}' reaches out millions of metres; fix its geometry or transform.")
 
 
 @dataclass(frozen=True)

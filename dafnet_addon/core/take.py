@@ -48,8 +48,9 @@ class Take:
     ``joints`` (T, 22, 3): world, metres, constant bone lengths. ``rotations`` (T, 22, 4): quaternions w x y z of each joint's
     frame in its parent's, the pelvis' in the world; the identity everywhere is the rest pose (a T-pose that looks along +y);
     signs are continuous in time. ``root`` (T, 4, 4): the smoothed root. ``action`` (T, 10): action probabilities.
-    ``scale``: the character's size. ``poses`` (N, 66) and ``path``: the model's own poses at 30 fps, canonical size, in the
-    frames of ``path``: what resuming needs. ``seconds``: time spent by stage. ``warnings``: sentences for the user.
+    ``scale``: the character's size. ``poses`` (70 + N, 66) and ``path`` (N): the model's own poses at 30 fps, canonical size,
+    in the frames of ``path``, after 70 of standing in its first one: what resuming needs. ``seconds``: time spent by stage.
+    ``warnings``: sentences for the user.
     """
 
     fps: float
