@@ -49,7 +49,7 @@ def test_sits_on_a_seat_and_stands_without_it(weights):
 def test_the_same_seed_is_the_same_take_and_another_is_not(weights):
     scene, controls = _seated()
     one, two, other = (generate(scene, controls, weights, seed=s, temperature=0.8) for s in (3, 3, 4))
-    assert (one.joints == two.joints).all() and np.abs(one.joints - other.joints).max() > 0.02
+    assert np.abs(one.joints - two.joints).max() < 1e-4 and np.abs(one.joints - other.joints).max() > 0.02
 
 
 def test_the_legs_vary_under_the_same_noise_of_the_trunk(weights):
