@@ -15,6 +15,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..core.errors import InputError
+from ..core.progress import drained
 from ..core.root import POSITION_SIGMA, YAW_SIGMA, root_from_joints, root_from_matrices, smoothed, to_root, to_world
 from ..core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
 from ..core.solids import Mesh, Scene
@@ -58,12 +59,7 @@ class _Piece:
 
 def read_scene(context: bpy.types.Context, settings: Settings) -> ReadScene:
     """``read_steps`` drained."""
-    steps = read_steps(context, settings)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            return done.value
+    return drained(read_steps(context, settings))
 
 
 def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[float, None, ReadScene]:
