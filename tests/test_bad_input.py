@@ -487,11 +487,12 @@ def test_whatever_becomes_a_mesh_is_read_and_moves(shot: Shot) -> None:
 
 @pytest.mark.parametrize(
     ("output", "words"),
-    [("{tmp}/file/out.blend", "file cannot be used"), ("/proc/out.blend", "Blender cannot write")],
+    [("{tmp}/file/out.blend", "file cannot be used"), ("{tmp}/folder.blend", "Blender cannot write")],
 )
 def test_an_output_that_cannot_be_written(
     shot: Shot, capfd: pytest.CaptureFixture[str], output: str, words: str,
 ) -> None:
     (shot.tmp_path / "file").write_text("in the way")
+    (shot.tmp_path / "folder.blend").mkdir()
     code, out, err = shot.command(capfd, "-o", output.format(tmp=shot.tmp_path))
     assert code == 1 and out == "" and words in err and err.startswith("dafnet: ")
