@@ -6,6 +6,7 @@ done, 1 an error said in one sentence, 2 a wrong command line, 130 stopped.
 
 import argparse
 import ctypes
+import importlib.util
 import json
 import os
 import runpy
@@ -13,19 +14,12 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .core.errors import DafnetError, InputError
-from .core.progress import drained
 from .core.take import MODES
 
-if TYPE_CHECKING:
-    import bpy
-
 __all__ = ["main", "run"]
-
-_FURTHER_TAKES = 0.8  # temperature of every take but the first, where none is asked for
-
 
 def main(argv: Sequence[str] | None = None, in_blender: bool = False) -> int:
     """Run one command and return its exit code. ``in_blender``: the file that Blender has open is the scene."""
@@ -138,11 +132,7 @@ def _demo(options: argparse.Namespace) -> None:
 
 def _bake(options: argparse.Namespace) -> None:
     _require_bpy()
-    import bpy
-
-    from .blender import job
-    from .blender.compat import assign_action
-    from .blender.properties import ensure_registered
+    from .blender.batch import bake_takes
     from .core.weights import load_weights
 
     if options.takes < 1:
@@ -150,20 +140,18 @@ def _bake(options: argparse.Namespace) -> None:
     if options.output.suffix != ".blend":
         raise InputError(f"The output '{options.output}' has to end in .blend.")
     weights = load_weights(options.weights) if options.weights else None
-    ensure_registered()
-    results = []
-    with _only_our_output():
-        if options.file is not None:
-            _open(options.file)
-        armature = _character(bpy.context.scene, options.character)
-        options.output.parent.mkdir(parents=True, exist_ok=True)
-        for index in range(options.takes):
-            settings = job.settings_of(armature, bpy.context.scene, **_overrides(options, armature, index))
-            label = f"take {index + 1} of {options.takes}" if options.takes > 1 else ""
-            with _Bar(label) as bar:
-                results.append((settings, drained(job.steps(bpy.context, settings, weights), bar)))
-        assign_action(armature, results[0][1].action)
-        _save(options.output, copy=options.in_blender)
+    changes = {
+        "root": options.root, "furniture": options.furniture, "head": options.head, "hand_left": options.hand_left,
+        "hand_right": options.hand_right, "upper_body_source": options.upper_body, "mode": options.mode,
+        "temperature": options.temperature, "seed": options.seed,
+    }
+    if options.frames:
+        changes["frame_start"], changes["frame_end"] = options.frames
+    with _only_our_output(), _Bar() as bar:
+        results = bake_takes(
+            options.file, options.output, character=options.character, takes=options.takes, weights=weights, progress=bar,
+            changes={name: value for name, value in changes.items() if value is not None},
+        )
     report: dict[str, Any] = {
         "output": str(options.output),
         "takes": [
@@ -184,64 +172,6 @@ def _bake(options: argparse.Namespace) -> None:
         spent = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in take["seconds"].items())
         print(f"{take['action']}: {take['frames']} frames; {spent}")
     print(f"Written to {options.output}")
-
-
-def _overrides(options: argparse.Namespace, armature: "bpy.types.Object", index: int) -> dict[str, Any]:
-    """Fields of ``Settings`` that the command line sets, for take number ``index``."""
-    chosen: dict[str, Any] = {
-        "root": options.root, "furniture": options.furniture, "head": options.head, "hand_left": options.hand_left,
-        "hand_right": options.hand_right, "upper_body_source": options.upper_body, "mode": options.mode,
-        "temperature": options.temperature,
-    }
-    if options.frames:
-        chosen["frame_start"], chosen["frame_end"] = options.frames
-    if index:
-        chosen["seed"] = (armature.dafnet.seed if options.seed is None else options.seed) + index
-        if options.temperature is None:
-            chosen["temperature"] = armature.dafnet.temperature or _FURTHER_TAKES
-    elif options.seed is not None:
-        chosen["seed"] = options.seed
-    return {name: value for name, value in chosen.items() if value is not None}
-
-
-def _open(file: Path) -> None:
-    import bpy
-
-    if not file.is_file():
-        raise InputError(f"There is no file '{file}'; check its path.")
-    try:
-        bpy.ops.wm.open_mainfile(filepath=str(file.resolve()))
-    except RuntimeError as error:
-        raise InputError(f"Blender cannot open '{file}'; save it again with this Blender or an older one.") from error
-
-
-def _save(file: Path, copy: bool) -> None:
-    import bpy
-
-    try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(file.resolve()), copy=copy)
-    except RuntimeError as error:
-        raise InputError(f"Blender cannot write '{file}'; choose a folder that you may write to.") from error
-
-
-def _character(scene: "bpy.types.Scene", name: str | None) -> "bpy.types.Object":
-    """The armature to bake onto: the one named, else the only one of the scene that is a DAFNet character."""
-    from .blender.armature import missing_bones
-
-    armatures = [ob for ob in scene.objects if ob.type == "ARMATURE"]
-    if name is not None:
-        named = [ob for ob in armatures if name in (ob.name, ob.name_full)]
-        if not named:
-            raise InputError(f"The scene has no armature '{name}'; give --character the name of one that it has.")
-        return named[0]
-    characters = [ob for ob in armatures if not missing_bones(ob)]
-    directed = [ob for ob in characters if ob.dafnet.root is not None] or characters
-    if not directed:
-        raise InputError("The scene has no character; add one in Blender with Add Character and save the file.")
-    if len(directed) > 1:
-        names = ", ".join(f"'{ob.name}'" for ob in directed)
-        raise InputError(f"The scene has several characters; choose one of {names} with --character.")
-    return directed[0]
 
 
 def _info(options: argparse.Namespace) -> None:
@@ -322,24 +252,22 @@ def _require_checkout(folder: str) -> None:
 
 
 def _require_bpy() -> None:
-    try:
-        import bpy  # noqa: F401
-    except ImportError as error:
-        raise InputError("This command needs Blender's Python module; install it, or run it inside Blender.") from error
+    if importlib.util.find_spec("bpy") is None:
+        raise InputError("This command needs Blender's Python module; install it, or run it inside Blender.")
 
 
 class _Bar:
     """Progress for people, on standard error: a bar on a terminal, ten dots elsewhere."""
 
-    def __init__(self, label: str = "") -> None:
-        self.label, self.dots = label, 0
+    def __init__(self) -> None:
+        self.dots = 0
 
     def __call__(self, progress: float) -> None:
         """Show the part done, in [0, 1]."""
         part = min(max(progress, 0.0), 1.0)
         if sys.stderr.isatty():
             filled = "#" * int(30 * part)
-            print(f"\r[{filled:.<30}] {100 * part:3.0f} % {self.label}", end="", file=sys.stderr, flush=True)
+            print(f"\r[{filled:.<30}] {100 * part:3.0f} %", end="", file=sys.stderr, flush=True)
         elif int(10 * part) > self.dots:
             print("." * (int(10 * part) - self.dots), end="", file=sys.stderr, flush=True)
             self.dots = int(10 * part)

@@ -148,6 +148,7 @@ def test_sizes_of_the_paper():
     assert SMALL.condition_size == 10 + 3 + SMALL.code + 66 + 22
 
 
+@torch.no_grad()
 def test_gmvae_losses_have_known_values():
     model = GMVAE(TINY)
     past, occupancy = torch.randn(4000, TINY.scene_size), torch.zeros(4000, 2640)
@@ -157,10 +158,9 @@ def test_gmvae_losses_have_known_values():
     losses = model.losses(past, past, occupancy, 1.0)
     assert abs(float(losses.category)) < 1e-9, "even probabilities have the entropy log K"
     assert losses.kl > 0 and losses.reconstruction > 0.9 * TINY.scene_size
-    with torch.no_grad():
-        for head in (model.mean, model.spread, model.prior_mean, model.prior_spread):
-            head.weight.zero_()
-            head.bias.zero_()
+    for head in (model.mean, model.spread, model.prior_mean, model.prior_spread):
+        head.weight.zero_()
+        head.bias.zero_()
     assert abs(float(model.losses(past, past, occupancy, 1.0).kl)) < 1e-9, "equal Gaussians have no divergence"
 
 
