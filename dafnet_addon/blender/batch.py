@@ -31,6 +31,8 @@ def bake_takes(
     where the scene has several. ``changes`` overrule the character's own settings (fields of ``Settings``). Each further take
     has the next seed. Raises InputError where a file cannot be opened or written, or there is nothing to bake onto.
     """
+    if output.is_dir():  # which some Blenders would move out of the way
+        raise InputError(f"'{output}' is a folder; give the output another name.")
     ensure_registered()
     if file is not None:
         _open(file)
