@@ -1,6 +1,9 @@
 """The command: what it prints and returns, and that its two doors and the operator make the same keys."""
 
 import json
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -156,3 +159,20 @@ def test_the_demo_room_has_its_seats_at_their_heights(blender: ModuleType, addon
         np.testing.assert_allclose(root.matrix_world.translation[:2], rest.stop.position, atol=1e-4)
         modes.add((rest.stop.name, room.armature.dafnet.mode))
     assert modes == {("", "FREE"), ("Chair", "FREE"), ("Whiteboard", "EE"), ("Stool", "FREE")}
+
+
+def test_the_demo_runs_in_a_process_of_its_own(tmp_path: Path) -> None:
+    bpy = pytest.importorskip("bpy")
+    if bpy.app.binary_path:
+        pytest.skip("runs the Python module in a process of its own")
+    done = subprocess.run(
+        [sys.executable, "-m", "dafnet_addon", "demo", "-o", str(tmp_path), "--no-preview", "--json"],
+        capture_output=True, text=True, cwd=Path(__file__).resolve().parents[1],
+        env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")},
+    )
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    assert (tmp_path / "demo.blend").is_file() and report == json.loads((tmp_path / "report.json").read_text())
+    heights = {seat["name"]: seat["seat_height"] for seat in report["seats"]}
+    assert len(set(heights.values())) == 2 and all(abs(seat["error"]) <= 0.08 for seat in report["seats"])
+    assert 0.88 < report["standing_pelvis_height"] < 1.0 and report["metrics"]["ground_truth"]["clips"] > 0
