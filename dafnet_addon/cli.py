@@ -42,7 +42,13 @@ def main(argv: Sequence[str] | None = None, in_blender: bool = False) -> int:
 
 def run() -> None:
     """``main`` as a console script."""
-    sys.exit(main())
+    code = main()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    if "bpy" in sys.modules:
+        # The module of Blender 4.2 crashes at exit once a property with a poll function was registered, unregistered or not.
+        os._exit(code)
+    sys.exit(code)
 
 
 def _parser(in_blender: bool) -> argparse.ArgumentParser:
