@@ -9,6 +9,7 @@ import pytest
 from dafnet_addon import Box, Controls, InputError, Mesh, Scene, Take, generate, generate_steps, load_weights
 from dafnet_addon.core.metrics import bone_length_variation, end_effector_distance
 from dafnet_addon.core.paths import Stop, route
+from dafnet_addon.core.progress import drained
 from dafnet_addon.core.root import RootPath
 from dafnet_addon.core.skeleton import END_EFFECTORS, UPPER
 
@@ -144,13 +145,8 @@ def test_resuming_keeps_what_was_and_goes_on(weights):
 
 
 def test_progress_rises_to_one(weights):
-    steps, seen = generate_steps(Scene(), _walk(seconds=1.0), weights), []
-    while True:
-        try:
-            seen.append(next(steps))
-        except StopIteration as done:
-            assert isinstance(done.value, Take)
-            break
+    seen: list[float] = []
+    assert isinstance(drained(generate_steps(Scene(), _walk(seconds=1.0), weights), seen.append), Take)
     assert seen[0] == 0.0 and seen[-1] == 1.0 and all(a <= b for a, b in pairwise(seen))
 
 

@@ -10,9 +10,10 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from dafnet_addon.core.errors import InputError  # noqa: E402
+from dafnet_addon.core.skeleton import MODEL_ORDER  # noqa: E402
 from dafnet_addon.core.weights import load_weights  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
-from dafnet_addon.training.batches import ORDER, Statistics, batch_of, observation_for, past_of  # noqa: E402
+from dafnet_addon.training.batches import Statistics, batch_of, observation_for, past_of  # noqa: E402
 from dafnet_addon.training.export import annotate, export, tensors_of  # noqa: E402
 from dafnet_addon.training.train import Run, TrainingConfig, read_config, train_part, trained  # noqa: E402
 
@@ -79,7 +80,7 @@ def test_observations_show_only_what_a_mode_gives():
     shown = mask[..., :42] == 1
     assert (observation[..., :42][shown] == upper[shown]).all()
     assert (given[..., 14:] == 0).all(), "the lower body is never given"
-    effectors = [ORDER.index(j) for j in (15, 20, 21)]
+    effectors = [MODEL_ORDER.index(j) for j in (15, 20, 21)]
     counts = {tuple(row) for row in given[:, 0].numpy().astype(int).tolist()}
     assert any(sum(row) == 0 for row in counts) and any(sum(row) in (13, 14) for row in counts)
     alone = [row for row in counts if sum(row) == 1]

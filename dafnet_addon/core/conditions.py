@@ -12,7 +12,7 @@ from .resampling import MODEL_FPS, covering_frames, frame_times, resample_neares
 from .root import RootPath, root_from_matrices, smoothed, to_root, velocities
 from .rotations import normalised
 from .sampler import Conditions
-from .skeleton import END_EFFECTORS, LOWER, UPPER
+from .skeleton import END_EFFECTORS, MODEL_ORDER, UPPER
 from .solids import Box, Mesh, Scene
 from .take import MODES, Controls
 
@@ -21,8 +21,7 @@ __all__ = ["Shot", "shot_steps", "PREROLL"]
 PREROLL = 70
 """Frames for which the root stands still before the first one, so that the model's memory has settled."""
 
-_ORDER = UPPER + LOWER
-_EFFECTORS = {name: _ORDER.index(j) for name, j in END_EFFECTORS.items()}
+_EFFECTORS = {name: MODEL_ORDER.index(j) for name, j in END_EFFECTORS.items()}
 _TILT, _SPRINT = np.radians(5.0), 10.5  # radians; metres a second
 _REACH_FROM, _REACH = np.array([0.0, 0.0, 1.0]), 1.25  # a sphere that holds every head and wrist of the training poses
 _STILL, _CROWDED = 0.02, 0.35
@@ -124,7 +123,7 @@ def _observed(
         if not np.isfinite(body[full]).all():
             raise InputError("The upper body to follow has a joint that is not a number; fix its animation.")
         observation[full, : len(UPPER)], given[full, : len(UPPER)] = body[full], 1.0
-        given[full, _ORDER.index(0)] = float(controls.pelvis_given)
+        given[full, MODEL_ORDER.index(0)] = float(controls.pelvis_given)
     return observation.reshape(frames, -1), given
 
 

@@ -1,6 +1,6 @@
 """What can go wrong, said in one sentence that tells the user what to do."""
 
-__all__ = ["DafnetError", "InputError", "WeightsError", "Cancelled"]
+__all__ = ["DafnetError", "InputError", "WeightsError"]
 
 
 class DafnetError(Exception):
@@ -13,7 +13,3 @@ class InputError(DafnetError):
 
 class WeightsError(DafnetError):
     """A weights file is missing, damaged, hostile or made for another version."""
-
-
-class Cancelled(DafnetError):
-    """The user stopped a running job."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .errors import WeightsError
-from .skeleton import LOWER, OFFSETS, UPPER
+from .skeleton import LOWER, MODEL_ORDER, OFFSETS, UPPER
 from .threads import one_thread
 from .weights import Weights
 
@@ -22,7 +22,7 @@ Array = Any  # numpy.ndarray or torch.Tensor
 
 _UPPER_SIZE, _LOWER_SIZE = 3 * len(UPPER), 3 * len(LOWER)
 _POSE_SIZE = _UPPER_SIZE + _LOWER_SIZE
-_ORDER = np.array([3 * j + k for j in UPPER + LOWER for k in range(3)])
+_ORDER = np.array([3 * j + k for j in MODEL_ORDER for k in range(3)])
 _INVERSE = np.argsort(_ORDER)
 _SIZES = (
     "actions", "history", "predictor_code", "predictor_width", "steps_upper", "steps_lower", "width", "layers", "code",

@@ -7,8 +7,8 @@ own, rounded from the medians of the training sources; other statures are made b
 import numpy as np
 
 __all__ = [
-    "JOINTS", "PARENTS", "UPPER", "LOWER", "MIRROR", "END_EFFECTORS", "OFFSETS", "REST", "STANDING_PELVIS", "TOE_HEIGHT",
-    "STATURE", "SEAT_TO_PELVIS", "joint",
+    "JOINTS", "PARENTS", "UPPER", "LOWER", "MODEL_ORDER", "MIRROR", "END_EFFECTORS", "OFFSETS", "REST", "STANDING_PELVIS",
+    "TOE_HEIGHT", "STATURE", "SEAT_TO_PELVIS", "joint",
 ]
 
 JOINTS = (
@@ -19,6 +19,8 @@ JOINTS = (
 PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19)
 UPPER = (0, 3, 6, 9, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21)
 LOWER = (1, 2, 4, 5, 7, 8, 10, 11)
+MODEL_ORDER = UPPER + LOWER
+"""Joint order of poses inside the model: upper body first."""
 END_EFFECTORS = {"head": 15, "hand_left": 20, "hand_right": 21}
 
 _INDEX = {name: i for i, name in enumerate(JOINTS)}

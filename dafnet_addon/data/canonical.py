@@ -139,8 +139,8 @@ def canonical(clip: Clip, c: Calibration) -> np.ndarray:
     out[:, 0] = middle - rotate(pelvis, _HIP_MIDDLE)
 
     # The spine's inner joints are interpolated: sources place them differently, pelvis and chest they agree on.
-    lower_spine = normalised_mean(pelvis, chest, 1 / 3)
-    upper_spine = normalised_mean(pelvis, chest, 2 / 3)
+    lower_spine = _blended(pelvis, chest, 1 / 3)
+    upper_spine = _blended(pelvis, chest, 2 / 3)
     chain = (("spine1", 0, pelvis), ("spine2", joint("spine1"), lower_spine), ("spine3", joint("spine2"), upper_spine))
     for name, parent, frame in chain:
         out[:, joint(name)] = out[:, parent] + rotate(frame, OFFSETS[joint(name)])
@@ -171,15 +171,11 @@ def canonical(clip: Clip, c: Calibration) -> np.ndarray:
         out[:, ankle] = out[:, foot] - pointing * FOOT
         # The source's knee tells the bend's direction; the offset carries it from its hip and ankle to ours.
         bend = j[:, knee] - (j[:, hip] + j[:, ankle]) / 2
-        out[:, knee] = (out[:, hip] + out[:, ankle]) / 2 + bend + _forward(pelvis) * 0.02
+        out[:, knee] = (out[:, hip] + out[:, ankle]) / 2 + bend + pelvis[..., :, 1] * 0.02
     return pose_legs(out)
 
 
-def _forward(pelvis: np.ndarray) -> np.ndarray:
-    return pelvis[..., :, 1]
-
-
-def normalised_mean(a: np.ndarray, b: np.ndarray, t: float) -> np.ndarray:
+def _blended(a: np.ndarray, b: np.ndarray, t: float) -> np.ndarray:
     """Rotation between ``a`` and ``b`` (…, 3, 3): z and x axes blended by ``t`` and made orthogonal."""
     m = (1 - t) * a + t * b
     return frame_from(m[..., :, 2], m[..., :, 0], "zx")

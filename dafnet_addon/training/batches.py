@@ -6,16 +6,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..core.skeleton import END_EFFECTORS, LOWER, UPPER
+from ..core.sampler import model_order
+from ..core.skeleton import END_EFFECTORS, MODEL_ORDER, UPPER
 from ..model.config import UPPER_SIZE
 
-__all__ = ["ORDER", "Statistics", "Batch", "batch_of", "past_of", "observation_for"]
+__all__ = ["Statistics", "Batch", "batch_of", "past_of", "observation_for"]
 
-ORDER = UPPER + LOWER
-"""Joint order of poses inside the model: upper body first."""
-_COORDINATES = np.array([3 * j + k for j in ORDER for k in range(3)])
-_EFFECTORS = [ORDER.index(j) for j in END_EFFECTORS.values()]
-_PELVIS = ORDER.index(0)
+_EFFECTORS = [MODEL_ORDER.index(j) for j in END_EFFECTORS.values()]
+_PELVIS = MODEL_ORDER.index(0)
 NOISE = 0.003
 """Dequantisation (metres): constant bone lengths would else make the likelihood unbounded."""
 _SEGMENTS = 4
@@ -32,14 +30,14 @@ class Statistics:
 
     @staticmethod
     def of(poses: np.ndarray, velocity: np.ndarray) -> "Statistics":
-        flat, speed = poses.reshape(-1, 66)[:, _COORDINATES].astype(float), velocity.reshape(-1, 3).astype(float)
+        flat, speed = model_order(poses.reshape(-1, 66)).astype(float), velocity.reshape(-1, 3).astype(float)
         return Statistics(
             flat.mean(0), np.maximum(flat.std(0), 0.01), speed.mean(0), np.maximum(speed.std(0), 1e-3)
         )
 
     def poses(self, poses: np.ndarray) -> np.ndarray:
         """Standardised poses, upper first, of poses (…, 66) in SMPL order."""
-        return (poses[..., _COORDINATES] - self.pose_mean) / self.pose_std
+        return (model_order(poses) - self.pose_mean) / self.pose_std
 
     def velocities(self, velocity: np.ndarray) -> np.ndarray:
         return (velocity - self.velocity_mean) / self.velocity_std
