@@ -12,7 +12,7 @@ from ..core.root import RootPath
 from ..core.skeleton import SEAT_TO_PELVIS, joint
 from .boxes import NO_BOXES, box, distances, placed
 
-__all__ = ["Rest", "resting", "probes", "seat_for", "scattered"]
+__all__ = ["Rest", "resting", "probes", "seat_for", "seats_for", "scattered", "furnished"]
 
 _PROBES = [  # bone from, bone to, share of the way, radius of the flesh there
     ("pelvis", "pelvis", 0.0, 0.09), ("left_hip", "left_knee", 0.5, 0.06), ("right_hip", "right_knee", 0.5, 0.06),
@@ -170,3 +170,27 @@ def scattered(rng: np.random.Generator, points: np.ndarray, path: RootPath, coun
                 kept.append(candidate)
                 break
     return np.concatenate(kept)
+
+
+def seats_for(rng: np.random.Generator, rests: list[Rest], points: np.ndarray) -> list[np.ndarray]:
+    """A seat for every place of rest (places within 0.25 m share one); empty where one cannot be had."""
+    places: list[Rest] = []
+    for rest in rests:
+        if all(np.linalg.norm(rest.position - other.position) > 0.25 for other in places):
+            places.append(rest)
+    seats = [seat_for(rng, place, points) for place in places]
+    return [] if any(seat is None for seat in seats) else [seat for seat in seats if seat is not None]
+
+
+def furnished(rng: np.random.Generator, joints: np.ndarray, path: RootPath) -> tuple[np.ndarray | None, str]:
+    """All boxes (B, 7) of a room for one motion (T, 22, 3) with its root path, what the body uses and random pieces, and "".
+
+    Or None and one word for what could not be had: "seat".
+    """
+    points = probes(joints)
+    rests = resting(joints, path)
+    seats = seats_for(rng, rests, points)
+    if rests and not seats:
+        return None, "seat"
+    count = int(rng.integers(1, 5)) if rng.random() < 0.8 else 0
+    return np.concatenate([NO_BOXES, *seats, scattered(rng, points, path, count)]), ""
