@@ -20,7 +20,7 @@ def _conditions(frames: int, seed: int = 0) -> Conditions:
     given = np.zeros((frames, 22))
     given[frames // 3 : frames // 2, 12:14] = 1.0
     observation = np.tile(rng.normal(size=66) * 0.1 + np.tile([0.0, 0.2, 1.0], 22), (frames, 1))
-    return Conditions(smooth, occupancy, observation, given)
+    return Conditions(smooth, np.repeat(smooth, 6, axis=1), occupancy, observation, given)
 
 
 def test_orders_are_inverse():

@@ -9,7 +9,7 @@ from .distance import prepared, rigid_split, scaled
 from .errors import InputError
 from .occupancy import distance, occupancy
 from .resampling import MODEL_FPS, covering_frames, frame_times, resample_nearest, resample_positions, resample_rigid
-from .root import RootPath, root_from_matrices, smoothed, to_root, velocities
+from .root import RootPath, ahead, root_from_matrices, smoothed, to_root, velocities
 from .rotations import normalised
 from .sampler import Conditions
 from .skeleton import END_EFFECTORS, MODEL_ORDER, UPPER
@@ -189,9 +189,9 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     def rolled(values: np.ndarray, before: np.ndarray) -> np.ndarray:
         return np.concatenate([np.repeat(before, PREROLL, axis=0), values])
 
-    velocity = velocities(path)
+    whole = RootPath(rolled(path.position, path.position[:1]), rolled(path.yaw, path.yaw[:1]))
     conditions = Conditions(
-        rolled(velocity, np.zeros((1, 3))), rolled(occupied, occupied[:1]),
+        velocities(whole), ahead(whole), rolled(occupied, occupied[:1]),
         rolled(observation, observation[:1]), rolled(given, given[:1]),
     )
     return Shot(conditions, path, modes, tuple(warnings))

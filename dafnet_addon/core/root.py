@@ -13,11 +13,13 @@ from .skeleton import joint
 
 __all__ = [
     "RootPath", "raw_root_from_joints", "root_from_joints", "root_from_matrices", "smoothed", "velocities", "integrate",
-    "to_root", "to_world",
+    "to_root", "to_world", "AHEAD", "ahead",
 ]
 
 POSITION_SIGMA, YAW_SIGMA = 3.0, 6.0
 _MAX_TURN = np.radians(15.0)
+AHEAD = (5, 10, 15, 20, 25, 30)
+"""How far ahead the model is told of the root, in 30-fps frames."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,25 @@ def velocities(path: RootPath) -> np.ndarray:
     out[1:, :2] = rotate(transpose(path.rotation[:-1]), step)[:, :2]
     out[1:, 2] = np.diff(path.yaw)
     return out
+
+
+def ahead(path: RootPath) -> np.ndarray:
+    """Where the root will be (T, 18): right, forward (metres) and turn (radians) from R^τ to each of ``AHEAD`` frames later.
+
+    Beyond its end the path goes on as it last moved. Not in the paper; in Blender the whole path is known.
+    """
+    last, rest = len(path) - 1, max(AHEAD)
+    step = path.position[-1:] - path.position[max(last - 1, 0)]
+    turn = path.yaw[-1] - path.yaw[max(last - 1, 0)]
+    beyond = np.arange(1, rest + 1)
+    position = np.concatenate([path.position, path.position[-1:] + step * beyond[:, None]])
+    yaw = np.concatenate([path.yaw, path.yaw[-1] + turn * beyond])
+    out = np.empty((len(path), len(AHEAD), 3))
+    for k, frames in enumerate(AHEAD):
+        later = slice(frames, frames + len(path))
+        out[:, k, :2] = rotate(transpose(path.rotation), position[later] - path.position)[:, :2]
+        out[:, k, 2] = yaw[later] - path.yaw
+    return out.reshape(len(path), -1)
 
 
 def integrate(velocity: np.ndarray, position: np.ndarray, yaw: float) -> RootPath:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from .errors import WeightsError
+from .root import AHEAD
 from .skeleton import LOWER, MODEL_ORDER, OFFSETS, UPPER
 from .threads import one_thread
 from .weights import Weights
@@ -44,11 +45,13 @@ def smpl_order(poses: np.ndarray) -> np.ndarray:
 class Conditions:
     """What the model is told at each of T frames, 30 a second, in the target root's frame R^τ (paper, section 4.1).
 
-    ``velocity`` (T, 3): c_vel, metres and radians per frame. ``occupancy`` (T, 2640): c_env. ``observation`` (T, 66): c_ob,
-    positions in metres in the model's order; what is not ``given`` (T, 22) is ignored.
+    ``velocity`` (T, 3): c_vel, metres and radians per frame. ``ahead`` (T, 18): where the root will be (``root.ahead``), for
+    models that are told. ``occupancy`` (T, 2640): c_env. ``observation`` (T, 66): c_ob, positions in metres in the model's
+    order; what is not ``given`` (T, 22) is ignored.
     """
 
     velocity: np.ndarray
+    ahead: np.ndarray
     occupancy: np.ndarray
     observation: np.ndarray
     given: np.ndarray
@@ -73,6 +76,10 @@ def _sizes(weights: Weights) -> dict[str, int]:
     temperature = model.get("action_temperature")
     if not isinstance(temperature, int | float) or not 1e-3 < temperature < 1e3:
         raise _unusable(weights, "their action temperature is no positive number")
+    foresight = model.get("ahead", 0)
+    if foresight not in (0, 3 * len(AHEAD)):
+        raise _unusable(weights, "they are told of the root's way in another manner")
+    sizes["ahead"] = foresight
     if fps != 30 or np.shape(offsets) != OFFSETS.shape or not np.allclose(offsets, OFFSETS):
         raise _unusable(weights, "they were made for another skeleton or frame rate")
     return sizes
@@ -161,7 +168,9 @@ class Sampler:
 
         self.pose_mean, self.pose_std = array("pose_mean", _POSE_SIZE), array("pose_std", _POSE_SIZE)
         self.velocity_mean, self.velocity_std = array("velocity_mean", 3), array("velocity_std", 3)
-        if min(self.pose_std.min(), self.velocity_std.min()) < 1e-6:
+        self.ahead = c["ahead"]
+        self.ahead_mean, self.ahead_std = (array(n, self.ahead) if self.ahead else np.zeros(0) for n in ("ahead_mean", "ahead_std"))
+        if min(self.pose_std.min(), self.velocity_std.min(), self.ahead_std.min(initial=1.0)) < 1e-6:
             raise _unusable(weights, "its deviations are not positive")
 
         poses = self.history * _POSE_SIZE
@@ -199,7 +208,8 @@ class Sampler:
     def _step(self, array: Any, name: str, size: int, c: dict[str, int]) -> _Step:
         half, width = size // 2, c["width"]
         observed = _POSE_SIZE + (22 if self.mask else 0)
-        condition = self.actions + 3 + c["code"] + observed
+        moving = 3 + c["ahead"]
+        condition = self.actions + moving + c["code"] + observed
         bias, log_scale = array(f"{name}.bias", size), array(f"{name}.log_scale", size)
         weight = array(f"{name}.weight", size, size)
         if np.abs(log_scale).max() > 30 or np.linalg.cond(weight) > 1e8:
@@ -213,9 +223,9 @@ class Sampler:
             back = array(f"{name}.lstm.weight_hh_l{i}", 4 * width, width).T
             total = array(f"{name}.lstm.bias_ih_l{i}", 4 * width) + array(f"{name}.lstm.bias_hh_l{i}", 4 * width)
             if i == 0:
-                # Rows of the input: half a pose, actions, velocity, observation (upper part first), mask, code.
+                # Rows of the input: half a pose, actions, velocity and way ahead, observation (upper part first), mask, code.
                 fresh = [np.arange(half + self.actions)]
-                start = half + self.actions + 3
+                start = half + self.actions + moving
                 if size == _LOWER_SIZE:
                     # The upper slots of the observation are the upper body just made: known only now.
                     fresh.append(np.arange(start, start + _UPPER_SIZE))
@@ -255,7 +265,8 @@ class Sampler:
         lower_mask = [np.concatenate([np.ones((frames, joints)), m[:, joints:]], axis=1) for m in mask]
         seen_upper = self._to(np.concatenate([observation, *mask], axis=1))
         seen_lower = self._to(np.concatenate([observation[:, _UPPER_SIZE:], *lower_mask], axis=1))
-        moving, one = self._to(velocity), self._to(np.ones((frames, 1)))
+        way = (conditions.ahead[:, : self.ahead] - self.ahead_mean) / self.ahead_std
+        moving, one = self._to(np.concatenate([velocity, way], axis=1)), self._to(np.ones((frames, 1)))
         empty = self._to(np.zeros((takes, self.width)))
         for part, seen in ((self._upper, seen_upper), (self._lower, seen_lower)):
             codes = []

@@ -16,6 +16,7 @@ class ModelConfig:
     LSTM. ``code``: the flow's environment code. ``shared_encoder``: one environment encoder for all couplings of a part
     (else one each). ``mask``: 22 values beside the observation say which joints are given. ``action_temperature``: softmax
     temperature after training (paper, section 4.2). ``history``: past frames that the predictor sees.
+    ``ahead``: numbers that tell the flow where the root will be (``core.root.ahead``), or 0 as in the paper.
     """
 
     actions: int = 10
@@ -31,11 +32,12 @@ class ModelConfig:
     mask: bool = False
     action_temperature: float = 0.7
     history: int = 10
+    ahead: int = 0
 
     @property
     def condition_size(self) -> int:
-        """Action probabilities, root velocity, environment code, observation (and its mask)."""
-        return self.actions + VELOCITY_SIZE + self.code + POSE_SIZE + (22 if self.mask else 0)
+        """Action probabilities, root velocity (and way ahead), environment code, observation (and its mask)."""
+        return self.actions + VELOCITY_SIZE + self.ahead + self.code + POSE_SIZE + (22 if self.mask else 0)
 
     @property
     def scene_size(self) -> int:
