@@ -1,0 +1,158 @@
+"""Contact sheets: motions as rows of stick figures over time, each row ending in its plan seen from above.
+
+Axes are equal and in metres. The body's left is blue, its right orange; an arrow on the floor shows where it faces; furniture
+is drawn as wireframes, contacts as green dots. Needs matplotlib, which is imported when a sheet is drawn.
+"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..core.root import root_from_joints
+from ..core.rotations import normalised, rotate, yaw_matrix
+from ..core.skeleton import PARENTS, joint
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["sheet"]
+
+Row = tuple[str, np.ndarray, np.ndarray | None]
+Cell = tuple[float, float, float, float]  # left, bottom, width, height
+
+_LEFT, _RIGHT, _TRUNK = "#1f6fb4", "#e0701a", "#3a3a3a"
+_FURNITURE, _CONTACT, _FACING, _FAINT = "#8a7a66", "#1e9e3e", "#a01860", "#d4d4d4"
+_WIDTH, _HEIGHT, _BELOW = 1.8, 2.35, 0.32  # a cell, and how much of it lies under the floor line; metres
+_INCHES = 0.68  # a metre on paper
+_TURN, _TILT = np.radians(60), np.radians(12)  # the camera: from straight ahead towards the body's right side, and up
+_CONTACT_JOINTS = (joint("left_foot"), joint("right_foot"), joint("left_wrist"), joint("right_wrist"), 0)
+_LEFT_BONES = {joint("left_" + n) for n in ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")}
+_RIGHT_BONES = {joint("right_" + n) for n in ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")}
+_COLOURS = [_LEFT if j in _LEFT_BONES else _RIGHT if j in _RIGHT_BONES else _TRUNK for j in range(22)]
+_CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+_EDGES = np.array([(a, b) for a in range(8) for b in range(a) if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 2])
+
+
+def _camera(yaw: float) -> np.ndarray:
+    """(3, 3) rows right, up and towards the viewer, of a camera that sees a body that faces ``yaw`` from its right front."""
+    toward = np.array([np.sin(_TURN) * np.cos(_TILT), np.cos(_TURN) * np.cos(_TILT), np.sin(_TILT)])
+    right = normalised(np.cross([0.0, 0.0, 1.0], toward))
+    return np.stack([right, np.cross(toward, right), toward]) @ yaw_matrix(np.array(-yaw))
+
+
+def _wireframe(boxes: np.ndarray) -> np.ndarray:
+    """(12 B, 2, 3) edges of the boxes (B, 7)."""
+    corners = rotate(yaw_matrix(boxes[:, None, 6]), _CORNERS * boxes[:, None, 3:6]) + boxes[:, None, :3]
+    return corners[:, _EDGES].reshape(-1, 2, 3)
+
+
+def _lines(ax: "Axes", segments: np.ndarray, colours: str | list[str], width: float, cell: Cell) -> None:
+    """Draw segments (N, 2, 2), clipped to a cell."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import Rectangle
+
+    drawn = ax.add_collection(LineCollection(list(segments), colors=colours, linewidths=width, capstyle="round"))
+    drawn.set_clip_path(Rectangle(cell[:2], *cell[2:], transform=ax.transData))
+
+
+def _figure(
+    ax: "Axes", pose: np.ndarray, yaw: float, boxes: np.ndarray | None, contacts: np.ndarray | None, camera: np.ndarray,
+    cell: Cell,
+) -> None:
+    """One pose (22, 3) in its cell, the camera following the pelvis along the floor."""
+    ground = pose[0] * (1, 1, 0)
+    corner = np.array([cell[0] + cell[2] / 2, cell[1] + _BELOW])
+
+    def seen(points: np.ndarray) -> np.ndarray:
+        return (points - ground) @ camera[:2].T + corner
+
+    # Floor lines every metre of the world, so that travel shows although the camera follows.
+    low, high = np.floor(ground[:2]) - 1, np.ceil(ground[:2]) + 1
+    grid = [((x, low[1], 0), (x, high[1], 0)) for x in np.arange(low[0], high[0] + 1)]
+    grid += [((low[0], y, 0), (high[0], y, 0)) for y in np.arange(low[1], high[1] + 1)]
+    _lines(ax, seen(np.array(grid, dtype=float)), _FAINT, 0.5, cell)
+    if boxes is not None and len(boxes):
+        _lines(ax, seen(_wireframe(boxes)), _FURNITURE, 0.8, cell)
+
+    forward = rotate(yaw_matrix(np.array(yaw)), np.array([0.0, 1.0, 0.0]))
+    start, end = seen(np.stack([ground, ground + 0.38 * forward]))
+    ax.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": _FACING, "lw": 1.0, "shrinkA": 0, "shrinkB": 0})
+
+    bones = np.stack([pose[list(PARENTS[1:])], pose[1:]], axis=1)
+    order = np.argsort((bones.mean(1) - ground) @ camera[2])
+    _lines(ax, seen(bones)[order], [_COLOURS[j + 1] for j in order], 2.2, cell)
+    top, neck = pose[joint("head")], pose[joint("neck")]
+    skull = top + normalised(top - neck) * 0.08
+    angle = np.linspace(0, 2 * np.pi, 17)
+    ring = seen(skull) + 0.10 * np.stack([np.cos(angle), np.sin(angle)], -1)
+    nose = seen(np.stack([skull + 0.09 * forward, skull + 0.16 * forward]))
+    _lines(ax, np.concatenate([np.stack([ring[:-1], ring[1:]], 1), nose[None]]), _TRUNK, 1.4, cell)
+    if contacts is not None:
+        touching = [j for j, on in zip(_CONTACT_JOINTS, contacts, strict=True) if on]
+        ax.plot(*seen(pose[touching]).T, "o", color=_CONTACT, markersize=4.5, markeredgecolor="white", zorder=4)
+
+
+def _plan(
+    ax: "Axes", joints: np.ndarray, yaw: np.ndarray, boxes: np.ndarray | None, frames: np.ndarray, cell: Cell,
+) -> None:
+    """The pelvis' path from above, with hips, shoulders and facing at the frames shown, and a bar of one metre."""
+    path = joints[:, 0, :2]
+    middle = (path.min(0) + path.max(0)) / 2
+    reach = max(float(np.ptp(path, axis=0).max()) / 2 + 0.55, 0.8)
+    scale = min(cell[2], cell[3] - _BELOW) / (2 * reach)
+    corner = np.array([cell[0] + cell[2] / 2, cell[1] + _BELOW + (cell[3] - _BELOW) / 2])
+
+    def seen(points: np.ndarray) -> np.ndarray:
+        return (points[..., :2] - middle) * scale + corner
+
+    if boxes is not None and len(boxes):
+        _lines(ax, seen(_wireframe(boxes)), _FURNITURE, 0.8, cell)
+    _lines(ax, seen(np.stack([path[:-1], path[1:]], 1)), _TRUNK, 0.8, cell)
+    for frame in frames:
+        pose = joints[frame]
+        pairs = [(joint("left_" + n), joint("right_" + n)) for n in ("hip", "shoulder")]
+        spans = np.array([(pose[a], (pose[a] + pose[b]) / 2, pose[b]) for a, b in pairs])
+        feet = pose[[[joint(s + "ankle"), joint(s + "foot")] for s in ("left_", "right_")]]
+        _lines(ax, seen(np.concatenate([spans[:, :2], feet[:1]])), _LEFT, 1.2, cell)
+        _lines(ax, seen(np.concatenate([spans[:, 1:], feet[1:]])), _RIGHT, 1.2, cell)
+        forward = rotate(yaw_matrix(yaw[frame]), np.array([0.0, 1.0, 0.0]))
+        start, end = seen(np.stack([pose[0], pose[0] + 0.4 * forward]))
+        ax.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": _FACING, "lw": 0.7, "shrinkA": 0, "shrinkB": 0})
+    ax.plot(*seen(path[0]), "o", color=_TRUNK, markersize=3)
+    bar = np.array([corner[0] - scale / 2, cell[1] + 0.2])
+    ax.plot([bar[0], bar[0] + scale], [bar[1], bar[1]], color="black", lw=1.2)
+    ax.text(corner[0], cell[1] + 0.04, "1 m, from above", ha="center", va="bottom", fontsize=6)
+
+
+def sheet(file: Path, rows: list[Row], columns: int = 8, contacts: list[np.ndarray | None] | None = None) -> None:
+    """Draw a contact sheet into ``file`` (.png or .svg).
+
+    A row is a title, joints (T, 22, 3) at 30 fps in world metres, and boxes (B, 7) or None; it is shown at ``columns`` times
+    spread over its length. ``contacts`` holds (T, 5) booleans for each row (left foot, right foot, left hand, right hand,
+    pelvis), or None.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    across, down = columns * _WIDTH + _HEIGHT, len(rows) * _HEIGHT
+    figure = Figure(figsize=(across * _INCHES, down * _INCHES), dpi=120)
+    FigureCanvasAgg(figure)
+    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    ax.set(xlim=(0, across), ylim=(-down, 0), aspect="equal")
+    ax.axis("off")
+    for r, (title, joints, boxes) in enumerate(rows):
+        yaw = root_from_joints(joints).yaw
+        frames = np.linspace(0, len(joints) - 1, columns).round().astype(int)
+        # One camera a row, set by where the body mostly faces.
+        camera = _camera(float(np.angle(np.exp(1j * yaw[frames]).sum())))
+        bottom = -(r + 1) * _HEIGHT
+        for c, frame in enumerate(frames):
+            touching = None if contacts is None or contacts[r] is None else contacts[r][frame]
+            cell = (c * _WIDTH, bottom, _WIDTH, _HEIGHT)
+            _figure(ax, joints[frame], float(yaw[frame]), boxes, touching, camera, cell)
+            ax.text((c + 0.5) * _WIDTH, bottom + 0.04, f"{frame / 30:.1f} s", ha="center", va="bottom", fontsize=6)
+        _plan(ax, joints, yaw, boxes, frames, (columns * _WIDTH, bottom, _HEIGHT, _HEIGHT - 0.15))
+        ax.text(0.05, bottom + _HEIGHT - 0.03, title, ha="left", va="top", fontsize=8, weight="bold")
+        ax.plot([0, across], [bottom, bottom], color=_FAINT, lw=0.8)
+    figure.savefig(file)
