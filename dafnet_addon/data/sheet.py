@@ -147,10 +147,10 @@ def sheet(file: Path, rows: list[Row], columns: int = 8, contacts: list[np.ndarr
         # One camera a row, set by where the body mostly faces.
         camera = _camera(float(np.angle(np.exp(1j * yaw[frames]).sum())))
         bottom = -(r + 1) * _HEIGHT
+        touching = None if contacts is None else contacts[r]
         for c, frame in enumerate(frames):
-            touching = None if contacts is None or contacts[r] is None else contacts[r][frame]
             cell = (c * _WIDTH, bottom, _WIDTH, _HEIGHT)
-            _figure(ax, joints[frame], float(yaw[frame]), boxes, touching, camera, cell)
+            _figure(ax, joints[frame], float(yaw[frame]), boxes, None if touching is None else touching[frame], camera, cell)
             ax.text((c + 0.5) * _WIDTH, bottom + 0.04, f"{frame / 30:.1f} s", ha="center", va="bottom", fontsize=6)
         _plan(ax, joints, yaw, boxes, frames, (columns * _WIDTH, bottom, _HEIGHT, _HEIGHT - 0.15))
         ax.text(0.05, bottom + _HEIGHT - 0.03, title, ha="left", va="top", fontsize=8, weight="bold")
