@@ -87,6 +87,6 @@ def held_out(folder: Path) -> list[HeldClip]:
     clips = []
     for frozen in json.loads(FROZEN.read_text())["clips"]:
         if frozen["name"] not in motions:
-            raise InputError(f"The held-out clip '{frozen['name']}' is not in '{folder}'; give the folder with all motion files.")
+            raise InputError(f"The held-out clip '{frozen['name']}' is not in '{folder}'; give the folder with all files.")
         clips.append(_clip(frozen, motions[frozen["name"]]))
     return clips
