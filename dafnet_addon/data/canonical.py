@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.errors import InputError
 from ..core.kinematics import two_bone
 from ..core.root import root_from_joints
 from ..core.rotations import frame_from, normalised, rotate, rotation_between, transpose
@@ -54,14 +55,10 @@ def _mean_rotation(m: np.ndarray) -> np.ndarray:
     return u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
 
 
-def leg_length(clip: Clip) -> float:
-    """Thigh plus shin of a clip's body, in its own metres."""
-    j = clip.joints
-    bones = [
-        np.linalg.norm(j[:, joint(s + a)] - j[:, joint(s + b)], axis=-1)
-        for s, _ in _SIDES for a, b in (("hip", "knee"), ("knee", "ankle"))
-    ]
-    return float(np.median(bones[0] + bones[1]) + np.median(bones[2] + bones[3])) / 2
+def _leg_lengths(j: np.ndarray) -> np.ndarray:
+    """(T, 2) thigh plus shin of both legs, in the clip's own metres."""
+    hip, knee, ankle = (j[:, [joint(s + n) for s, _ in _SIDES]] for n in ("hip", "knee", "ankle"))
+    return np.linalg.norm(hip - knee, axis=-1) + np.linalg.norm(knee - ankle, axis=-1)
 
 
 def _toe_floor(j: np.ndarray) -> float:
@@ -69,9 +66,12 @@ def _toe_floor(j: np.ndarray) -> float:
 
 
 def calibrate(clips: list[Clip]) -> Calibration:
-    """Constants of one body from its clips, read off the frames in which it stands upright on both feet or walks."""
-    scale = LEG / float(np.median([leg_length(c) for c in clips]))
-    pelvis, chest, head, pitch, ankles = [], [], [], [], []
+    """Constants of one body from its clips, read off the frames in which it stands upright on both feet or walks.
+
+    Legs are measured there too: where joints come from markers, a bent leg measures up to 15 % shorter than a straight one.
+    Raises InputError where the body never stands upright.
+    """
+    pelvis, chest, head, pitch, ankles, legs = [], [], [], [], [], []
     collars: dict[str, list[np.ndarray]] = {"left_": [], "right_": []}
     tallest = max(float(np.percentile(c.joints[:, 0, 2], 98)) for c in clips)
     for clip in clips:
@@ -85,6 +85,7 @@ def calibrate(clips: list[Clip]) -> Calibration:
         step = max(1, int(upright.sum()) // 400)
         pick = np.flatnonzero(upright)[::step]
         to_root = transpose(yaw[pick])
+        legs.append(_leg_lengths(j[pick]))
         pelvis.append(to_root @ raw_pelvis[pick])
         chest.append(to_root @ raw_chest[pick])
         head.append(rotate(to_root, normalised(j[:, joint("head")] - j[:, joint("neck")])[pick]))
@@ -98,10 +99,16 @@ def calibrate(clips: list[Clip]) -> Calibration:
             planted = low & still & upright
             d = (toe - ankle)[planted]
             pitch.append(np.arctan2(d[:, 2], np.linalg.norm(d[:, :2], axis=-1)))
-            ankles.append((ankle[:, 2] - _toe_floor(j))[planted] * scale)
+            ankles.append((ankle[:, 2] - _toe_floor(j))[planted])
+    if not legs:
+        raise InputError(
+            f"The body '{clips[0].source}/{clips[0].subject}' never stands upright in its motion files; "
+            "add a clip in which it stands or walks, so that its skeleton can be fitted."
+        )
+    scale = LEG / float(np.median(np.concatenate(legs)))
     chest_mean = _mean_rotation(np.concatenate(chest))
     pitches = np.concatenate(pitch)
-    heights = np.concatenate(ankles)
+    heights = np.concatenate(ankles) * scale
     return Calibration(
         scale=scale,
         pelvis=_mean_rotation(np.concatenate(pelvis)).T,
