@@ -11,8 +11,9 @@ import numpy as np
 from ..core.root import RootPath
 from ..core.skeleton import SEAT_TO_PELVIS, joint
 from .boxes import NO_BOXES, box, distances, placed
+from .uses import Use, lying, reaching, stroking, working
 
-__all__ = ["Rest", "resting", "probes", "seat_for", "seats_for", "scattered", "furnished"]
+__all__ = ["Rest", "resting", "probes", "seat_for", "scattered", "furnished"]
 
 _PROBES = [  # bone from, bone to, share of the way, radius of the flesh there
     ("pelvis", "pelvis", 0.0, 0.09), ("left_hip", "left_knee", 0.5, 0.06), ("right_hip", "right_knee", 0.5, 0.06),
@@ -32,8 +33,65 @@ _FROM = np.array([joint(p[0]) for p in _PROBES])
 _TO = np.array([joint(p[1]) for p in _PROBES])
 _SHARE = np.array([p[2] for p in _PROBES])[:, None]
 _RADIUS = np.array([p[3] for p in _PROBES])
-_SITS = np.array([p[0] in ("pelvis", "left_hip", "right_hip") for p in _PROBES])
 _MIN_REST = 8
+_FAR = 0.3
+_TRIES = 16
+_ONE_SEAT = 0.25
+_ON_THE_FLOOR = 0.22  # a pelvis that rests lower than this sits on the floor
+_NEEDED = ("seat", "bed")
+_LIKELY = {"desk": 0.85, "board": 0.8, "shelf": 0.6}
+_SOFT = 0.3
+
+
+def _pressed(rest: float, **parts: float) -> np.ndarray:
+    """Metres by which each probe's flesh may give: ``rest``, or what is said of a part of the body."""
+    out = np.full(len(_PROBES), rest)
+    for i, (start, end, share, _) in enumerate(_PROBES):
+        if "wrist" in end:
+            name = "hand" if share > 1 else "wrist" if share == 1 else "elbow"
+        elif start.endswith("hip"):
+            name = "thigh" if share else "hip"
+        else:
+            name = {"pelvis": "hip", "spine1": "trunk", "spine3": "trunk", "neck": "head"}.get(start, "")
+        out[i] = parts.get(name, rest)
+    return out
+
+
+# The hand's probe lies where a stretched wrist would carry it; on a top or a board the wrist bends.
+_ON_SEAT = _pressed(0.025, hip=0.07, thigh=0.07)
+_SINKS = _pressed(0.0, hip=1.0, thigh=1.0)
+_ON_BED = _pressed(0.06, hip=0.08, thigh=0.08, trunk=0.08, head=0.08, wrist=0.09, hand=0.10)
+_ON_DESK = _pressed(0.0, wrist=0.035, hand=0.09, elbow=0.03)
+_ON_BOARD = _pressed(0.0, wrist=0.01, hand=0.12)
+_STYLES = ("block", "legs", "legs", "column", "panels")
+
+
+@dataclass(frozen=True)
+class _Seat:
+    """Ranges of a kind of seat in metres: half its width, what lies behind and before the pelvis, thickness; how often it has a
+    back and arms; what may carry it; whether it is ever soft.
+    """
+
+    half_width: tuple[float, float]
+    behind: tuple[float, float]
+    before: tuple[float, float]
+    thick: tuple[float, float]
+    backed: float
+    armed: float
+    styles: tuple[str, ...] = _STYLES
+    soft: bool = False
+
+
+_SEATS = (
+    _Seat((0.15, 0.22), (0.12, 0.2), (0.1, 0.25), (0.03, 0.08), 0.0, 0.0),  # stool
+    _Seat((0.18, 0.26), (0.14, 0.30), (0.14, 0.36), (0.03, 0.08), 0.85, 0.2, ("legs", "legs", "panels")),  # chair
+    _Seat((0.22, 0.30), (0.15, 0.30), (0.14, 0.36), (0.05, 0.10), 0.9, 0.6, ("column",)),  # office chair
+    _Seat((0.5, 1.0), (0.12, 0.25), (0.12, 0.3), (0.03, 0.12), 0.2, 0.0),  # bench
+    _Seat((0.27, 0.36), (0.18, 0.35), (0.2, 0.42), (0.1, 0.25), 0.9, 0.8, ("block", "legs"), soft=True),  # armchair
+    _Seat((0.5, 1.1), (0.18, 0.35), (0.2, 0.42), (0.1, 0.25), 0.9, 0.7, ("block", "legs"), soft=True),  # sofa
+    _Seat((0.3, 1.0), (0.3, 0.6), (0.04, 0.14), (0.03, 0.3), 0.3, 0.0),  # sitting on the edge
+)
+_SEAT_SHARES = (0.14, 0.27, 0.15, 0.10, 0.10, 0.14, 0.10)
 
 
 @dataclass(frozen=True)
@@ -71,23 +129,29 @@ def probes(joints: np.ndarray, step: int = 3) -> np.ndarray:
     return j[:, _FROM] + (j[:, _TO] - j[:, _FROM]) * _SHARE
 
 
-def _clear(boxes: np.ndarray, points: np.ndarray, margin: float, sits: bool = False) -> bool:
-    """Whether no probe comes nearer to a box than its radius plus ``margin``; those that sit are let off where ``sits``."""
-    keep = ~_SITS if sits else np.ones(len(_RADIUS), dtype=bool)
-    flat = points[:, keep].reshape(-1, 3)
-    limits = np.tile(_RADIUS[keep] + margin, len(points))
-    near = np.ones(len(flat), dtype=bool)
-    if len(boxes):
-        centre = boxes[:, :2].mean(0)
-        span = np.linalg.norm(boxes[:, :2] - centre, axis=1).max() + np.linalg.norm(boxes[:, 3:5], axis=1).max() + 0.3
-        near = np.linalg.norm(flat[:, :2] - centre, axis=1) < span
-    return bool((distances(boxes, flat[near]) > limits[near]).all())
+def _clearance(boxes: np.ndarray, points: np.ndarray, pressed: float | np.ndarray = 0.0) -> float:
+    """How far (metres) the flesh about the probes (N, P, 3) stays from the boxes at least; negative where it cuts them.
+
+    ``pressed`` (a number, or one per probe) is let off: flesh gives where it rests on something. Far probes count as 0.3 m.
+    """
+    flat = points.reshape(-1, 3)
+    limits = np.broadcast_to(_RADIUS - pressed, points.shape[:2]).reshape(-1)
+    if not len(boxes):
+        return _FAR
+    centre = boxes[:, :2].mean(0)
+    span = np.linalg.norm(boxes[:, :2] - centre, axis=1).max() + np.linalg.norm(boxes[:, 3:5], axis=1).max() + _FAR
+    near = ((flat[:, :2] - centre) ** 2).sum(1) < (span + 0.1) ** 2
+    if not near.any():
+        return _FAR
+    return min(_FAR, float((distances(boxes, flat[near]).min(0) - limits[near]).min()))
 
 
-def _frame_under(rng: np.random.Generator, top: float, thick: float, x: float, back: float, front: float) -> list[np.ndarray]:
-    """What carries a seat or table top between ``back`` and ``front`` (y), ``x`` to either side: block, legs or column."""
+def _carrier(
+    rng: np.random.Generator, top: float, thick: float, x: float, back: float, front: float, styles: tuple[str, ...] = _STYLES
+) -> list[np.ndarray]:
+    """What carries a seat or table top between ``back`` and ``front`` (y), ``x`` to either side."""
     middle, depth, under = (front + back) / 2, front - back, top - thick
-    style = rng.choice(["block", "legs", "column", "panels"], p=[0.3, 0.4, 0.15, 0.15])
+    style = styles[rng.integers(len(styles))]
     if style == "block":
         gap = rng.choice([0.0, rng.uniform(0.05, 0.15)])
         return [box((0, middle, (under + gap) / 2), (2 * x, depth, max(under - gap, 0.02)))]
@@ -96,28 +160,35 @@ def _frame_under(rng: np.random.Generator, top: float, thick: float, x: float, b
         ys = (back + t / 2, front - t / 2)
         return [box((sx * (x - t / 2), y, under / 2), (t, t, under)) for sx in (-1, 1) for y in ys]
     if style == "column":
-        t = rng.uniform(0.05, 0.12)
-        return [box((0, middle, under / 2), (t, t, under)), box((0, middle, 0.03), (0.3, 0.3, 0.06))]
+        t, foot = rng.uniform(0.05, 0.12), rng.uniform(0.3, 0.5)
+        return [box((0, middle, under / 2), (t, t, under)), box((0, middle, 0.03), (foot, foot, 0.06))]
     return [box((sx * (x - 0.02), middle, under / 2), (0.04, depth, under)) for sx in (-1, 1)]
 
 
-def _seat(rng: np.random.Generator, top: float, small: float) -> tuple[np.ndarray, np.ndarray]:
-    """A seat with its front along +y, the sitter's pelvis over the origin: (carrying boxes, back and arms)."""
-    sofa = rng.random() < 0.2
-    x = rng.uniform(0.45, 1.1) if sofa else rng.uniform(0.17, 0.32)
-    shift = rng.uniform(-0.8, 0.8) * (x - 0.25) if sofa else rng.uniform(-0.03, 0.03)
-    back, front = -rng.uniform(0.12, 0.30), rng.uniform(0.14, 0.40) * small
-    thick = min(rng.uniform(0.03, 0.25 if sofa else 0.10), top - 0.05)
+def _seat(rng: np.random.Generator, top: float, kind: _Seat, small: float) -> tuple[np.ndarray, np.ndarray]:
+    """A seat with its front along +y, the sitter's pelvis over the origin: (carrying boxes, back and arms).
+
+    ``small`` from 1 to 0 takes away what lies before the pelvis.
+    """
+    x = rng.uniform(*kind.half_width)
+    room = max(0.0, x - 0.22)
+    shift = rng.uniform(-room, room) + rng.uniform(-0.03, 0.03)
+    back, front = -rng.uniform(*kind.behind), rng.uniform(*kind.before) * small
+    thick = min(rng.uniform(*kind.thick), top - 0.03)
     rows = [box((0, (front + back) / 2, top - thick / 2), (2 * x, front - back, thick))]
-    rows += _frame_under(rng, top, thick, x, back, front)
+    rows += _carrier(rng, top, thick, x, back, front, kind.styles)
     extra = []
-    if rng.random() < (0.85 if sofa else 0.6):
-        t, h = rng.uniform(0.03, 0.2 if sofa else 0.08), rng.uniform(0.25, 0.6)
-        low = 0.0 if sofa else rng.choice([0.0, rng.uniform(0.05, 0.2)])
+    t = rng.uniform(0.03, 0.06) + 0.6 * max(0.0, thick - 0.08)
+    if rng.random() < kind.backed:
+        h = rng.uniform(0.25, 0.6)
+        low = rng.choice([0.0, rng.uniform(0.05, 0.2)]) if t < 0.06 else 0.0
         extra.append(box((0, back - t / 2 + rng.uniform(0, 0.03), top + (low + h) / 2), (2 * x, t, h - low)))
-    if rng.random() < (0.6 if sofa else 0.2):
-        t, h = rng.uniform(0.04, 0.2 if sofa else 0.06), rng.uniform(0.12, 0.25)
-        extra += [box((s * (x + t / 2), (front + back) / 2, (top + h) / 2), (t, front - back, top + h)) for s in (-1, 1)]
+    if rng.random() < kind.armed:
+        h = rng.uniform(0.12, 0.25)
+        # The arms of an office chair hang on its seat; others stand on the floor.
+        foot = top if kind.styles == ("column",) else 0.0
+        middle, size = (front + back) / 2, (t, front - back, top + h - foot)
+        extra += [box((s * (x + t / 2), middle, (top + h + foot) / 2), size) for s in (-1, 1)]
     both = np.array(rows), (np.array(extra) if extra else NO_BOXES.copy())
     for part in both:
         part[:, 0] += shift
@@ -126,71 +197,222 @@ def _seat(rng: np.random.Generator, top: float, small: float) -> tuple[np.ndarra
 
 def seat_for(rng: np.random.Generator, rest: Rest, points: np.ndarray) -> np.ndarray | None:
     """Boxes of a random seat under a resting pelvis, or None where no try leaves the body's path (``points``) free."""
-    top = rest.position[2] - SEAT_TO_PELVIS + rng.uniform(-0.012, 0.012)
-    for attempt in range(14):
-        carrying, extra = _seat(rng, top, small=1.0 - 0.04 * attempt)
+    kind = _SEATS[rng.choice(len(_SEATS), p=_SEAT_SHARES)]
+    sink = float(np.clip(rng.normal(0.0, 0.015), -0.04, 0.04))
+    if kind.soft and rng.random() < _SOFT:
+        sink = SEAT_TO_PELVIS - rng.uniform(0.0, 0.06)
+    for attempt in range(_TRIES):
+        if attempt == _TRIES // 2:
+            kind = _SEATS[0]  # a plain stool fits where nothing else does
+        top = rest.position[2] - SEAT_TO_PELVIS + sink
+        carrying, extra = _seat(rng, top, kind, small=1.0 - 0.5 * attempt / _TRIES)
         yaw = rest.yaw + rng.normal(0.0, 0.08)
         carrying, extra = (placed(part, rest.position[:2], yaw) for part in (carrying, extra))
-        if not _clear(carrying, points, -0.025, sits=True):
+        if _clearance(carrying, points, _ON_SEAT + max(0.0, sink) * _SINKS) < 0:
             continue
-        if len(extra) and not _clear(extra, points, -0.02):
-            if attempt < 7:
+        if _clearance(extra, points, 0.02) < 0:
+            if attempt < _TRIES // 4:
                 continue
             extra = NO_BOXES
         return np.concatenate([carrying, extra])
     return None
 
 
+def _bed_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
+    """A bed, or a sofa with its back to one side, under a lying body, head end along +y."""
+    middle = use.points.mean(0)
+    for attempt in range(_TRIES):
+        sofa = rng.random() < 0.35
+        x = rng.uniform(0.32, 0.45) if sofa else rng.uniform(0.4, 0.95)
+        shift = rng.uniform(-1, 1) * (x - 0.24)
+        head, feet = rng.uniform(0.65, 0.95), -rng.uniform(0.9, 1.35) * (1.0 - 0.4 * attempt / _TRIES)
+        top = middle[2] - rng.uniform(0.10, 0.14)
+        thick = min(rng.uniform(0.08, 0.3), top - 0.05)
+        rows = [box((shift, (head + feet) / 2, top - thick / 2), (2 * x, head - feet, thick))]
+        extra = []
+        if sofa:
+            side, t, h = rng.choice([-1.0, 1.0]), rng.uniform(0.08, 0.2), rng.uniform(0.25, 0.5)
+            extra.append(box((shift + side * (x + t / 2), (head + feet) / 2, (top + h) / 2), (t, head - feet, top + h)))
+        if rng.random() < 0.5:
+            t, h = rng.uniform(0.04, 0.1), rng.uniform(0.1, 0.6)
+            extra.append(box((shift, head + t / 2, (top + h) / 2), (2 * x, t, top + h)))
+        carrying = np.array(rows + _carrier(rng, top, thick, x, feet, head, ("block", "legs")))
+        carrying[1:, 0] += shift
+        beside = np.array(extra) if extra else NO_BOXES
+        yaw = use.yaw + rng.normal(0.0, 0.05)
+        carrying, beside = (placed(part, middle[:2], yaw) for part in (carrying, beside))
+        if _clearance(carrying, points, _ON_BED) < 0:
+            continue
+        return np.concatenate([carrying, beside if _clearance(beside, points, 0.02) >= 0 else NO_BOXES])
+    return None
+
+
+def _across(use: Use, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the use's points lie to the right of ``origin`` (2,) and away from the body."""
+    offset = use.points[:, :2] - origin
+    c, s = np.cos(use.yaw), np.sin(use.yaw)
+    return offset @ (c, s), offset @ (-s, c)
+
+
+def _desk_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
+    """A desk, table or counter whose top is 2 to 5 cm under the lowest wrist that works there."""
+    origin = use.points[:, :2].mean(0)
+    right, ahead = _across(use, origin)
+    top = use.points[:, 2].min() - rng.uniform(0.02, 0.05)
+    for attempt in range(_TRIES):
+        near = ahead.min() - rng.uniform(0.0, 0.22) * (1.0 - attempt / _TRIES)
+        far = ahead.max() + rng.uniform(0.12, 0.5)
+        left_side, right_side = right.min() - rng.uniform(0.1, 0.7), right.max() + rng.uniform(0.1, 0.7)
+        x, thick = (right_side - left_side) / 2, rng.uniform(0.02, 0.06)
+        rows = [box((0, (near + far) / 2, top - thick / 2), (2 * x, far - near, thick))]
+        rows += _carrier(rng, top, thick, x, near, far, _STYLES if rng.random() < 0.3 else ("legs", "column", "panels"))
+        desk = np.array(rows)
+        desk[:, 0] += (left_side + right_side) / 2
+        desk = placed(desk, origin, use.yaw)
+        if _clearance(desk, points, _ON_DESK) >= 0:
+            return desk
+    return None
+
+
+def _board_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
+    """A board or wall 5 to 9 cm beyond the furthest wrist that strokes it."""
+    origin = use.points[:, :2].mean(0)
+    right, ahead = _across(use, origin)
+    low, high = use.points[:, 2].min(), use.points[:, 2].max()
+    face = ahead.max() + rng.uniform(0.05, 0.09)
+    for attempt in range(_TRIES):
+        share = 1.0 - attempt / _TRIES
+        left_side, right_side = right.min() - 0.1 - rng.uniform(0, 1.0) * share, right.max() + 0.1 + rng.uniform(0, 1.0) * share
+        thick, upper = rng.uniform(0.02, 0.12), high + rng.uniform(0.1, 0.6)
+        lower = 0.0 if rng.random() < 0.3 * share else max(0.0, low - rng.uniform(0.1, 0.5))
+        size = (right_side - left_side, thick, upper - lower)
+        board = placed(box(((left_side + right_side) / 2, face + thick / 2, (lower + upper) / 2), size)[None], origin, use.yaw)
+        if _clearance(board, points, _ON_BOARD) >= 0:
+            return board
+    return None
+
+
+def _shelf_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
+    """A shelf, bookcase or counter a little under a hand that reached for it."""
+    origin = use.points[:, :2].mean(0)
+    _, ahead = _across(use, origin)
+    under = use.points[:, 2].min()
+    for _ in range(_TRIES // 2):
+        top, x = under - rng.uniform(0.03, 0.08), rng.uniform(0.15, 0.7)
+        near, thick = ahead.min() - rng.uniform(0.0, 0.12), rng.uniform(0.02, 0.05)
+        far = ahead.max() + rng.uniform(0.1, 0.35)
+        rows = [box((0, (near + far) / 2, top - thick / 2), (2 * x, far - near, thick))]
+        style = rng.choice(["board", "counter", "bookcase"])
+        if style == "counter" and top < 1.2:
+            rows += _carrier(rng, top, thick, x, near, far)
+        if style == "bookcase":
+            height = top + rng.uniform(0.1, 0.8)
+            rows.append(box((0, far + 0.01, height / 2), (2 * x, 0.02, height)))
+            rows += [box((s * x, (near + far) / 2, height / 2), (0.03, far - near, height)) for s in (-1, 1)]
+            rows += [box((0, (near + far) / 2, z), (2 * x, far - near, thick)) for z in np.arange(top - 0.35, 0.1, -0.35)]
+        shelf = np.array(rows)
+        shelf[:, 0] += rng.uniform(-0.6, 0.6) * x
+        shelf = placed(shelf, origin, use.yaw + rng.normal(0.0, 0.1))
+        if _clearance(shelf, points, _ON_DESK) >= 0:
+            return shelf
+    return None
+
+
+def _desk_alone(rng: np.random.Generator) -> np.ndarray:
+    top, x, y = rng.uniform(0.4, 1.05), rng.uniform(0.25, 0.9), rng.uniform(0.2, 0.45)
+    thick = rng.uniform(0.02, 0.08)
+    desk = np.array([box((0, 0, top - thick / 2), (2 * x, 2 * y, thick)), *_carrier(rng, top, thick, x, -y, y)])
+    if top > 0.65 and rng.random() < 0.4:  # its chair is drawn up, and nobody sits on it
+        seat = np.concatenate(_seat(rng, rng.uniform(0.38, 0.5), _SEATS[1], 1.0))
+        desk = np.concatenate([desk, placed(seat, np.array([0.0, -y - rng.uniform(0.1, 0.5)]), rng.normal(0, 0.3))])
+    return desk
+
+
 def _piece(rng: np.random.Generator) -> np.ndarray:
-    kind = rng.choice(["block", "wall", "table", "seat"], p=[0.3, 0.2, 0.25, 0.25])
+    """Something that nobody uses, about the origin."""
+    kind = rng.choice(["block", "wall", "desk", "seat", "bed"], p=[0.25, 0.15, 0.25, 0.3, 0.05])
     if kind == "block":
         size = rng.uniform((0.2, 0.2, 0.2), (1.2, 0.8, 1.9))
         return box((0, 0, size[2] / 2 + rng.choice([0.0, rng.uniform(0, 0.8)])), tuple(size))[None]
     if kind == "wall":
         length, height = rng.uniform(1.0, 4.0), rng.uniform(1.0, 2.6)
         return box((0, 0, height / 2 + rng.choice([0.0, 0.8])), (length, rng.uniform(0.03, 0.2), height))[None]
-    if kind == "table":
-        top, x, y = rng.uniform(0.4, 1.0), rng.uniform(0.25, 0.9), rng.uniform(0.2, 0.45)
-        thick = rng.uniform(0.02, 0.08)
-        return np.array([box((0, 0, top - thick / 2), (2 * x, 2 * y, thick)), *_frame_under(rng, top, thick, x, -y, y)])
-    return np.concatenate(_seat(rng, rng.uniform(0.3, 0.75), 1.0))
+    if kind == "desk":
+        return _desk_alone(rng)
+    if kind == "bed":
+        size = rng.uniform((0.8, 1.9, 0.3), (1.8, 2.1, 0.6))
+        return box((0, 0, size[2] / 2), tuple(size))[None]
+    seat = _SEATS[rng.choice(len(_SEATS), p=_SEAT_SHARES)]
+    return np.concatenate(_seat(rng, rng.uniform(0.3, 0.75), seat, 1.0))
 
 
 def scattered(rng: np.random.Generator, points: np.ndarray, path: RootPath, count: int) -> np.ndarray:
-    """Up to ``count`` random pieces near the path, none of which the body (``points``) comes near to."""
+    """Up to ``count`` random pieces near the path, none of which the body (``points``) comes near to.
+
+    Half of them are pushed to within 5 to 20 cm of the body's path: what one has to walk around.
+    """
     kept = [NO_BOXES]
     for _ in range(count):
         piece = _piece(rng)
+        wanted = rng.uniform(0.05, 0.2) if rng.random() < 0.5 else _FAR
         for _ in range(5):
             at = path.position[rng.integers(len(path)), :2]
             direction, distance = rng.uniform(0, 2 * np.pi), rng.uniform(0.25, 1.5)
-            spot = at + distance * np.array([np.cos(direction), np.sin(direction)])
-            candidate = placed(piece, spot, rng.uniform(0, 2 * np.pi))
-            if _clear(candidate, points, 0.03):
-                kept.append(candidate)
-                break
+            towards = np.array([np.cos(direction), np.sin(direction)])
+            candidate = placed(piece, at + distance * towards, rng.uniform(0, 2 * np.pi))
+            clearance = _clearance(candidate, points)
+            if clearance < 0.03:
+                continue
+            for _ in range(4):  # no step can be longer than what is free
+                if clearance > wanted + 0.01:
+                    candidate[:, :2] -= (clearance - wanted) * towards
+                    clearance = _clearance(candidate, points)
+            kept.append(candidate)
+            break
     return np.concatenate(kept)
 
 
-def seats_for(rng: np.random.Generator, rests: list[Rest], points: np.ndarray) -> list[np.ndarray]:
-    """A seat for every place of rest (places within 0.25 m share one); empty where one cannot be had."""
+def _carried(boxes: np.ndarray, rest: Rest) -> bool:
+    """Whether a bed is already the seat of this rest: one sits down on its edge."""
+    at = rest.position - (0.0, 0.0, SEAT_TO_PELVIS)
+    return len(boxes) > 0 and float(distances(boxes, at[None]).min()) < 0.05
+
+
+def _fitted(
+    rng: np.random.Generator, joints: np.ndarray, path: RootPath, points: np.ndarray
+) -> list[tuple[str, np.ndarray | None]]:
+    """What a motion uses, one word each, with the boxes fitted to it, or None where none could be had.
+
+    Hands may as well work in the air: now and then theirs is not tried, and not in the list.
+    """
+    beds = [("bed", _bed_for(rng, use, points)) for use in lying(joints)]
+    carrying = np.concatenate([NO_BOXES, *(rows for _, rows in beds if rows is not None)])
     places: list[Rest] = []
-    for rest in rests:
-        if all(np.linalg.norm(rest.position - other.position) > 0.25 for other in places):
+    for rest in resting(joints, path):
+        apart = all(np.linalg.norm(rest.position - other.position) > _ONE_SEAT for other in places)
+        if apart and rest.position[2] > _ON_THE_FLOOR and not _carried(carrying, rest):
             places.append(rest)
-    seats = [seat_for(rng, place, points) for place in places]
-    return [] if any(seat is None for seat in seats) else [seat for seat in seats if seat is not None]
+    fitted = [*beds, *(("seat", seat_for(rng, place, points)) for place in places)]
+    for use in [*working(joints, path), *stroking(joints, path), *reaching(joints, path)]:
+        if rng.random() < _LIKELY[use.kind]:
+            fitted.append((use.kind, _FITS[use.kind](rng, use, points)))
+    return fitted
 
 
 def furnished(rng: np.random.Generator, joints: np.ndarray, path: RootPath) -> tuple[np.ndarray | None, str]:
     """All boxes (B, 7) of a room for one motion (T, 22, 3) with its root path, what the body uses and random pieces, and "".
 
-    Or None and one word for what could not be had: "seat".
+    Or None and one word for what could not be had: "seat" or "bed". A desk, board or shelf that does not fit is left out.
+    Paper, section 5.2.
     """
     points = probes(joints)
-    rests = resting(joints, path)
-    seats = seats_for(rng, rests, points)
-    if rests and not seats:
-        return None, "seat"
+    fitted = _fitted(rng, joints, path, points)
+    for kind, rows in fitted:
+        if rows is None and kind in _NEEDED:
+            return None, kind
     count = int(rng.integers(1, 5)) if rng.random() < 0.8 else 0
-    return np.concatenate([NO_BOXES, *seats, scattered(rng, points, path, count)]), ""
+    pieces = [rows for _, rows in fitted if rows is not None]
+    return np.concatenate([NO_BOXES, *pieces, scattered(rng, points, path, count)]), ""
+
+
+_FITS = {"desk": _desk_for, "board": _board_for, "shelf": _shelf_for}
