@@ -1,7 +1,6 @@
 """Training: it learns, resumes exactly, stops on NaN with the last good state, and what it exports is what it trained."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +9,13 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from dafnet_addon.core.errors import InputError  # noqa: E402
+from dafnet_addon.core.root import RootPath  # noqa: E402
 from dafnet_addon.core.skeleton import MODEL_ORDER  # noqa: E402
 from dafnet_addon.core.weights import load_weights  # noqa: E402
+from dafnet_addon.data import boxes as boxes_module  # noqa: E402
+from dafnet_addon.data.prepare import POSE_UNIT  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
-from dafnet_addon.training.batches import Statistics, batch_of, observation_for, past_of  # noqa: E402
+from dafnet_addon.training.batches import Pool, Statistics, observation_for, occupancy_of, past_of  # noqa: E402
 from dafnet_addon.training.export import annotate, export, tensors_of  # noqa: E402
 from dafnet_addon.training.train import Run, TrainingConfig, read_config, train_part, trained  # noqa: E402
 
@@ -27,14 +29,18 @@ def dataset(tmp_path: Path) -> Path:
     """A small set of swaying bodies, each window at a height of its own that the sensor shows."""
     rng, windows = np.random.default_rng(0), 12
     sway = np.sin(np.linspace(0, 6, 80))[None, :, None] * rng.uniform(0.05, 0.2, (windows, 1, 66))
-    poses = (rng.normal(size=66) + sway).astype(np.float32)
+    poses = rng.uniform(-1.0, 1.0, size=66) + sway
+    rows = rng.uniform((-1, -1, 0.1, 0.1, 0.1, 0.1, -3), (1, 1, 0.6, 0.5, 0.5, 0.5, 3), (windows, boxes_module.MOST, 7))
+    rows[:, 3:] = boxes_module.ABSENT
     pool = {
-        "poses": poses, "velocity": rng.normal(scale=0.01, size=(windows, 80, 3)).astype(np.float32),
-        "occupancy": (rng.random((windows, 70, 2640)) < 0.03).astype(np.uint8) * 255, "kinds": np.array(["walk"] * windows),
+        "poses": np.round(poses / POSE_UNIT).astype(np.int16), "velocity": rng.normal(scale=0.01, size=(windows, 80, 3)),
+        "ahead": rng.normal(size=(windows, 70, 18)), "root": rng.normal(scale=0.1, size=(windows, 70, 3)), "boxes": rows,
     }
+    pool = {name: a if a.dtype == np.int16 else a.astype(np.float32) for name, a in pool.items()}
+    pool["kinds"] = np.array(["walk"] * windows)
     folder = tmp_path / "dataset"
     folder.mkdir()
-    np.savez(folder / "pool-000.npz", **pool)
+    np.savez(folder / "pool-0000.npz", **pool)
     np.savez(folder / "held.npz", **{name: value[:4] for name, value in pool.items()})
     return folder
 
@@ -74,7 +80,7 @@ def test_pasts_hold_ten_poses_and_eleven_velocities():
 
 def test_observations_show_only_what_a_mode_gives():
     upper = torch.randn(200, 20, 42)
-    observation, given = observation_for(np.random.default_rng(0), upper)
+    observation, given = observation_for(upper)
     mask = given.repeat_interleave(3, -1)
     assert (observation[mask == 0] == 0).all()
     shown = mask[..., :42] == 1
@@ -87,18 +93,39 @@ def test_observations_show_only_what_a_mode_gives():
     assert {row.index(1) for row in alone} == set(effectors), "one hand alone is a valid request"
 
 
+def _pool(dataset: Path) -> Pool:
+    return Pool(lambda: sorted(dataset.glob("pool-????.npz")), torch.device("cpu"))
+
+
 def test_statistics_standardise_and_keep_their_floor(dataset):
-    with np.load(dataset / "pool-000.npz") as z:
-        poses, velocity = z["poses"], z["velocity"]
-    poses = poses.copy()
-    poses[..., 0] = 1.0
-    statistics = Statistics.of(poses, velocity)
-    assert statistics.pose_std.min() >= 0.01 and np.abs(statistics.poses(poses).mean((0, 1))).max() < 1e-4
+    pool = _pool(dataset)
+    pool.arrays["poses"][..., 0] = 1000
+    statistics = pool.statistics()
+    assert statistics.pose_std.min() >= 0.01
+    batch = pool.batch(torch.arange(12), statistics, TINY)
+    assert torch.cat([batch.upper, batch.lower], -1).mean((0, 1)).abs().max() < 0.5
+
+
+def test_pools_take_in_new_shards(dataset):
+    pool = _pool(dataset)
+    (dataset / "pool-0001.npz").write_bytes((dataset / "pool-0000.npz").read_bytes())
+    pool.refresh()
+    assert len(pool) == 24
+
+
+def test_the_sensor_in_torch_is_the_one_in_numpy():
+    rng = np.random.default_rng(0)
+    rows = rng.uniform((-1, -1, 0.1, 0.05, 0.05, 0.05, -3), (1, 1, 1.2, 0.6, 0.6, 0.6, 3), (3, 6, 7))
+    rows[:, -1] = boxes_module.ABSENT
+    root = np.concatenate([rng.uniform(-0.5, 0.5, (3, 20, 2)), rng.uniform(-3, 3, (3, 20, 1))], axis=-1)
+    made = occupancy_of(torch.from_numpy(rows), torch.from_numpy(root)).numpy()
+    for boxes, places, seen in zip(rows, root, made, strict=True):
+        path = RootPath(np.c_[places[:, :2], np.zeros(20)], places[:, 2])
+        assert np.abs(seen - boxes_module.occupancy(boxes, path)).max() < 1e-6 and seen.max() > 0.5
 
 
 def _loss_at(run: Run, dataset: Path) -> float:
-    with np.load(dataset / "pool-000.npz") as z:
-        return run.held_loss({name: z[name] for name in z.files}, windows=12)
+    return run.held_loss(_pool(dataset), windows=12)
 
 
 @pytest.mark.parametrize("part", ["predictor", "upper"])
@@ -106,8 +133,7 @@ def test_it_learns(part, dataset, tmp_path):
     folder = tmp_path / "run"
     if part == "upper":
         _until("predictor", dataset, folder, steps=2)
-    with np.load(dataset / "pool-000.npz") as z:
-        fresh = Run(part, tmp_path / "fresh", TINY, _config(10), Statistics.of(z["poses"], z["velocity"]))
+    fresh = Run(part, tmp_path / "fresh", TINY, _config(10), _pool(dataset).statistics())
     before = _loss_at(fresh, dataset)
     assert _loss_at(_until(part, dataset, folder, steps=40), dataset) < before - 5.0
 
@@ -127,10 +153,10 @@ def test_a_loss_that_is_no_number_stops_with_the_last_good_state(dataset, tmp_pa
     folder = tmp_path / "run"
     _until("predictor", dataset, folder, steps=2)
     before = (folder / "predictor.pt").read_bytes()
-    with np.load(dataset / "pool-000.npz") as z:
+    with np.load(dataset / "pool-0000.npz") as z:
         pool = {name: z[name] for name in z.files}
     pool["velocity"] = pool["velocity"] * np.nan
-    np.savez(dataset / "pool-000.npz", **pool)
+    np.savez(dataset / "pool-0000.npz", **pool)
     with pytest.raises(InputError, match="no number"):
         train_part("predictor", dataset, folder, TINY, _config(2))
     assert (folder / "predictor.pt").read_bytes() == before
@@ -167,10 +193,42 @@ def test_configurations_are_read_and_bad_ones_refused(tmp_path):
 
 
 def test_batches_are_noisy_by_three_millimetres(dataset):
-    with np.load(dataset / "pool-000.npz") as z:
-        pool = {name: z[name] for name in z.files}
-    statistics = replace(Statistics.of(pool["poses"], pool["velocity"]), pose_std=np.ones(66), pose_mean=np.zeros(66))
-    rows = np.arange(12)
-    batch = batch_of(pool, rows, statistics, 10)
-    clean = statistics.poses(pool["poses"][rows])[:, 10:, :42]
-    assert abs(float((batch.upper - torch.from_numpy(clean)).std()) - 0.003) < 3e-4
+    pool, rows = _pool(dataset), torch.arange(12)
+    unit = Statistics(np.zeros(66), np.ones(66), np.zeros(3), np.ones(3), np.zeros(18), np.ones(18))
+    one, two = (pool.batch(rows, unit, TINY) for _ in range(2))
+    assert abs(float((one.upper - two.upper).std()) - 0.003 * 2**0.5) < 3e-4
+
+
+def test_free_running_loss_is_zero_for_the_captured_motion_and_knows_sliding():
+    from dafnet_addon.core.skeleton import LOWER, REST, UPPER
+    from dafnet_addon.training.free_run import lower_loss, sliding, upper_loss
+
+    rest = torch.from_numpy(REST).float()
+    upper, lower = rest[list(UPPER)].repeat(3, 8, 1, 1), rest[list(LOWER)].repeat(3, 8, 1, 1)
+    calm, given, step = torch.tensor([True, False, True]), torch.zeros(3, 8, 14), torch.zeros(3, 8, 3)
+    assert float(upper_loss(upper, upper, calm, given)) < 1e-3
+    still = float(lower_loss(lower, lower, calm, upper[:, :, 0], step))
+    assert still < 0.1
+    # The root goes 1 cm to the right each frame and turns; feet that stay in its frame slide over the floor.
+    step[..., 0] = 0.01
+    assert torch.allclose(sliding(lower, step), torch.tensor(0.3), atol=1e-3)
+    assert float(lower_loss(lower, lower, ~calm, upper[:, :, 0], step)) > still + 1.0
+    turning = torch.zeros(1, 2, 3)
+    turning[..., 2] = 0.1
+    fixed = torch.tensor([[0.0, 1.0, 0.0], [0.1, 0.995, 0.0]])[None, :, None]
+    assert float(sliding(fixed, turning)) < 0.02, "a point that stays in the world while the root turns to the left"
+
+
+def test_running_on_is_the_likelihood_and_the_inverse(dataset):
+    torch.manual_seed(0)
+    run = Run("upper", dataset, TINY, _config(1), _pool(dataset).statistics())
+    flow = run.flow.upper
+    with torch.no_grad():
+        for parameter in flow.parameters():
+            parameter += 0.05 * torch.randn_like(parameter)
+        x, z, occupancy = torch.randn(2, 12, 42), torch.randn(2, 42), torch.rand(2, 12, 2640)
+        condition = torch.randn(2, 12, TINY.condition_size - TINY.code)
+        density, made = flow.run_on(x, condition, occupancy, z, 5)
+        assert torch.allclose(density, flow.log_likelihood(x, condition, occupancy), atol=1e-3)
+        again, _, _ = flow(torch.cat([x[:, :5], made], 1), condition, occupancy)
+    assert (again[:, 5:] - z[:, None]).abs().max() < 1e-3

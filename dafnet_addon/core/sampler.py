@@ -169,7 +169,8 @@ class Sampler:
         self.pose_mean, self.pose_std = array("pose_mean", _POSE_SIZE), array("pose_std", _POSE_SIZE)
         self.velocity_mean, self.velocity_std = array("velocity_mean", 3), array("velocity_std", 3)
         self.ahead = c["ahead"]
-        self.ahead_mean, self.ahead_std = (array(n, self.ahead) if self.ahead else np.zeros(0) for n in ("ahead_mean", "ahead_std"))
+        told = ("ahead_mean", "ahead_std")
+        self.ahead_mean, self.ahead_std = (array(name, self.ahead) if self.ahead else np.zeros(0) for name in told)
         if min(self.pose_std.min(), self.velocity_std.min(), self.ahead_std.min(initial=1.0)) < 1e-6:
             raise _unusable(weights, "its deviations are not positive")
 

@@ -9,9 +9,13 @@ from ..core.root import RootPath
 from ..core.rotations import rotate, transpose, yaw_matrix
 from ..core.sensor import RADIUS, REACH, SPHERES, occupancy_of_distance
 
-__all__ = ["NO_BOXES", "box", "placed", "distances", "occupancy"]
+__all__ = ["NO_BOXES", "MOST", "ABSENT", "box", "placed", "distances", "near", "occupancy"]
 
 NO_BOXES = np.zeros((0, 7))
+MOST = 48
+"""Boxes that a training window holds at most."""
+ABSENT = np.array([0.0, 0.0, -9.0, 0.0, 0.0, 0.0, 0.0])
+"""A box that no sensor sees: fills up the rows of a window."""
 _LAYERS = 15
 _DISC = SPHERES[: len(SPHERES) // _LAYERS, :2]
 _HEIGHTS = SPHERES[:: len(_DISC), 2]
@@ -36,6 +40,17 @@ def distances(boxes: np.ndarray, points: np.ndarray) -> np.ndarray:
     local = rotate(transpose(yaw_matrix(boxes[:, 6]))[:, None], points[None] - boxes[:, None, :3])
     q = np.abs(local) - boxes[:, None, 3:6]
     return np.sqrt((np.maximum(q, 0.0) ** 2).sum(-1)) + np.minimum(q.max(-1), 0.0)
+
+
+def near(boxes: np.ndarray, path: RootPath) -> np.ndarray:
+    """The boxes that the sensor may see along a path, the nearest first, filled up or cut to (MOST, 7)."""
+    gap = np.linalg.norm(path.position[None, :, :2] - boxes[:, None, :2], axis=-1).min(1, initial=np.inf)
+    gap -= np.linalg.norm(boxes[:, 3:5], axis=1)
+    order = np.argsort(gap)[:MOST]
+    out = np.tile(ABSENT, (MOST, 1))
+    kept = boxes[order[gap[order] < REACH + RADIUS]]
+    out[: len(kept)] = kept
+    return out
 
 
 def occupancy(boxes: np.ndarray, path: RootPath) -> np.ndarray:

@@ -1,25 +1,27 @@
 """From motion files to a training set: clips on the canonical body, and a pool of augmented, furnished windows on disk.
 
-A dataset is a folder: ``dataset.json`` (what it was made from), ``pool-NNN.npz`` (training windows) and ``held.npz`` (windows
-of held-out clips, for the likelihood).
+A dataset is a folder: ``train.npz`` and ``test.npz`` (motions, captured and composed), ``dataset.json`` (what they were made
+from), ``pool-NNNN.npz`` (training windows) and ``held.npz`` (windows of held-out motions, for the likelihood).
 """
 
 import json
+import multiprocessing
 from collections import defaultdict
-from collections.abc import Callable, Iterator
-from multiprocessing import Pool
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..core.rotations import frame_from, normalised
 from ..core.skeleton import OFFSETS, PARENTS
 from .canonical import calibrate, canonical
-from .compose import entrance, joined, matches
+from .compose import composed
 from .mocap import Clip, read_clips
-from .windows import Motion, Window, draw, mirrored, motion_of
+from .motions import Draws, read_motions, write_motions
+from .windows import COMPOSED, Motion, Window, draw, motion_of
 
-__all__ = ["load_motions", "prepare", "load_pool", "TRAINED_ON_PARTLY"]
+__all__ = ["load_motions", "sample", "prepare", "load_pool", "POSE_UNIT", "TRAINED_ON_PARTLY"]
 
 _WALK = {"locomotion", "walk", "turn", "run", "carry_other", "door"}
 _STAND = {"standing", "standing_idle", "standing_gesture", "social_gesture", "greeting", "work_standing", "documents",
@@ -30,13 +32,11 @@ _SHARES = {"approach": 0.20, "descend": 0.29, "sit": 0.10, "walk": 0.27, "stand"
 """Shares of windows: walking up to a seat and sitting down (composed), around a captured sit-down or stand-up, seated,
 walking, standing.
 """
-_COMPOSED = "composed"
 _COMPOSITION = (
     "walks joined to sit-downs; seats moved to other heights; mirrored, reversed, re-timed; arms lent to the UI-PRMD bodies; "
     "all furniture"
 )
 """What in the training motion nobody ever did in one piece; said on the weights' card."""
-_TRIES, _JOINS = 60, 8  # walks tried and joins kept for each captured sit-down and its mirror image
 
 _SHARE_ALIKE = {"hdm05_cuts"}
 _ONE_RIG = {"cmu_daz", "cmu_expmap", "gazebo_actors", "snu_tiling", "snu_ys2010"}
@@ -47,6 +47,9 @@ TRAINED_ON_PARTLY = {"cmu69", "snu_tiling/wd2(dir 1)", "snu_ys2010", "gazebo_act
 
 _ARMS = [18, 20, 19, 21]  # elbow and wrist, left then right
 _SHARD = 1000
+_STORED = ("poses", "velocity", "ahead", "root", "boxes")
+POSE_UNIT = 1e-4
+"""Poses are stored as whole numbers of these (metres)."""
 
 
 def _wanted(clip: Clip) -> bool:
@@ -98,97 +101,66 @@ def load_motions(folder: Path, split: str) -> list[Motion]:
     return motions
 
 
-def _approaches(motions: list[Motion]) -> list[Motion]:
-    """Composed motions that walk up to a seat (see ``compose``), from every sit-down and its mirror image."""
-    rng = np.random.default_rng(11)
-    walks = [m for m in motions if m.category in _WALK and len(m.joints) > 60 and m.valid.all()]
-    made = []
-    for m in motions:
-        if m.category not in _SIT or not m.rests or m.source in _ARMS_RAISED or not walks:
-            continue
-        entry = entrance(m.joints, m.rests[0].start)
-        if entry is None:
-            continue
-        for sit in (m.joints, mirrored(m.joints)):
-            kept = 0
-            for k in rng.permutation(len(walks))[:_TRIES]:
-                at = matches(walks[k].joints, sit[entry : entry + 1])
-                if at is None or kept == _JOINS:
-                    continue
-                whole = joined(walks[k].joints, at, sit, entry)
-                motion = motion_of(f"{walks[k].name} + {m.name}", _COMPOSED, m.subject, m.category, whole)
-                if motion.rests:
-                    made.append(motion)
-                    kept += 1
-    return made
+def _captured(motions: list[Motion]) -> dict[str, list[tuple[int, int, float]]]:
+    """Moments of captured motions to draw windows around: kind → (motion, frame, weight)."""
+    found: dict[str, list[tuple[int, int, float]]] = defaultdict(list)
+    for i, m in enumerate(motions):
+        if m.category in _SIT:
+            height = m.joints[:, 0, 2]
+            moving = np.abs(np.gradient(height)) * 30 > 0.12
+            for rest in m.rests:
+                near = np.arange(max(0, rest.start - 75), min(len(height), rest.end + 75))
+                down = near[moving[near]]
+                weight = _WEIGHT.get(m.source, 1.0)
+                found["descend"] += [(i, int(f), weight / len(down)) for f in down]
+                found["sit"] += [(i, int(f), 1.0) for f in range(rest.start, rest.end, 10)]
+        elif m.category in _WALK | _STAND:
+            kind = "walk" if m.category in _WALK else "stand"
+            weight = 0.1 if m.source == "reactidle" else 1.0
+            found[kind] += [(i, f, weight) for f in range(0, len(m.joints), 10)]
+    return found
 
 
-class _Draws:
-    """Where to draw from: weights by kind of moment, clips in proportion to what they hold of it."""
-
-    def __init__(self, motions: list[Motion]) -> None:
-        self.motions = motions = motions + _approaches(motions)
-        self.focus: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-        found: dict[str, list[tuple[int, int, float]]] = {kind: [] for kind in _SHARES}
-        for i, m in enumerate(motions):
-            if m.source == _COMPOSED:
-                found["approach"] += [(i, f, 1.0) for f in range(60, m.rests[0].start + 10, 5)]
-            elif m.category in _SIT:
-                if not m.rests:
-                    continue
-                height = m.joints[:, 0, 2]
-                moving = np.abs(np.gradient(height)) * 30 > 0.12
-                for rest in m.rests:
-                    near = np.arange(max(0, rest.start - 75), min(len(height), rest.end + 75))
-                    down = near[moving[near]]
-                    weight = _WEIGHT.get(m.source, 1.0)
-                    if len(down):
-                        found["descend"] += [(i, int(f), weight / len(down)) for f in down]
-                    found["sit"] += [(i, int(f), 1.0) for f in range(rest.start, rest.end, 10)]
-            else:
-                kind = "walk" if m.category in _WALK else "stand"
-                weight = 0.1 if m.source == "reactidle" else 1.0
-                found[kind] += [(i, f, weight) for f in range(0, len(m.joints), 10)]
-        for kind, rows in found.items():
-            if rows:
-                table = np.array(rows)
-                self.focus[kind] = (table[:, :2].astype(int), table[:, 2] / table[:, 2].sum())
-
-    def sample(self, rng: np.random.Generator) -> tuple[str, Window]:
-        kinds = list(self.focus)
-        share = np.array([_SHARES[k] for k in kinds])
-        while True:
-            kind = kinds[rng.choice(len(kinds), p=share / share.sum())]
-            rows, weight = self.focus[kind]
-            clip, frame = rows[rng.choice(len(rows), p=weight)]
-            window = draw(rng, self.motions[clip], int(frame))
-            if window is not None:
-                return kind, window
+def _draws(motions: list[Motion]) -> tuple[list[Motion], Draws]:
+    """Captured motions and those composed of them, with the moments of each kind in proportion to what there is of it."""
+    found = _captured(motions)
+    for made in composed(motions):
+        found[made.kind] += [(len(motions), int(f), 1.0 / len(made.focus)) for f in made.focus]
+        motions = [*motions, made.motion]
+    tables = {kind: np.array(rows) for kind, rows in found.items() if rows}
+    return motions, {kind: (t[:, :2].astype(int), t[:, 2] / t[:, 2].sum()) for kind, t in tables.items()}
 
 
-_draws: _Draws | None = None
+def sample(rng: np.random.Generator, motions: list[Motion], draws: Draws) -> tuple[str, Window]:
+    """A kind of moment by its share, a moment of that kind, and a window around it."""
+    kinds = [kind for kind in _SHARES if kind in draws]
+    share = np.array([_SHARES[kind] for kind in kinds])
+    while True:
+        kind = kinds[rng.choice(len(kinds), p=share / share.sum())]
+        rows, weight = draws[kind]
+        motion, frame = rows[rng.choice(len(rows), p=weight)]
+        window = draw(rng, motions[motion], int(frame))
+        if window is not None:
+            return kind, window
 
 
-def _start(folder: Path, split: str) -> None:
-    global _draws
-    _draws = _Draws(load_motions(folder, split))
+_known: tuple[list[Motion], Draws]
+
+
+def _start(known: tuple[list[Motion], Draws]) -> None:
+    global _known
+    _known = known
 
 
 def _shard(task: tuple[Path, int, int]) -> Path:
     file, seed, count = task
-    if not file.exists():
-        assert _draws is not None
-        rng = np.random.default_rng(seed)
-        kinds, windows = zip(*(_draws.sample(rng) for _ in range(count)), strict=True)
-        part = file.with_suffix(".part.npz")
-        np.savez_compressed(
-            part,
-            poses=np.stack([w.poses for w in windows]),
-            velocity=np.stack([w.velocity for w in windows]),
-            occupancy=np.stack([w.occupancy for w in windows]),
-            kinds=np.array(kinds),
-        )
-        part.rename(file)
+    rng = np.random.default_rng(seed)
+    kinds, windows = zip(*(sample(rng, *_known) for _ in range(count)), strict=True)
+    part = file.with_suffix(".part.npz")
+    arrays = {name: np.stack([getattr(w, name) for w in windows]).astype(np.float32) for name in _STORED}
+    arrays["poses"] = np.round(arrays["poses"] / POSE_UNIT).astype(np.int16)
+    np.savez(part, kinds=np.array(kinds), **arrays)
+    part.rename(file)
     return file
 
 
@@ -196,25 +168,31 @@ def prepare(
     folder: Path, out: Path, windows: int = 12000, processes: int = 1, seed: int = 0,
     progress: Callable[[float], None] = lambda _: None,
 ) -> None:
-    """Make (or go on making) the dataset ``out`` from the motion files in ``folder``. Finished shards are kept."""
+    """Make (or go on making) the dataset ``out`` from the motion files in ``folder``. What is finished is kept."""
     out.mkdir(parents=True, exist_ok=True)
-    shards = max(1, windows // _SHARD)
-    train = [(out / f"pool-{i:03d}.npz", seed * 1000 + i, min(_SHARD, windows)) for i in range(shards)]
+    size = min(_SHARD, windows)
+    train = [(out / f"pool-{i:04d}.npz", seed * 10000 + i, size) for i in range(max(1, windows // _SHARD))]
+    described: dict[str, Any] = {"windows": size * len(train), "shares": _SHARES, "composed": _COMPOSITION}
+    done = 0
     for split, tasks in (("test", [(out / "held.npz", 99, min(600, windows))]), ("train", train)):
-        with Pool(processes, _start, (folder, split)) as pool:
-            for done, _ in enumerate(pool.imap_unordered(_shard, tasks)):
-                progress((done + 1) / len(tasks))
-    used = {f"{m.source}/{m.subject}" for m in load_motions(folder, "train")}
-    held = {f"{m.source}/{m.subject}" for m in load_motions(folder, "test")}
-    described = {
-        "windows": sum(count for _, _, count in train), "train": sorted(used), "held_out": sorted(held), "shares": _SHARES,
-        "composed": _COMPOSITION,
-    }
+        file = out / f"{split}.npz"
+        if not file.exists():
+            write_motions(file, *_draws(load_motions(folder, split)))
+        known = read_motions(file)
+        described["train" if split == "train" else "held_out"] = sorted(
+            {f"{m.source}/{m.subject}" for m in known[0] if m.source != COMPOSED}
+        )
+        missing = [task for task in tasks if not task[0].exists()]
+        # Forked: the motions are read once and shared by all.
+        with multiprocessing.get_context("fork").Pool(processes, _start, (known,)) as pool:
+            for k, _ in enumerate(pool.imap_unordered(_shard, missing)):
+                progress((done + k + 1) / (1 + len(train)))
+        done += len(tasks)
     (out / "dataset.json").write_text(json.dumps(described, indent=1))
 
 
-def load_pool(files: Iterator[Path] | list[Path]) -> dict[str, np.ndarray]:
-    """The windows of several shards, joined: poses (N, 80, 66), velocity (N, 80, 3), occupancy (N, 70, 2640) uint8, kinds."""
+def load_pool(files: Iterable[Path]) -> dict[str, np.ndarray]:
+    """The windows of several shards, joined: the fields of ``Window`` (N, …), poses in ``POSE_UNIT``s, and kinds (N,)."""
     parts = []
     for file in files:
         with np.load(file) as z:

@@ -8,18 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.root import RootPath, root_from_joints, smoothed, to_root, velocities
+from ..core.root import RootPath, ahead, root_from_joints, smoothed, to_root, velocities
 from ..core.rotations import normalised
 from ..core.skeleton import MIRROR, joint
-from . import boxes as box_module
+from .boxes import near
 from .canonical import pose_legs
-from .furniture import Rest, probes, resting, scattered, seat_for
+from .furniture import Rest, furnished, resting
 
-__all__ = ["HISTORY", "LENGTH", "Motion", "Window", "motion_of", "draw", "seats_for", "mirrored", "at_seat_height"]
+__all__ = ["COMPOSED", "HISTORY", "LENGTH", "Motion", "Window", "motion_of", "draw", "mirrored", "at_seat_height"]
 
 HISTORY, LENGTH = 10, 70
+COMPOSED = "composed"
+"""Source of motions that nobody did in one piece."""
 _FRAMES = HISTORY + LENGTH
-_MARGIN = 24
+_MARGIN = 32  # the root is smoothed over 24 frames and known 30 ahead
 _HOLD = 45
 _LOWEST, _HIGHEST = 0.40, 0.82  # resting pelvis, metres: seats of 0.28 to 0.70
 _LEGS = [joint(s + n) for s in ("left_", "right_") for n in ("ankle", "foot")]
@@ -40,11 +42,15 @@ class Motion:
 
 @dataclass(frozen=True)
 class Window:
-    """``poses`` (80, 66) in each frame's root, ``velocity`` (80, 3), ``occupancy`` (70, 2640) uint8 of the last 70 frames."""
+    """``poses`` (80, 66) in each frame's root, ``velocity`` (80, 3); of the last 70 frames: ``ahead`` (70, 18) and ``root``
+    (70, 3), its place x, y and yaw in the world of ``boxes`` (``boxes.MOST``, 7). Metres, radians.
+    """
 
     poses: np.ndarray
     velocity: np.ndarray
-    occupancy: np.ndarray
+    ahead: np.ndarray
+    root: np.ndarray
+    boxes: np.ndarray
 
 
 def _held(joints: np.ndarray) -> np.ndarray:
@@ -112,16 +118,6 @@ def _animated_by_hand(rng: np.random.Generator, path: RootPath) -> RootPath:
     return path
 
 
-def seats_for(rng: np.random.Generator, rests: list[Rest], points: np.ndarray) -> list[np.ndarray]:
-    """A seat for every place of rest (places within 0.25 m share one); empty where one cannot be had."""
-    places: list[Rest] = []
-    for rest in rests:
-        if all(np.linalg.norm(rest.position - other.position) > 0.25 for other in places):
-            places.append(rest)
-    seats = [seat_for(rng, place, points) for place in places]
-    return [] if any(seat is None for seat in seats) else [seat for seat in seats if seat is not None]
-
-
 def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> Window | None:
     """One augmented, furnished window, around frame ``focus`` where given; None where this draw cannot be used."""
     total = len(motion.joints)
@@ -150,24 +146,18 @@ def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> 
     if rng.random() < 0.5:
         joints = mirrored(joints)
     path = root_from_joints(joints)
-    points = probes(joints)
-    furniture = [box_module.NO_BOXES]
-    if seated:
-        seats = seats_for(rng, resting(joints, path), points)
-        if not seats:
-            return None
-        furniture += seats
-    if rng.random() < 0.8:
-        furniture.append(scattered(rng, points, path, int(rng.integers(1, 5))))
+    boxes, _ = furnished(rng, joints, path)
+    if boxes is None:
+        return None
     if rng.random() < 0.5:
         path = _animated_by_hand(rng, path)
     first = round((start - low) / speed)
     cut = slice(min(first, len(joints) - _FRAMES), min(first, len(joints) - _FRAMES) + _FRAMES)
     poses = to_root(path, joints)[cut].reshape(_FRAMES, -1)
     recent = RootPath(path.position[cut][HISTORY:], path.yaw[cut][HISTORY:])
-    occupancy = box_module.occupancy(np.concatenate(furniture), recent)
+    root = np.concatenate([recent.position[:, :2], recent.yaw[:, None]], axis=1)
     return Window(
-        poses.astype(np.float32), velocities(path)[cut].astype(np.float32), np.round(occupancy * 255).astype(np.uint8)
+        poses, velocities(path)[cut], ahead(path)[cut][HISTORY:], root, near(boxes, recent)
     )
 
 

@@ -132,11 +132,9 @@ class PartFlow(nn.Module):
         each = [torch.cat([condition, encoder(occupancy)], dim=-1) for encoder in self.encoders]
         return each * (len(self.norms) // len(each))
 
-    def forward(
-        self, x: Tensor, condition: Tensor, occupancy: Tensor, states: list[LSTMState] | None = None,
-        initialise: bool = False,
+    def _to_noise(
+        self, x: Tensor, conditions: list[Tensor], states: list[LSTMState] | None, initialise: bool = False
     ) -> tuple[Tensor, Tensor, list[LSTMState]]:
-        conditions = self._conditions(condition, occupancy)
         total = x.new_zeros(x.shape[:-1])
         after = []
         for k, (norm, linear, coupling) in enumerate(self.steps()):
@@ -149,10 +147,9 @@ class PartFlow(nn.Module):
             after.append(state)
         return x, total, after
 
-    def inverse(
-        self, z: Tensor, condition: Tensor, occupancy: Tensor, states: list[LSTMState] | None = None
+    def _to_pose(
+        self, z: Tensor, conditions: list[Tensor], states: list[LSTMState] | None
     ) -> tuple[Tensor, list[LSTMState]]:
-        conditions = self._conditions(condition, occupancy)
         after: list[LSTMState] = []
         for k, (norm, linear, coupling) in reversed(list(enumerate(self.steps()))):
             z, state = coupling.inverse(z, conditions[k], None if states is None else states[k])
@@ -160,10 +157,40 @@ class PartFlow(nn.Module):
             after.insert(0, state)
         return z, after
 
+    def forward(
+        self, x: Tensor, condition: Tensor, occupancy: Tensor, states: list[LSTMState] | None = None,
+        initialise: bool = False,
+    ) -> tuple[Tensor, Tensor, list[LSTMState]]:
+        return self._to_noise(x, self._conditions(condition, occupancy), states, initialise)
+
+    def inverse(
+        self, z: Tensor, condition: Tensor, occupancy: Tensor, states: list[LSTMState] | None = None
+    ) -> tuple[Tensor, list[LSTMState]]:
+        return self._to_pose(z, self._conditions(condition, occupancy), states)
+
     def log_likelihood(self, x: Tensor, condition: Tensor, occupancy: Tensor, initialise: bool = False) -> Tensor:
         """Log density (B, T) in standardised units (equation 2)."""
         z, log_det, _ = self(x, condition, occupancy, initialise=initialise)
-        return -0.5 * (z.square() + math.log(2.0 * math.pi)).sum(-1) + log_det
+        return _log_density(z, log_det)
+
+    def run_on(
+        self, x: Tensor, condition: Tensor, occupancy: Tensor, z: Tensor, kept: int
+    ) -> tuple[Tensor, Tensor]:
+        """Log density (B, T) of ``x``, and what the noise ``z`` (B, size), held constant, makes of the frames after the first
+        ``kept`` (B, T − kept, size), with the memory that those have left.
+
+        No pose enters the flow but through its memory, so making all frames costs what measuring them does.
+        """
+        conditions = self._conditions(condition, occupancy)
+        before, after = [c[:, :kept] for c in conditions], [c[:, kept:] for c in conditions]
+        z_before, det_before, states = self._to_noise(x[:, :kept], before, None)
+        z_after, det_after, _ = self._to_noise(x[:, kept:], after, states)
+        made, _ = self._to_pose(z[:, None].expand(-1, x.shape[1] - kept, -1), after, states)
+        return torch.cat([_log_density(z_before, det_before), _log_density(z_after, det_after)], dim=1), made
+
+
+def _log_density(z: Tensor, log_det: Tensor) -> Tensor:
+    return -0.5 * (z.square() + math.log(2.0 * math.pi)).sum(-1) + log_det
 
 
 class EnvironmentEncoder(nn.Module):

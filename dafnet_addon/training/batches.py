@@ -1,57 +1,63 @@
-"""Training windows as standardised tensors: statistics, conditions, and the observation modes drawn for each window."""
+"""Training windows as standardised tensors: the pool they are drawn from, what the sensor sees, the modes drawn for each."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from ..core.sampler import model_order
+from ..core.sensor import RADIUS, REACH, SPHERES
 from ..core.skeleton import END_EFFECTORS, MODEL_ORDER, UPPER
-from ..model.config import UPPER_SIZE
+from ..data.prepare import POSE_UNIT, load_pool
+from ..model.config import UPPER_SIZE, ModelConfig
 
-__all__ = ["Statistics", "Batch", "batch_of", "past_of", "observation_for"]
+__all__ = ["Statistics", "Pool", "Batch", "past_of", "observation_for", "occupancy_of"]
 
 _EFFECTORS = [MODEL_ORDER.index(j) for j in END_EFFECTORS.values()]
 _PELVIS = MODEL_ORDER.index(0)
 NOISE = 0.003
 """Dequantisation (metres): constant bone lengths would else make the likelihood unbounded."""
 _SEGMENTS = 4
+_FREE, _EE, _FULL = range(3)
 
 
 @dataclass(frozen=True)
 class Statistics:
-    """Mean and deviation of poses (66, upper first) and velocities (3); deviations floored."""
+    """Mean and deviation of poses (66, upper first), velocities (3) and the way ahead (18); deviations floored."""
 
     pose_mean: np.ndarray
     pose_std: np.ndarray
     velocity_mean: np.ndarray
     velocity_std: np.ndarray
+    ahead_mean: np.ndarray
+    ahead_std: np.ndarray
 
     @staticmethod
-    def of(poses: np.ndarray, velocity: np.ndarray) -> "Statistics":
-        flat, speed = model_order(poses.reshape(-1, 66)).astype(float), velocity.reshape(-1, 3).astype(float)
+    def of(poses: np.ndarray, velocity: np.ndarray, ahead: np.ndarray) -> "Statistics":
+        """Of poses (…, 66) in SMPL order, metres, velocities (…, 3) and ways ahead (…, 18)."""
+        flat = model_order(poses.reshape(-1, 66)).astype(float)
+        speed, way = (a.reshape(-1, a.shape[-1]).astype(float) for a in (velocity, ahead))
         return Statistics(
-            flat.mean(0), np.maximum(flat.std(0), 0.01), speed.mean(0), np.maximum(speed.std(0), 1e-3)
+            flat.mean(0), np.maximum(flat.std(0), 0.01), speed.mean(0), np.maximum(speed.std(0), 1e-3),
+            way.mean(0), np.maximum(way.std(0), 1e-2),
         )
-
-    def poses(self, poses: np.ndarray) -> np.ndarray:
-        """Standardised poses, upper first, of poses (…, 66) in SMPL order."""
-        return (model_order(poses) - self.pose_mean) / self.pose_std
-
-    def velocities(self, velocity: np.ndarray) -> np.ndarray:
-        return (velocity - self.velocity_mean) / self.velocity_std
 
 
 @dataclass(frozen=True)
 class Batch:
-    """``past`` (B, T, 693); ``upper`` (B, T, 42), ``lower`` (B, T, 24); ``velocity`` (B, T, 3); ``occupancy`` (B, T, 2640)."""
+    """``past`` (B, T, 693); ``upper`` (B, T, 42), ``lower`` (B, T, 24); ``root`` (B, T, 3 [+ 18]): velocity and way ahead, all
+    standardised; ``occupancy`` (B, T, 2640); ``step`` (B, T, 3): the velocity in metres and radians.
+    """
 
     past: Tensor
     upper: Tensor
     lower: Tensor
-    velocity: Tensor
+    root: Tensor
     occupancy: Tensor
+    step: Tensor
 
 
 def past_of(poses: Tensor, velocity: Tensor, history: int) -> Tensor:
@@ -64,46 +70,117 @@ def past_of(poses: Tensor, velocity: Tensor, history: int) -> Tensor:
     return torch.cat(past + [velocity[:, k : k + frames] for k in range(history + 1)], dim=-1)
 
 
-def batch_of(pool: dict[str, np.ndarray], rows: np.ndarray, statistics: Statistics, history: int) -> Batch:
-    """Windows ``rows`` of a pool, poses with dequantisation noise."""
-    poses = torch.from_numpy(statistics.poses(pool["poses"][rows]).astype(np.float32))
-    velocity = torch.from_numpy(statistics.velocities(pool["velocity"][rows]).astype(np.float32))
-    noise = torch.from_numpy((NOISE / statistics.pose_std).astype(np.float32))
-    poses = poses + torch.randn_like(poses) * noise
-    occupancy = torch.from_numpy(pool["occupancy"][rows]).float().div_(255.0)
-    now = poses[:, history:]
-    return Batch(
-        past_of(poses, velocity, history), now[..., :UPPER_SIZE], now[..., UPPER_SIZE:], velocity[:, history:], occupancy
-    )
+class Pool:
+    """Windows of a dataset on a device. New shards may be written while training goes on: ``refresh`` takes them in."""
+
+    def __init__(self, files: Callable[[], Sequence[Path]], device: torch.device) -> None:
+        self.files, self.device = files, device
+        self.known: set[Path] = set()
+        self.arrays: dict[str, Tensor] = {}
+        self.refresh()
+
+    def __len__(self) -> int:
+        return len(self.arrays["poses"]) if self.arrays else 0
+
+    def refresh(self) -> None:
+        """Read the shards that were not there before."""
+        new = [file for file in self.files() if file not in self.known]
+        if new:
+            read = load_pool(new)
+            fresh = {name: torch.from_numpy(a).to(self.device) for name, a in read.items() if name != "kinds"}
+            self.arrays = {name: torch.cat([self.arrays[name], a]) if self.arrays else a for name, a in fresh.items()}
+            self.known.update(new)
+
+    def statistics(self) -> Statistics:
+        """Means and deviations over the windows that are there."""
+        poses, velocity, ahead = (self.arrays[name].cpu().numpy() for name in ("poses", "velocity", "ahead"))
+        return Statistics.of(poses * POSE_UNIT, velocity, ahead)
+
+    def batch(self, rows: Tensor, statistics: Statistics, config: ModelConfig) -> Batch:
+        """Windows ``rows``, poses with dequantisation noise."""
+        mean, std, v_mean, v_std, a_mean, a_std = (
+            torch.as_tensor(getattr(statistics, name), dtype=torch.float32, device=self.device)
+            for name in ("pose_mean", "pose_std", "velocity_mean", "velocity_std", "ahead_mean", "ahead_std")
+        )
+        a, history = self.arrays, config.history
+        order = torch.as_tensor(model_order(np.arange(66)), device=self.device)
+        poses = a["poses"][rows].float()[..., order] * POSE_UNIT
+        poses = (poses + NOISE * torch.randn_like(poses) - mean) / std
+        step = a["velocity"][rows]
+        velocity = (step - v_mean) / v_std
+        way = ((a["ahead"][rows] - a_mean) / a_std)[..., : config.ahead]
+        now = poses[:, history:]
+        return Batch(
+            past_of(poses, velocity, history), now[..., :UPPER_SIZE], now[..., UPPER_SIZE:],
+            torch.cat([velocity[:, history:], way], dim=-1), occupancy_of(a["boxes"][rows], a["root"][rows]), step[:, history:],
+        )
 
 
-def _given(rng: np.random.Generator, mode: str) -> np.ndarray:
-    """Which of the 22 joints (upper first) a mode gives. EE: any subset; FULL: with or without the pelvis."""
-    given = np.zeros(22, dtype=np.float32)
-    if mode == "EE":
-        chosen = rng.random(3) < 0.6
-        chosen[rng.integers(3)] = True
-        given[np.array(_EFFECTORS)[chosen]] = 1.0
-    elif mode == "FULL":
-        given[: len(UPPER)] = 1.0
-        given[_PELVIS] = float(rng.random() < 0.5)
-    return given
+def occupancy_of(boxes: Tensor, root: Tensor) -> Tensor:
+    """What the sensor sees of upright ``boxes`` (B, M, 7) from ``root`` (B, T, 3): x, y, yaw. Occupancy (B, T, 2640).
+
+    Equal to ``data.boxes.occupancy``. Boxes out of the sensor's reach cost nothing; both boxes and sensor being upright, the
+    distance is one in the plane and one in height.
+    """
+    windows, frames, _ = root.shape
+    spheres = torch.as_tensor(SPHERES, dtype=root.dtype, device=root.device)
+    layers = len(spheres) // int((spheres[:, 2] == 0).sum())
+    disc, heights = spheres[: len(spheres) // layers, :2], spheres[:: len(spheres) // layers, 2]
+    between = boxes[:, None, :, :2] - root[:, :, None, :2]
+    reach = REACH + RADIUS + boxes[..., 3:5].norm(dim=-1)
+    window, frame, which = torch.nonzero(between.norm(dim=-1) < reach[:, None], as_tuple=True)
+    seen, yaw = boxes[window, which], root[window, frame, 2]
+    # Sensor points in each box's own frame, in the plane.
+    turn, own = (seen[:, 6] - yaw)[:, None], seen[:, 6][:, None]
+    offset = between[window, frame, which]
+    x = turn.cos() * disc[:, 0] + turn.sin() * disc[:, 1] - (own.cos() * offset[:, :1] + own.sin() * offset[:, 1:])
+    y = -turn.sin() * disc[:, 0] + turn.cos() * disc[:, 1] - (-own.sin() * offset[:, :1] + own.cos() * offset[:, 1:])
+    qx, qy = x.abs() - seen[:, 3:4], y.abs() - seen[:, 4:5]
+    outside = torch.hypot(qx.clamp_min(0), qy.clamp_min(0))
+    row, spot = torch.nonzero(outside < RADIUS, as_tuple=True)
+    plane_out, plane_in = outside[row, spot][:, None], torch.maximum(qx, qy)[row, spot][:, None].clamp_max(0)
+    above = ((heights - seen[:, 2:3]).abs() - seen[:, 5:6])[row]
+    distance = torch.hypot(plane_out, above.clamp_min(0))
+    distance = torch.where((plane_out == 0) & (above <= 0), torch.maximum(plane_in, above), distance)
+    value = (1 - distance / RADIUS).clamp(0, 1)
+    place = (window * frames + frame)[row][:, None] * len(spheres) + torch.arange(layers, device=root.device) * len(disc)
+    out = torch.zeros(windows * frames * len(spheres), dtype=root.dtype, device=root.device)
+    out.scatter_reduce_(0, (place + spot[:, None]).reshape(-1), value.reshape(-1), "amax")
+    return out.reshape(windows, frames, -1)
 
 
-def observation_for(rng: np.random.Generator, upper: Tensor) -> tuple[Tensor, Tensor]:
+def _modes(windows: int, device: torch.device) -> Tensor:
+    """The mode of each of four segments (B, 4): one throughout in 60 % of the windows, FREE foremost, else all of them."""
+    one = torch.multinomial(torch.tensor([0.55, 0.33, 0.12], device=device), windows, replacement=True)[:, None]
+    order = torch.rand(windows, _SEGMENTS, device=device).argsort(1)
+    fourth = torch.randint(_FREE, _FULL, (windows, 1), device=device)
+    shuffled = torch.where(order == 3, fourth, order)
+    return torch.where(torch.rand(windows, 1, device=device) < 0.6, one, shuffled)
+
+
+def observation_for(upper: Tensor) -> tuple[Tensor, Tensor]:
     """A random observation (B, T, 66) of the true upper bodies (B, T, 42), and its mask (B, T, 22).
 
-    Half of the windows hold one mode throughout, FREE foremost; the others change mode between four segments.
+    In EE any subset of head and hands is given, in FULL the upper body with or without the pelvis. The mode may change
+    between four segments of a window, as the author's code has it.
     """
     windows, frames, _ = upper.shape
-    given = np.zeros((windows, frames, 22), dtype=np.float32)
-    for w in range(windows):
-        if rng.random() < 0.6:
-            given[w] = _given(rng, rng.choice(["FREE", "EE", "FULL"], p=[0.55, 0.33, 0.12]))
-            continue
-        modes = rng.permutation(["FREE", "EE", "FULL", rng.choice(["FREE", "EE"])])
-        for mode, part in zip(modes, np.array_split(np.arange(frames), _SEGMENTS), strict=True):
-            given[w, part] = _given(rng, mode)
-    mask = torch.from_numpy(given)
-    whole = torch.cat([upper, torch.zeros(windows, frames, 24)], dim=-1)
+    device = upper.device
+    modes = _modes(windows, device)
+    chosen = torch.rand(windows, _SEGMENTS, 3, device=device) < 0.6
+    chosen |= torch.rand(windows, _SEGMENTS, 3, device=device).argsort(-1) == 0
+    with_pelvis = torch.rand(windows, _SEGMENTS, device=device) < 0.5
+    # A mode that lasts gives the same joints all along.
+    lasts = (modes == modes[:, :1]).all(1)[:, None]
+    chosen = torch.where(lasts[..., None], chosen[:, :1], chosen)
+    with_pelvis = torch.where(lasts, with_pelvis[:, :1], with_pelvis)
+    given = torch.zeros(windows, _SEGMENTS, 22, device=device)
+    given[..., _EFFECTORS] = (chosen & (modes == _EE)[..., None]).float()
+    full = (modes == _FULL)[..., None]
+    body = torch.ones(len(UPPER), device=device).repeat(windows, _SEGMENTS, 1)
+    body[..., _PELVIS] = with_pelvis.float()
+    given[..., : len(UPPER)] = torch.where(full, body, given[..., : len(UPPER)])
+    segment = torch.arange(frames, device=device) * _SEGMENTS // frames
+    mask = given[:, segment]
+    whole = torch.nn.functional.pad(upper, (0, 24))
     return whole * mask.repeat_interleave(3, dim=-1), mask

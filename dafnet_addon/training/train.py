@@ -15,16 +15,15 @@ from concurrent.futures import ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import nn
 
 from ..core.errors import InputError
-from ..data.prepare import load_pool
-from ..model.config import PAPER, POSE_SIZE, SMALL, ModelConfig
+from ..model.config import LOWER_SIZE, PAPER, POSE_SIZE, SMALL, UPPER_SIZE, ModelConfig
 from ..model.flow import TwoPartFlow
 from ..model.predictor import GMVAE, ActionPredictor, gumbel_temperature
-from .batches import Batch, Statistics, batch_of, observation_for
+from .batches import Batch, Pool, Statistics, observation_for
+from .free_run import lower_loss, upper_loss
 
 __all__ = ["TrainingConfig", "read_config", "Run", "account", "train", "train_part", "trained"]
 
@@ -35,7 +34,8 @@ class TrainingConfig:
     along a cosine to ``final``. ``slot_dropout``: share of past-pose slots hidden from the predictor while it learns.
     ``environment_dropout``: share of sensor values hidden from both, in a share ``dropout_windows`` of the windows (the paper
     hides them in all; then only whole layers of spheres are told apart, and seats are met to 12 cm). ``clip_norm``: largest
-    gradient norm.
+    gradient norm. ``free_run``: weight of the losses of motion that the flow makes by itself (see ``free_run``; 0 as in the
+    paper), which begins after ``captured`` frames of a window; ``calm`` of the windows make it from z = 0.
     """
 
     minutes_predictor: float = 5.0
@@ -48,6 +48,9 @@ class TrainingConfig:
     environment_dropout: float = 0.5
     dropout_windows: float = 0.5
     clip_norm: float = 50.0
+    free_run: float = 0.0
+    captured: int = 20
+    calm: float = 0.5
     save_every: int = 100
     seed: int = 0
 
@@ -75,14 +78,17 @@ class Run:
     have nothing in common, and are trained as two runs, side by side where there are two cores.
     """
 
-    def __init__(self, part: str, folder: Path, model: ModelConfig, config: TrainingConfig, statistics: Statistics) -> None:
+    def __init__(
+        self, part: str, folder: Path, model: ModelConfig, config: TrainingConfig, statistics: Statistics,
+        device: str = "cpu",
+    ) -> None:
         torch.manual_seed(config.seed)
         self.part, self.folder, self.model, self.config, self.statistics = part, folder, model, config, statistics
-        self.gmvae, self.flow = GMVAE(model), TwoPartFlow(model)
+        self.device = torch.device(device)
+        self.gmvae, self.flow = GMVAE(model).to(self.device), TwoPartFlow(model).to(self.device)
         self.network: nn.Module = self.gmvae if part == "predictor" else getattr(self.flow, part)
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=config.peak)
         self.step, self.seconds = 0, 0.0
-        self.rng = np.random.default_rng(config.seed)
 
     @property
     def budget(self) -> float:
@@ -99,26 +105,25 @@ class Run:
         state = {
             "model": self.model.as_dict(), "config": asdict(self.config), "statistics": asdict(self.statistics),
             "network": self.network.state_dict(), "optimiser": self.optimiser.state_dict(), "step": self.step,
-            "seconds": self.seconds, "rng": self.rng.bit_generator.state, "torch": torch.get_rng_state(),
+            "seconds": self.seconds, "generators": _generators(self.device),
         }
         part = self.folder / f"{self.part}.part"
         torch.save(state, part)
         part.rename(self.folder / f"{self.part}.pt")
 
     @staticmethod
-    def load(part: str, folder: Path, config: TrainingConfig | None = None) -> "Run":
+    def load(part: str, folder: Path, config: TrainingConfig | None = None, device: str = "cpu") -> "Run":
         """The run saved in ``folder``; ``config`` replaces its settings, a longer budget for example."""
         # The checkpoint is the trainer's own file, holding optimiser and generator states; weights that ship are never pickled.
-        state = torch.load(folder / f"{part}.pt", weights_only=False)
+        state = torch.load(folder / f"{part}.pt", weights_only=False, map_location="cpu")
         run = Run(
             part, folder, ModelConfig(**state["model"]), config or TrainingConfig(**state["config"]),
-            Statistics(**state["statistics"]),
+            Statistics(**state["statistics"]), device,
         )
         run.network.load_state_dict(state["network"])
         run.optimiser.load_state_dict(state["optimiser"])
         run.step, run.seconds = state["step"], state["seconds"]
-        run.rng.bit_generator.state = state["rng"]
-        torch.set_rng_state(state["torch"])
+        _set_generators(state["generators"], run.device)
         return run
 
     def rate(self) -> float:
@@ -128,106 +133,151 @@ class Run:
 
     def hidden(self, occupancy: torch.Tensor) -> torch.Tensor:
         """Occupancy (B, …, 2640) with a share of its values dropped (paper, Appendix A); nothing is rescaled."""
-        spared = torch.rand(len(occupancy), *[1] * (occupancy.ndim - 1)) >= self.config.dropout_windows
+        spared = torch.rand(len(occupancy), *[1] * (occupancy.ndim - 1), device=self.device) >= self.config.dropout_windows
         return occupancy * (spared | (torch.rand_like(occupancy) >= self.config.environment_dropout))
 
     def loss(self, batch: Batch, initialise: bool = False) -> torch.Tensor:
-        """The GMVAE's loss, or the part's negative log-likelihood a frame with the predictor frozen."""
+        """The GMVAE's loss, or the part's negative log-likelihood a frame with the predictor frozen, and its free run's."""
         if self.part == "predictor":
             # Neighbouring frames say nearly the same: every fifth is plenty for a network without memory.
             past, occupancy = batch.past[:, ::5].flatten(0, 1), batch.occupancy[:, ::5].flatten(0, 1)
             poses = self.model.history * POSE_SIZE
             seen = past.clone()
-            seen[:, :poses] *= torch.rand(len(past), poses) >= self.config.slot_dropout
+            seen[:, :poses] *= torch.rand(len(past), poses, device=self.device) >= self.config.slot_dropout
             return self.gmvae.losses(past, seen, self.hidden(occupancy), gumbel_temperature(self.share)).total
         occupancy = self.hidden(batch.occupancy)
         with torch.no_grad():
             actions = self.gmvae.predictor(batch.past, occupancy)
-        observation, given = observation_for(self.rng, batch.upper)
-        base = torch.cat([actions, batch.velocity], dim=-1)
+        observation, given = observation_for(batch.upper)
+        base = torch.cat([actions, batch.root], dim=-1)
         if self.part == "upper":
-            condition = self.flow.upper_condition(base, observation, given)
-            return -self.flow.upper.log_likelihood(batch.upper, condition, occupancy, initialise).mean()
-        condition = self.flow.lower_condition(base, observation, given, batch.upper)
-        return -self.flow.lower.log_likelihood(batch.lower, condition, occupancy, initialise).mean()
+            x, part, condition = batch.upper, self.flow.upper, self.flow.upper_condition(base, observation, given)
+        else:
+            x, part = batch.lower, self.flow.lower
+            condition = self.flow.lower_condition(base, observation, given, batch.upper)
+        if initialise or not self.config.free_run:
+            return -part.log_likelihood(x, condition, occupancy, initialise).mean()
+        kept, calm = self.config.captured, torch.rand(len(x), device=self.device) < self.config.calm
+        z = torch.randn(len(x), x.shape[-1], device=self.device) * ~calm[:, None]
+        density, made = part.run_on(x, condition, occupancy, z, kept)
+        own = self._free_run(made, x[:, kept:], calm, batch, given)
+        return -density.mean() + self.config.free_run * own
+
+    def _free_run(
+        self, made: torch.Tensor, true: torch.Tensor, calm: torch.Tensor, batch: Batch, given: torch.Tensor
+    ) -> torch.Tensor:
+        kept, joints = self.config.captured, UPPER_SIZE // 3
+        statistics = self.statistics.pose_mean, self.statistics.pose_std
+        mean, std = (torch.as_tensor(a, dtype=made.dtype, device=made.device) for a in statistics)
+
+        def metres(values: torch.Tensor, which: slice) -> torch.Tensor:
+            return (values * std[which] + mean[which]).unflatten(-1, (-1, 3))
+
+        if self.part == "upper":
+            upper = slice(0, UPPER_SIZE)
+            return upper_loss(metres(made, upper), metres(true, upper), calm, given[:, kept:, :joints])
+        lower = slice(UPPER_SIZE, UPPER_SIZE + LOWER_SIZE)
+        pelvis = metres(batch.upper[:, kept:, :3], slice(0, 3))[..., 0, :]
+        return lower_loss(metres(made, lower), metres(true, lower), calm, pelvis, batch.step[:, kept:])
 
     @torch.no_grad()
-    def held_loss(self, held: dict[str, np.ndarray], windows: int = 50) -> float:
+    def held_loss(self, held: Pool, windows: int = 50) -> float:
         """The loss on unseen bodies, with the same draws each time."""
-        state, rng = torch.get_rng_state(), self.rng
+        state = _generators(self.device)
         torch.manual_seed(1)
-        self.rng = np.random.default_rng(1)
-        rows = np.arange(min(windows, len(held["poses"])))
-        loss = float(self.loss(batch_of(held, rows, self.statistics, self.model.history)))
-        self.rng = rng
-        torch.set_rng_state(state)
+        rows = torch.arange(min(windows, len(held)), device=self.device)
+        loss = float(self.loss(held.batch(rows, self.statistics, self.model)))
+        _set_generators(state, self.device)
         return loss
+
+
+def _generators(device: torch.device) -> dict[str, torch.Tensor]:
+    """States of the generators that draw: the CPU's and the device's."""
+    states = {"cpu": torch.get_rng_state()}
+    if device.type == "cuda":
+        states["cuda"] = torch.cuda.get_rng_state(device)
+    return states
+
+
+def _set_generators(states: dict[str, torch.Tensor], device: torch.device) -> None:
+    torch.set_rng_state(states["cpu"])
+    if device.type == "cuda" and "cuda" in states:
+        torch.cuda.set_rng_state(states["cuda"], device)
 
 
 def train_part(
     part: str, dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig, threads: int | None = None,
-    progress: Callable[[str, float, float], None] = lambda part, share, loss: None,
+    progress: Callable[[str, float, float], None] = lambda part, share, loss: None, device: str = "cpu",
 ) -> Run:
     """Train one part, or go on with it, until its budget is spent. Raises InputError without a dataset.
 
-    A loss that is not a number stops the run with the last good checkpoint kept.
+    A loss that is not a number stops the run with the last good checkpoint kept. Shards that 'prepare' is still writing are
+    taken in as they come.
     """
     if threads is not None:
         torch.set_num_threads(threads)
-    files = sorted(Path(dataset).glob("pool-*.npz"))
-    if not files:
+    torch.backends.cuda.matmul.allow_tf32 = True
+    pool = Pool(lambda: sorted(Path(dataset).glob("pool-????.npz")), torch.device(device))
+    if not len(pool):
         raise InputError(f"The dataset '{dataset}' holds no windows; make it with 'dafnet prepare'.")
-    pool, held = load_pool(files), load_pool([Path(dataset) / "held.npz"])
+    held = Pool(lambda: [Path(dataset) / "held.npz"], torch.device(device))
+    predictor = None if part == "predictor" else Run.load("predictor", folder, device=device)
     if (folder / f"{part}.pt").exists():
-        run = Run.load(part, folder, config)
+        run = Run.load(part, folder, config, device)
     else:
-        run = Run(part, folder, model, config, Statistics.of(pool["poses"], pool["velocity"]))
+        # All parts are standardised alike, whatever shards there were when each began.
+        statistics = pool.statistics() if predictor is None else predictor.statistics
+        run = Run(part, folder, model, config, statistics, device)
         run.save()
-    if part != "predictor":
-        run.gmvae.load_state_dict(Run.load("predictor", folder).network.state_dict())
+    if predictor is not None:
+        run.gmvae.load_state_dict(predictor.network.state_dict())
         run.gmvae.requires_grad_(False)
-    recent: list[float] = []
+    recent: list[torch.Tensor] = []
     while run.share < 1.0:
         begin = time.monotonic()
-        rows = run.rng.integers(0, len(pool["poses"]), config.batch)
-        batch = batch_of(pool, rows, run.statistics, run.model.history)
+        rows = torch.randint(len(pool), (config.batch,), device=run.device)
         for group in run.optimiser.param_groups:
             group["lr"] = run.rate()
-        loss = run.loss(batch, initialise=run.step == 0)
-        if not torch.isfinite(loss):
-            raise InputError(f"The loss of '{part}' is no number at step {run.step}; resume with a lower peak rate.")
+        loss = run.loss(pool.batch(rows, run.statistics, run.model), initialise=run.step == 0)
         run.optimiser.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(run.network.parameters(), config.clip_norm)
         run.optimiser.step()
-        recent.append(float(loss.detach()))
+        recent.append(loss.detach())
         run.step += 1
         run.seconds += time.monotonic() - begin
         if run.step % config.save_every == 0 or run.share >= 1.0:
-            mean = float(np.mean(recent))
+            mean = float(torch.stack(recent).mean())
+            if not math.isfinite(mean):
+                raise InputError(f"The loss of '{part}' is no number by step {run.step}; resume with a lower peak rate.")
             values = {
                 "part": part, "step": run.step, "minutes": run.seconds / 60, "loss": mean, "held_out": run.held_loss(held),
+                "windows": len(pool),
             }
             with (folder / "log.jsonl").open("a") as f:
                 f.write(json.dumps(values) + "\n")
             progress(part, run.share, mean)
             recent.clear()
             run.save()
+            pool.refresh()
     return run
 
 
 def train(
     dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: Callable[[float], None] = lambda share: None, device: str = "cpu",
 ) -> None:
     """Train the predictor, then both parts of the flow in two processes; what a folder holds is gone on with."""
     whole = max(config.minutes_predictor + config.minutes_flow, 1e-9)
     first = config.minutes_predictor / whole
-    train_part("predictor", dataset, folder, model, config, progress=lambda part, share, loss: progress(first * share))
+    report = lambda part, share, loss: progress(first * share)  # noqa: E731
+    train_part("predictor", dataset, folder, model, config, progress=report, device=device)
     threads = max(1, (os.cpu_count() or 2) // 2)
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
         begin = time.monotonic()
-        parts = [pool.submit(train_part, part, dataset, folder, model, config, threads) for part in ("upper", "lower")]
+        parts = [
+            pool.submit(train_part, part, dataset, folder, model, config, threads, device=device) for part in ("upper", "lower")
+        ]
         while wait(parts, timeout=2.0).not_done:
             spent = (time.monotonic() - begin) / max(60.0 * config.minutes_flow, 1e-9)
             progress(first + (1.0 - first) * min(1.0, spent))
