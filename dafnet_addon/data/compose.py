@@ -4,15 +4,20 @@ Sit-downs that somebody walks up to are the scarcest of all captured motion; wal
 stand, are not. Where such a pair would lead through the seat, fitting the seat fails later and the pair is not used.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..core.root import root_from_joints, to_root
 from ..core.rotations import rotate, yaw_matrix
 from ..core.skeleton import joint
 from .canonical import pose_legs
+from .windows import COMPOSED, Motion, mirrored, motion_of
 
-__all__ = ["entrance", "joined", "matches"]
+__all__ = ["Composed", "composed", "entrance", "joined", "matches"]
 
+_WALK = {"locomotion", "walk", "turn", "run", "carry_other", "door"}
+_TRIES, _JOINS = 60, 8  # walks tried and joins kept for each captured sit-down and its mirror image
 _BEFORE = 110  # frames of walking that are kept
 _FADE = 14  # frames in which the difference at the join dies away
 _MATCHED = [
@@ -62,3 +67,35 @@ def joined(walk: np.ndarray, at: int, sit: np.ndarray, entry: int) -> np.ndarray
     fade = (1.0 - t / _FADE) ** 2 * (1.0 + 2.0 * t / _FADE)
     after[: len(t)] += (offset + drift * t) * fade
     return pose_legs(np.concatenate([walk[max(0, at - _BEFORE) : at], after]))
+
+
+@dataclass(frozen=True)
+class Composed:
+    """A composed motion: one word for its ``kind``, and the frames ``focus`` (N,) around which windows are drawn."""
+
+    kind: str
+    motion: Motion
+    focus: np.ndarray
+
+
+def composed(motions: list[Motion]) -> list[Composed]:
+    """Motions that walk up to a seat, from every captured sit-down and its mirror image."""
+    rng = np.random.default_rng(11)
+    walks = [m for m in motions if m.category in _WALK and len(m.joints) > 60 and m.valid.all()]
+    made = []
+    for m in motions:
+        entry = entrance(m.joints, m.rests[0].start) if m.rests and m.source != "ui_prmd" else None
+        if entry is None:
+            continue
+        for sit in (m.joints, mirrored(m.joints)):
+            kept = 0
+            for k in rng.permutation(len(walks))[:_TRIES]:
+                at = matches(walks[k].joints, sit[entry : entry + 1])
+                if at is None or kept == _JOINS:
+                    continue
+                whole = joined(walks[k].joints, at, sit, entry)
+                motion = motion_of(f"{walks[k].name} + {m.name}", COMPOSED, m.subject, m.category, whole)
+                if motion.rests:
+                    made.append(Composed("approach", motion, np.arange(60, motion.rests[0].start + 10, 5)))
+                    kept += 1
+    return made
