@@ -38,13 +38,16 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     from dafnet_addon.training.export import tensors_of
 
     torch.manual_seed(3)
-    config = ModelConfig(predictor_code=8, predictor_width=16, width=12, code=8, shared_encoder=False, mask=True)
+    config = ModelConfig(predictor_code=8, predictor_width=16, width=12, code=8, shared_encoder=False, mask=True, ahead=18)
     flow, predictor = TwoPartFlow(config), ActionPredictor(config)
     with torch.no_grad():
         for p in [*flow.parameters(), *predictor.parameters()]:
             p += 0.05 * torch.randn_like(p)
     rng = np.random.default_rng(0)
-    statistics = Statistics(rng.normal(size=66), rng.uniform(0.1, 0.3, 66), rng.normal(size=3) * 0.01, np.full(3, 0.02))
+    statistics = Statistics(
+        rng.normal(size=66), rng.uniform(0.1, 0.3, 66), rng.normal(size=3) * 0.01, np.full(3, 0.02), rng.normal(size=18) * 0.1,
+        np.full(18, 0.2),
+    )
     flow.double(), predictor.double()
     tensors = tensors_of(flow, predictor, statistics)
     description = {"model": config.as_dict(), "fps": 30, "offsets": OFFSETS.tolist()}
@@ -62,12 +65,19 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
         probabilities = predictor(past, occupancy)
         given = torch.from_numpy(conditions.given).repeat(2, 1, 1)
         scaled = (conditions.observation - tensors["pose_mean"]) / tensors["pose_std"] * np.repeat(conditions.given, 3, -1)
-        base = torch.cat([probabilities, velocity[:, 10:]], -1)
+        way = torch.from_numpy((conditions.ahead - tensors["ahead_mean"]) / tensors["ahead_std"]).repeat(2, 1, 1)
+        base = torch.cat([probabilities, velocity[:, 10:], way], -1)
         observation = torch.from_numpy(scaled).repeat(2, 1, 1)
-        z_upper, z_lower, *_ = flow(poses[..., :42], poses[..., 42:], base, occupancy, observation, given)
+        z_upper, z_lower, det_upper, det_lower = flow(poses[..., :42], poses[..., 42:], base, occupancy, observation, given)
     assert np.abs(actions - probabilities.transpose(0, 1).numpy()).max() < 1e-9
     noise = torch.cat([z_upper, z_lower], -1).numpy()
     assert np.abs(noise - z[:, None]).max() < 1e-8
+    sampler = Sampler(weights, dtype="float64")
+    sampler.start(conditions, takes=2)
+    taken = [sampler.absorb(t, sampler.standardised(made[t])) for t in range(30)]
+    assert max(np.abs(back - z).max() for back, _, _ in taken) < 1e-8
+    log_det = np.stack([d for _, _, d in taken], axis=1)
+    assert np.abs(log_det - (det_upper + det_lower).numpy()).max() < 1e-8
 
 
 @pytest.fixture(scope="module")

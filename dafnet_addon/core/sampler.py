@@ -130,6 +130,7 @@ class _Step:
     offset: Array
     inverse: Array
     inverse_offset: Array
+    log_det: float
     half: int
 
 
@@ -240,7 +241,7 @@ class Sampler:
         return _Step(
             coupling,
             self._to((weight * exponent).T), self._to((bias * exponent) @ weight.T),
-            self._to(inverse.T / exponent), self._to(-bias), half,
+            self._to(inverse.T / exponent), self._to(-bias), float(log_scale.sum() + np.linalg.slogdet(weight)[1]), half,
         )
 
     def standardised(self, poses: np.ndarray) -> np.ndarray:
@@ -308,11 +309,13 @@ class Sampler:
         self._remember(pose)
         return pose, actions
 
-    def absorb(self, index: int, pose: Array) -> tuple[Array, Array]:
-        """Noise (B, 66) and action probabilities of a kept frame: pose to noise, which rebuilds the memory to go on from."""
+    def absorb(self, index: int, pose: Array, actions: Array | None = None) -> tuple[Array, Array, Array]:
+        """Noise (B, 66), action probabilities (B, K) and log-determinant (B,) of a kept frame: pose to noise, which rebuilds the
+        memory to go on from. ``actions`` stand in for the predictor's.
+        """
         xp = self.xp
-        actions = self._act(index)
-        noise = []
+        actions = self._act(index) if actions is None else actions
+        noise, log_det = [], 0.0 * pose.sum(-1)
         upper = pose[:, :_UPPER_SIZE]
         for part, x, extra in ((self._upper, upper, []), (self._lower, pose[:, _UPPER_SIZE:], [upper])):
             for step in part.steps:
@@ -320,9 +323,10 @@ class Sampler:
                 passed = x[:, : step.half]
                 shift, scale = step.coupling(index, xp.concatenate([passed, actions, *extra], axis=-1))
                 x = xp.concatenate([passed, (x[:, step.half :] + shift) * scale], axis=-1)
+                log_det = log_det + xp.log(scale).sum(-1) + step.log_det
             noise.append(x)
         self._remember(pose)
-        return xp.concatenate(noise, axis=-1), actions
+        return xp.concatenate(noise, axis=-1), actions, log_det
 
     def run(
         self, conditions: Conditions, z: np.ndarray, kept: np.ndarray | None = None
@@ -342,7 +346,7 @@ class Sampler:
             with one_thread():  # frame by frame: whoever drains this generator has the threads back in between
                 if t < first:
                     pose = known[t]
-                    last, action = self.absorb(t, pose)
+                    last, action, _ = self.absorb(t, pose)
                 else:
                     share = min(1.0, (t - first + 1) / _PASSING)
                     now = last + (noise - last) * (share * share * (3.0 - 2.0 * share))
