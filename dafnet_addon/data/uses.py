@@ -108,7 +108,9 @@ def working(joints: np.ndarray, path: RootPath) -> list[Use]:
     forearm = normalised(joints[:, _WRISTS] - joints[:, _ELBOWS])[..., 2]
     height = joints[:, _WRISTS, 2]
     stays = _speed(path.position[:, :2]) < 0.25
-    before = (local[..., 1] > 0.2) & (height > 0.60) & (height < 1.15) & (forearm > -0.85) & (forearm < 0.45) & stays[:, None]
+    # The forearms of hanging arms are steeper, those of folded or raised ones rise.
+    level = (forearm > -0.75) & (forearm < 0.45)
+    before = (local[..., 1] > 0.12) & (height > 0.60) & (height < 1.15) & level & stays[:, None]
     seconds = _over_a_second(before).all(-1) & (_spread(_over_a_second(height)) < 0.06)
     seconds &= (_spread(_over_a_second(local[..., :2])) < 0.5).all(-1)
     tops: list[list[tuple[int, int, np.ndarray]]] = []
