@@ -287,7 +287,7 @@ class Sampler:
         x = self._past @ self._predictor_past + self._predictor_ahead[frame]
         x = (x * (x > 0)) @ self._predictor_second[0] + self._predictor_second[1]
         x = ((x * (x > 0)) @ self._predictor_out[0] + self._predictor_out[1]) / self.action_temperature
-        x = xp.exp(x - x.max())
+        x = xp.exp(x - xp.amax(x, -1)[:, None])
         return x / x.sum(-1)[:, None]
 
     def _remember(self, pose: Array) -> None:
