@@ -34,7 +34,7 @@ system:
 	@touch $@
 
 .venv/.test: pyproject.toml .venv/.demo
-	.venv/$(PIP) '$(TORCH)' 'numpy>=1.26,<2' matplotlib pytest trimesh rtree scipy safetensors ruff mypy
+	.venv/$(PIP) '$(TORCH)' 'numpy>=1.26,<2' matplotlib pytest trimesh rtree scipy safetensors tensorboard ruff mypy
 	@touch $@
 
 # Both generations of NumPy are in use: 4.2 takes either.

@@ -13,6 +13,7 @@ import runpy
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +99,8 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     train.add_argument("config", type=Path, metavar="CONFIG.toml", help="sizes and budgets; see configs/")
     train.add_argument("dataset", type=Path, metavar="DATASET", help="made by 'prepare'")
     train.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="folder of the run")
+    train.add_argument("--minutes", type=float, help="of the flow's training, instead of the configuration's")
+    train.add_argument("--device", default="cpu", help="'cpu', or 'cuda'; several GPUs through torchrun")
 
     evaluate = command("evaluate", _evaluate, "measure weights on held-out clips, beside the clips themselves")
     evaluate.add_argument("folder", type=Path, metavar="FOLDER", help="holds the motion files")
@@ -216,12 +219,17 @@ def _prepare(options: argparse.Namespace) -> None:
 
 def _train(options: argparse.Namespace) -> None:
     _require_checkout("training")
+    from .training import ranks
     from .training.export import export
     from .training.train import account, read_config, train, trained
 
     model, config = read_config(options.config)
+    if options.minutes is not None:
+        config = replace(config, minutes_flow=options.minutes)
     with _Bar() as bar:
-        train(options.dataset, options.output, model, config, bar)
+        train(options.dataset, options.output, model, config, bar, options.device)
+    if ranks.rank():
+        return
     file = options.output / "dafnet.safetensors"
     flow, predictor, statistics = trained(options.output)
     export(file, flow, predictor, statistics, account(options.output, options.dataset))

@@ -1,6 +1,9 @@
 """Training: it learns, resumes exactly, stops on NaN with the last good state, and what it exports is what it trained."""
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -232,3 +235,22 @@ def test_running_on_is_the_likelihood_and_the_inverse(dataset):
         assert torch.allclose(density, flow.log_likelihood(x, condition, occupancy), atol=1e-3)
         again, _, _ = flow(torch.cat([x[:, :5], made], 1), condition, occupancy)
     assert (again[:, 5:] - z[:, None]).abs().max() < 1e-3
+
+
+def test_two_processes_train_one_model(dataset, tmp_path):
+    (dataset / "dataset.json").write_text("{}")
+    config = tmp_path / "tiny.toml"
+    config.write_text(
+        'preset = "small"\n[model]\npredictor_code = 8\npredictor_width = 16\nwidth = 16\ncode = 8\nsteps_upper = 1\n'
+        "steps_lower = 1\n[training]\nminutes_predictor = 0.02\nminutes_flow = 0.02\nbatch = 4\n"
+    )
+    command = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2", "-m", "dafnet_addon"]
+    done = subprocess.run(
+        [*command, "train", config, dataset, "-o", tmp_path / "run"], cwd=Path(__file__).resolve().parents[1],
+        env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    lines = [json.loads(line) for line in (tmp_path / "run" / "log.jsonl").read_text().splitlines()]
+    assert len(lines) == len({(line["part"], line["step"]) for line in lines}), "one process keeps the run"
+    assert {line["part"] for line in lines} == {"predictor", "upper", "lower"}
+    assert load_weights(tmp_path / "run" / "dafnet.safetensors").config["model"]["width"] == 16

@@ -1,6 +1,7 @@
 """Trains the action predictor, then the two-part flow on top of it (paper, section 5.1, figure 7).
 
-A run lives in a folder: ``predictor.pt``, ``upper.pt``, ``lower.pt`` (each resumes exactly where it was saved), ``log.jsonl``.
+A run lives in a folder: ``predictor.pt``, ``upper.pt``, ``lower.pt`` (each resumes exactly where it was saved), ``log.jsonl``,
+and ``tensorboard``.
 Time, not steps, is the budget: the learning rate follows the share of the minutes that is spent.
 """
 
@@ -22,6 +23,7 @@ from ..core.errors import InputError
 from ..model.config import LOWER_SIZE, PAPER, POSE_SIZE, SMALL, UPPER_SIZE, ModelConfig
 from ..model.flow import TwoPartFlow
 from ..model.predictor import GMVAE, ActionPredictor, gumbel_temperature
+from . import ranks
 from .batches import Batch, Pool, Statistics, observation_for
 from .free_run import lower_loss, upper_loss
 
@@ -214,8 +216,11 @@ def train_part(
     A loss that is not a number stops the run with the last good checkpoint kept. Shards that 'prepare' is still writing are
     taken in as they come.
     """
+    from torch.utils.tensorboard import SummaryWriter
+
     if threads is not None:
         torch.set_num_threads(threads)
+    device = ranks.device_of(device)
     torch.backends.cuda.matmul.allow_tf32 = True
     pool = Pool(lambda: sorted(Path(dataset).glob("pool-????.npz")), torch.device(device))
     if not len(pool):
@@ -228,11 +233,15 @@ def train_part(
         # All parts are standardised alike, whatever shards there were when each began.
         statistics = pool.statistics() if predictor is None else predictor.statistics
         run = Run(part, folder, model, config, statistics, device)
-        run.save()
+        if ranks.rank() == 0:
+            run.save()
+    if ranks.rank():
+        torch.manual_seed(hash((config.seed, run.step, ranks.rank())) % 2**31)
     if predictor is not None:
         run.gmvae.load_state_dict(predictor.network.state_dict())
         run.gmvae.requires_grad_(False)
     recent: list[torch.Tensor] = []
+    writer = SummaryWriter(str(folder / "tensorboard" / part)) if ranks.rank() == 0 else None
     while run.share < 1.0:
         begin = time.monotonic()
         rows = torch.randint(len(pool), (config.batch,), device=run.device)
@@ -241,24 +250,33 @@ def train_part(
         loss = run.loss(pool.batch(rows, run.statistics, run.model), initialise=run.step == 0)
         run.optimiser.zero_grad()
         loss.backward()
+        if run.step == 0:
+            ranks.from_first(run.network)
+        ranks.average([p.grad for p in run.network.parameters() if p.grad is not None])
         nn.utils.clip_grad_norm_(run.network.parameters(), config.clip_norm)
         run.optimiser.step()
         recent.append(loss.detach())
         run.step += 1
-        run.seconds += time.monotonic() - begin
+        if run.step % config.save_every == 0:
+            torch.stack(recent).mean().item()  # what a device still has to do is counted too
+        run.seconds = ranks.mean(run.seconds + time.monotonic() - begin, run.device)
         if run.step % config.save_every == 0 or run.share >= 1.0:
-            mean = float(torch.stack(recent).mean())
+            mean = ranks.mean(float(torch.stack(recent).mean()), run.device)
             if not math.isfinite(mean):
                 raise InputError(f"The loss of '{part}' is no number by step {run.step}; resume with a lower peak rate.")
-            values = {
-                "part": part, "step": run.step, "minutes": run.seconds / 60, "loss": mean, "held_out": run.held_loss(held),
-                "windows": len(pool),
-            }
-            with (folder / "log.jsonl").open("a") as f:
-                f.write(json.dumps(values) + "\n")
-            progress(part, run.share, mean)
+            held_out = run.held_loss(held)
+            if writer is not None:
+                values = {
+                    "part": part, "step": run.step, "minutes": run.seconds / 60, "loss": mean, "held_out": held_out,
+                    "windows": len(pool),
+                }
+                with (folder / "log.jsonl").open("a") as f:
+                    f.write(json.dumps(values) + "\n")
+                for name in ("loss", "held_out", "windows"):
+                    writer.add_scalar(name, values[name], run.step)
+                progress(part, run.share, mean)
+                run.save()
             recent.clear()
-            run.save()
             pool.refresh()
     return run
 
@@ -267,11 +285,18 @@ def train(
     dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig,
     progress: Callable[[float], None] = lambda share: None, device: str = "cpu",
 ) -> None:
-    """Train the predictor, then both parts of the flow in two processes; what a folder holds is gone on with."""
+    """Train the predictor, then both parts of the flow in two processes; what a folder holds is gone on with.
+
+    Under ``torchrun`` all processes train one part after another, together.
+    """
     whole = max(config.minutes_predictor + config.minutes_flow, 1e-9)
     first = config.minutes_predictor / whole
     report = lambda part, share, loss: progress(first * share)  # noqa: E731
     train_part("predictor", dataset, folder, model, config, progress=report, device=device)
+    if ranks.joined():
+        for part in ("upper", "lower"):
+            train_part(part, dataset, folder, model, config, device=device)
+        return
     threads = max(1, (os.cpu_count() or 2) // 2)
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
         begin = time.monotonic()

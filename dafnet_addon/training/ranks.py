@@ -1,0 +1,52 @@
+"""Training on several devices: every rank of ``torchrun`` draws its own windows, gradients are averaged, rank 0 keeps the run."""
+
+import os
+
+import torch
+import torch.distributed as dist
+from torch import Tensor, nn
+
+__all__ = ["joined", "rank", "device_of", "average", "mean", "from_first"]
+
+
+def joined() -> bool:
+    """Whether ``torchrun`` started this process with others; joins them at the first call."""
+    if int(os.environ.get("WORLD_SIZE", "1")) < 2:
+        return False
+    if not dist.is_initialized():
+        dist.init_process_group("nccl" if torch.cuda.is_available() else "gloo")
+    return True
+
+
+def rank() -> int:
+    """This process's number; 0 where it is alone."""
+    return dist.get_rank() if joined() else 0
+
+
+def device_of(device: str) -> str:
+    """The device of this rank: the one asked for, where that is 'cuda' the one that ``torchrun`` gave it."""
+    return f"cuda:{os.environ['LOCAL_RANK']}" if device == "cuda" and joined() else device
+
+
+def average(values: list[Tensor]) -> None:
+    """Replace tensors by their means over all ranks."""
+    if joined():
+        for value in values:
+            dist.all_reduce(value)
+            value /= dist.get_world_size()
+
+
+def mean(value: float, device: torch.device) -> float:
+    """The mean of a number over all ranks."""
+    if not joined():
+        return value
+    shared = torch.tensor(value, device=device)
+    average([shared])
+    return float(shared)
+
+
+def from_first(network: nn.Module) -> None:
+    """Give every rank rank 0's parameters: the first batch, which sets activation norms, is another one on each."""
+    if joined():
+        for parameter in network.parameters():
+            dist.broadcast(parameter.data, 0)
