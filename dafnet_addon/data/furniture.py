@@ -38,7 +38,7 @@ _FAR = 0.3
 _TRIES = 16
 _ONE_SEAT = 0.25
 _ON_THE_FLOOR = 0.22  # a pelvis that rests lower than this sits on the floor
-_NEEDED = ("seat", "bed")
+_HALF_DOWN = 0.80
 _LIKELY = {"desk": 0.85, "board": 0.8, "shelf": 0.6}
 _SOFT = 0.3
 
@@ -388,6 +388,19 @@ def scattered(rng: np.random.Generator, points: np.ndarray, path: RootPath, coun
     return np.concatenate(kept)
 
 
+def _cut_off(joints: np.ndarray, stays: list[tuple[int, int]]) -> bool:
+    """Whether the motion begins or ends half-way down to a seat: low, off its feet, and not (yet) in one of its ``stays``.
+
+    What it sits down on is then not known, and nothing must be learnt of sitting down on air.
+    """
+    for end in (0, len(joints) - 1):
+        ankles = (joints[end, joint("left_ankle")] + joints[end, joint("right_ankle")]) / 2
+        low = _ON_THE_FLOOR < joints[end, 0, 2] < _HALF_DOWN and np.linalg.norm((ankles - joints[end, 0])[:2]) > 0.15
+        if low and not any(a - _MIN_REST < end < b + _MIN_REST for a, b in stays):
+            return True
+    return False
+
+
 def _carried(boxes: np.ndarray, rest: Rest) -> bool:
     """Whether a bed is already the seat of this rest: one sits down on its edge."""
     at = rest.position - (0.0, 0.0, SEAT_TO_PELVIS)
@@ -396,36 +409,40 @@ def _carried(boxes: np.ndarray, rest: Rest) -> bool:
 
 def _fitted(
     rng: np.random.Generator, joints: np.ndarray, path: RootPath, points: np.ndarray
-) -> list[tuple[str, np.ndarray | None]]:
-    """What a motion uses, one word each, with the boxes fitted to it, or None where none could be had.
+) -> tuple[list[tuple[str, np.ndarray | None]], str]:
+    """What a motion uses, one word each, with the boxes fitted to it or None where none could be had; and what is missing.
 
     Hands may as well work in the air: now and then theirs is not tried, and not in the list.
     """
-    beds = [("bed", _bed_for(rng, use, points)) for use in lying(joints)]
-    carrying = np.concatenate([NO_BOXES, *(rows for _, rows in beds if rows is not None)])
+    beds, rests = lying(joints), resting(joints, path)
+    if _cut_off(joints, [(u.start, u.end) for u in beds] + [(r.start, r.end) for r in rests]):
+        return [], "cut"
+    fitted = [("bed", _bed_for(rng, use, points)) for use in beds]
+    carrying = np.concatenate([NO_BOXES, *(rows for _, rows in fitted if rows is not None)])
     places: list[Rest] = []
-    for rest in resting(joints, path):
+    for rest in rests:
         apart = all(np.linalg.norm(rest.position - other.position) > _ONE_SEAT for other in places)
         if apart and rest.position[2] > _ON_THE_FLOOR and not _carried(carrying, rest):
             places.append(rest)
-    fitted = [*beds, *(("seat", seat_for(rng, place, points)) for place in places)]
-    for use in [*working(joints, path), *stroking(joints, path), *reaching(joints, path)]:
-        if rng.random() < _LIKELY[use.kind]:
-            fitted.append((use.kind, _FITS[use.kind](rng, use, points)))
-    return fitted
+    fitted += [("seat", seat_for(rng, place, points)) for place in places]
+    missing = next((kind for kind, rows in fitted if rows is None), "")
+    if not missing:
+        for use in [*working(joints, path), *stroking(joints, path), *reaching(joints, path)]:
+            if rng.random() < _LIKELY[use.kind]:
+                fitted.append((use.kind, _FITS[use.kind](rng, use, points)))
+    return fitted, missing
 
 
 def furnished(rng: np.random.Generator, joints: np.ndarray, path: RootPath) -> tuple[np.ndarray | None, str]:
     """All boxes (B, 7) of a room for one motion (T, 22, 3) with its root path, what the body uses and random pieces, and "".
 
-    Or None and one word for what could not be had: "seat" or "bed". A desk, board or shelf that does not fit is left out.
-    Paper, section 5.2.
+    Or None and one word for why not: "seat" or "bed", that could not be had, or "cut", where the motion begins or ends half-way
+    down to one. A desk, board or shelf that does not fit is left out. Paper, section 5.2.
     """
     points = probes(joints)
-    fitted = _fitted(rng, joints, path, points)
-    for kind, rows in fitted:
-        if rows is None and kind in _NEEDED:
-            return None, kind
+    fitted, missing = _fitted(rng, joints, path, points)
+    if missing:
+        return None, missing
     count = int(rng.integers(1, 5)) if rng.random() < 0.8 else 0
     pieces = [rows for _, rows in fitted if rows is not None]
     return np.concatenate([NO_BOXES, *pieces, scattered(rng, points, path, count)]), ""
