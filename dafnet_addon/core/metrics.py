@@ -17,7 +17,7 @@ from .skeleton import END_EFFECTORS, PARENTS, SEAT_TO_PELVIS, TOE_HEIGHT, joint
 __all__ = [
     "BAD_COLLISION_JOINTS", "Seat", "SeatEpisode", "foot_sliding", "skate", "end_effector_distance", "bad_collisions",
     "body_points", "penetration", "seat_episodes", "seat_report", "standing_pelvis_height", "bone_length_variation",
-    "jerk", "diversity", "summary",
+    "jerk", "diversity", "summary", "entropy", "action_information", "mutual_information",
 ]
 
 _FEET = [joint("left_foot"), joint("right_foot")]
@@ -226,3 +226,23 @@ def summary(
         "bone_length_variation": bone_length_variation(joints),
         "jerk": jerk(joints, fps),
     }
+
+
+def entropy(probabilities: np.ndarray) -> np.ndarray:
+    """Entropy (…) in nats of distributions (…, K)."""
+    return -(probabilities * np.log(np.maximum(probabilities, 1e-12))).sum(-1)
+
+
+def action_information(actions: np.ndarray) -> float:
+    """How far actions (T, K) tell frames apart: H(mean π) - mean H(π), nats; 0 where π is always the same, at most log K."""
+    return float(entropy(actions.mean(0)) - entropy(actions).mean())
+
+
+def mutual_information(first: np.ndarray, second: np.ndarray) -> float:
+    """Normalised mutual information of two labellings (T,): 0 independent, 1 the same; over the mean of their entropies."""
+    _, a = np.unique(first, return_inverse=True)
+    _, b = np.unique(second, return_inverse=True)
+    joint_share = np.zeros((a.max() + 1, b.max() + 1))
+    np.add.at(joint_share, (a, b), 1.0 / len(a))
+    apart = float(entropy(joint_share.sum(1)) + entropy(joint_share.sum(0)))
+    return 2.0 * (apart - float(entropy(joint_share.ravel()))) / apart if apart > 0 else 0.0

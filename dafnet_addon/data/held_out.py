@@ -19,7 +19,7 @@ from .furniture import Rest
 from .prepare import load_motions
 from .windows import Motion
 
-__all__ = ["ACTIVITIES", "FROZEN", "HeldClip", "fingerprint", "held_out"]
+__all__ = ["ACTIVITIES", "FROZEN", "HeldClip", "fingerprint", "held_out", "scene_of"]
 
 FROZEN = Path(__file__).with_name("held_out.json")
 ACTIVITIES = {
@@ -37,18 +37,24 @@ _SAME = 0.01  # metres by which a fingerprint may be off
 
 @dataclass(frozen=True)
 class HeldClip:
-    """``joints`` (T, 22, 3): ground truth, 30 fps. ``path``: its raw root. ``scene``: its furniture. ``rests``: seated
-    episodes. ``activity``: one of ``ACTIVITIES``. ``unseen``: whether the body has no clip in training.
+    """``joints`` (T, 22, 3): ground truth, 30 fps. ``path``: its raw root. ``boxes`` (B, 7): its furniture, the same as its
+    ``scene``. ``rests``: seated episodes. ``activity``: one of ``ACTIVITIES``. ``unseen``: whether the body has no clip in
+    training. ``composed``: whether it was made of several clips.
     """
 
     name: str
     body: str
     activity: str
     unseen: bool
+    composed: bool
     joints: np.ndarray
     path: RootPath
-    scene: Scene
+    boxes: np.ndarray
     rests: tuple[Rest, ...]
+
+    @property
+    def scene(self) -> Scene:
+        return scene_of(self.boxes)
 
 
 def fingerprint(joints: np.ndarray) -> list[float]:
@@ -58,7 +64,8 @@ def fingerprint(joints: np.ndarray) -> list[float]:
     return [round(float(number), 4) for number in numbers]
 
 
-def _scene(rows: np.ndarray) -> Scene:
+def scene_of(rows: np.ndarray) -> Scene:
+    """Boxes (B, 7) as solids."""
     return Scene(tuple(Box(center=r[:3], half_size=r[3:6], rotation=yaw_matrix(r[6])) for r in rows))
 
 
@@ -77,7 +84,7 @@ def _clip(frozen: dict[str, Any], motion: Motion) -> HeldClip:
     rows = np.array(frozen["boxes"]).reshape(-1, 7)
     body = f"{motion.source}/{motion.subject}"
     return HeldClip(
-        frozen["name"], body, _ACTIVITY[motion.category], frozen["unseen"], joints, path, _scene(rows), rests
+        frozen["name"], body, _ACTIVITY[motion.category], frozen["unseen"], "composed" in frozen, joints, path, rows, rests
     )
 
 

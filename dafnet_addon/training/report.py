@@ -1,0 +1,355 @@
+"""All that weights have to show on bodies they never saw: clips beside themselves, drift, seats, actions, likelihood.
+
+One dictionary, JSON all through; every figure stands beside the number of clips, takes or episodes that it is of.
+"""
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.conditions import PREROLL, shot_steps
+from ..core.generate import noise_of
+from ..core.metrics import (
+    BAD_COLLISION_JOINTS,
+    Seat,
+    action_information,
+    bad_collisions,
+    body_points,
+    foot_sliding,
+    jerk,
+    mutual_information,
+    penetration,
+    seat_report,
+    skate,
+)
+from ..core.occupancy import distance
+from ..core.paths import Point, Route, Stop, facing, route
+from ..core.progress import drained
+from ..core.root import to_root
+from ..core.sampler import Sampler
+from ..core.skeleton import SEAT_TO_PELVIS
+from ..core.take import Controls
+from ..core.weights import Weights
+from ..data.boxes import box, placed
+from ..data.held_out import ACTIVITIES, HeldClip, scene_of
+from ..data.sheet import sheet
+from .batches import NOISE
+from .evaluate import SEEDS, Figures, Measured, in_processes, made, measured, row, rows, rows_of, shot_of, table
+
+__all__ = ["contact_sheets", "report", "text"]
+
+_MINUTE, _LOOPS = 1800, 3  # frames of a long take; how often it goes round
+_HEIGHTS = {"low": 0.35, "medium": 0.45, "high": 0.60}
+_RIGHT_HEIGHT, _SITS_WITHIN, _STANDS_ABOVE = 0.05, 0.06, 0.86  # metres
+_AWAY = 0.8  # metres from a seat's middle, beyond which one stands
+_LIKELY = 0.02  # share of frames in which an action has to be the likeliest
+_SHEET_OF = {"sit down or up": 7, "sit": 3, "walk": 4, "reach": 3, "stand": 3}
+_A_SHEET = 2  # clips
+
+
+@dataclass(frozen=True)
+class Room:
+    """A root path among seats: ``boxes`` (B, 7); ``heights`` of the seats by the names of the route's stops."""
+
+    name: str
+    boxes: np.ndarray
+    walked: Route
+    heights: dict[str, float]
+
+
+def _seat(stop: Stop, height: float, back: bool) -> np.ndarray:
+    """A seat of boxes at a stop: a slab on four legs, and a back where asked for."""
+    rows = [box((0.0, 0.01, height - 0.025), (0.44, 0.44, 0.05))]
+    rows += [box((x, 0.01 + y, height / 2 - 0.025), (0.04, 0.04, height - 0.05)) for x in (-0.2, 0.2) for y in (-0.2, 0.2)]
+    if back:
+        rows.append(box((0.0, -0.23, height + 0.185), (0.44, 0.04, 0.47)))
+    return placed(np.array(rows), np.array(stop.position), stop.yaw)
+
+
+def _round_walk(mirror: float, seconds: float) -> Route:
+    """From standing to a chair, to a stool, and back, three times, with ``seconds`` at each."""
+    stand = Stop((mirror * 1.2, 3.4), facing((0.0, -1.0)), seconds)
+    chair = Stop((0.0, 0.0), 0.0, seconds, seated=True, name="chair")
+    stool = Stop((mirror * 3.0, 2.0), facing((-mirror, 0.0)), seconds, seated=True, name="stool")
+    once: tuple[Point | Stop, ...] = ((mirror * 0.12, 1.5), chair, (mirror * 1.2, 1.3), stool, stand)
+    return route(stand, *(once * _LOOPS))
+
+
+def long_rooms() -> list[Room]:
+    """Rooms walked round three times in a minute, each round the same: what differs between rounds is drift."""
+    rooms = []
+    for mirror, chair, stool in ((1.0, 0.45, 0.40), (-1.0, 0.50, 0.45), (1.0, 0.42, 0.55), (-1.0, 0.45, 0.60)):
+        # A round is to last 600 frames: what it lacks is shared out among its three rests.
+        brief = _round_walk(mirror, 1.0)
+        walked = _round_walk(mirror, 1.0 + (_MINUTE / _LOOPS - brief.rests[3].first) / 90.0)
+        seats = [_seat(walked.rests[k].stop, height, back) for k, height, back in ((1, chair, True), (2, stool, False))]
+        rooms.append(Room(f"{chair:.2f}, {stool:.2f} m", np.concatenate(seats), walked, {"chair": chair, "stool": stool}))
+    return rooms
+
+
+def seat_rooms() -> list[Room]:
+    """The same three root paths to a seat, its height low, medium and high."""
+    stop = Stop((0.0, 0.0), 0.0, 3.0, seated=True, name="seat")
+    ways = {
+        "front": route(Stop((-1.6, 3.2), facing((0.5, -1.0)), 0.5), stop),
+        "side": route(Stop((3.2, 0.8), facing((-1.0, 0.0)), 0.5), stop),
+        "behind": route(Stop((-0.3, -3.2), 0.0, 0.5), (-0.95, -0.6), (-0.85, 0.45), stop),
+    }
+    return [
+        Room(f"{way}, {name}", _seat(stop, height, back=True), walked, {"seat": height})
+        for way, walked in ways.items() for name, height in _HEIGHTS.items()
+    ]
+
+
+def _walk(sampler: Sampler, room: Room, seeds: int) -> np.ndarray:
+    """Takes (1 + seeds, T, 22, 3) in a room: temperature 0 first, then 1."""
+    controls = Controls(fps=30.0, root=room.walked.path.matrices())
+    shot = drained(shot_steps(scene_of(room.boxes), controls))
+    return made(sampler, shot, np.concatenate([noise_of(0, None, 0.0), *(noise_of(s, None, 1.0) for s in range(seeds))]))
+
+
+def _round(room: Room, takes: np.ndarray, first: int, last: int) -> Figures:
+    """Figures of takes (S, T, 22, 3) in frames ``first`` to ``last``; a seat's right height is that of its top plus 0.12 m."""
+    walked, scene = room.walked, scene_of(room.boxes)
+    cut = takes[:, first:last]
+    flat, weight = cut.reshape(-1, 22, 3), float(cut.shape[0] * cut.shape[1])
+    reach = partial(distance, scene, floor=0.0)
+    places = np.array([rest.stop.position for rest in walked.rests if rest.stop.seated])
+    away = np.linalg.norm(walked.path.position[first:last, None, :2] - places, axis=-1).min(1) > _AWAY
+    seats = [
+        float(np.median(take[r.first : r.last + 1, 0, 2]) - room.heights[r.stop.name] - SEAT_TO_PELVIS)
+        for take in takes for r in walked.rests if r.stop.seated and first <= r.first < last
+    ]
+    each = [(foot_sliding(j, 30.0).mean(), skate(j, 30.0), jerk(j, 30.0)) for j in cut]
+    sliding, skating, jerking = (np.array(each).mean(0) * weight).tolist()
+    return Figures({
+        "foot_sliding_per_frame": (sliding, weight), "skate_cm": (skating, weight), "jerk": (jerking, weight),
+        "bad_collisions_per_frame": (float(bad_collisions(reach(flat[:, list(BAD_COLLISION_JOINTS)])).sum()), weight),
+        "penetration_mean": (penetration(reach(body_points(flat)))[0] * weight, weight),
+        "sits_within_6cm": (float(sum(abs(error) <= _SITS_WITHIN for error in seats)), float(len(seats))),
+        "stands_when_it_should": (float((cut[:, away, 0, 2] > _STANDS_ABOVE).sum()), float(cut.shape[0] * away.sum())),
+    }, seats)
+
+
+def _rounds(sampler: Sampler, room: Room) -> dict[str, Figures]:
+    """Figures of the first and the last round of a long walk."""
+    takes = _walk(sampler, room, seeds=3)
+    starts = [rest.first for rest in room.walked.rests[::3]]
+    rounds = {"first": (starts[0], starts[1]), "last": (starts[_LOOPS - 1], starts[_LOOPS])}
+    out = {}
+    for name, (first, last) in rounds.items():
+        for temperature, chosen in (("t0", takes[:1]), ("t1", takes[1:])):
+            out[f"{name}_third_{temperature}"] = _round(room, chosen, first, last)
+    return out
+
+
+def _heights(sampler: Sampler, room: Room) -> list[float]:
+    """Height of the pelvis of every take while the root rests on the seat."""
+    seat = Seat("seat", np.array([0.0, 0.0, room.heights["seat"]]))
+    reports = [seat_report(take, room.walked.path, 30.0, [seat])[0] for take in _walk(sampler, room, SEEDS)]
+    return [float(report["pelvis_height"] or np.nan) for report in reports]
+
+
+def _drift(weights: Weights, progress: Callable[[float], None]) -> dict[str, dict[str, Any]]:
+    found = list(in_processes(weights, _rounds, long_rooms(), progress))
+    return {name: row([rounds[name] for rounds in found]) for name in found[0]}
+
+
+def _seats(weights: Weights, progress: Callable[[float], None]) -> dict[str, Any]:
+    """Pelvis over seats of three heights on the same root path, and how often all three are right."""
+    rooms = seat_rooms()
+    found = np.array(list(in_processes(weights, _heights, rooms, progress)))
+    found = found.reshape(-1, len(_HEIGHTS), found.shape[1])  # way, height, take
+    wanted = np.array(list(_HEIGHTS.values()))[:, None] + SEAT_TO_PELVIS
+    right = np.abs(found - wanted) <= _RIGHT_HEIGHT
+    out: dict[str, Any] = {}
+    for temperature, takes in (("t0", slice(0, 1)), ("t1", slice(1, None))):
+        out[temperature] = {
+            "paths_and_seeds": int(right[:, 0, takes].size),
+            "all_three_right": round(float(right[:, :, takes].all(1).mean()), 4),
+            **{
+                name: {
+                    "seat": _HEIGHTS[name], "wanted": round(float(wanted[k, 0]), 4),
+                    "pelvis_median": round(float(np.median(found[:, k, takes])), 4),
+                    "right": round(float(right[:, k, takes].mean()), 4),
+                }
+                for k, name in enumerate(_HEIGHTS)
+            },
+        }
+    return out
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """The model led along a real clip: actions (T, K), and nats a frame (T,) of negative log-likelihood."""
+
+    clip: HeldClip
+    actions: np.ndarray
+    nats: np.ndarray
+
+
+def _followed(sampler: Sampler, task: tuple[HeldClip, np.ndarray | None]) -> _Followed:
+    """Actions and likelihood of a clip's true poses, FREE, in metres, with the noise of training; of other actions if given."""
+    clip, actions = task
+    shot = shot_of(clip, "FREE")
+    rng = np.random.default_rng(len(clip.joints))
+    poses = to_root(shot.path, clip.joints).reshape(-1, 66)
+    poses = np.concatenate([np.repeat(poses[:1], PREROLL, axis=0), poses])
+    poses = sampler.standardised(poses + rng.normal(0.0, NOISE, poses.shape)).astype(np.float32)
+    sampler.start(shot.conditions)
+    seen, nats = [], []
+    metres = float(np.log(sampler.pose_std).sum())
+    for t, pose in enumerate(poses[:, None]):
+        other = None if actions is None or t < PREROLL else actions[t - PREROLL, None]
+        noise, told, log_det = sampler.absorb(t, pose, other)
+        seen.append(told[0])
+        nats.append(float(0.5 * (noise**2 + np.log(2.0 * np.pi)).sum() - log_det[0]) + metres)
+    return _Followed(clip, np.array(seen[PREROLL:]), np.array(nats[PREROLL:]))
+
+
+def _actions(weights: Weights, clips: Sequence[HeldClip], progress: Callable[[float], None]) -> dict[str, Any]:
+    """What the action predictor says along real clips, and what its word is worth to the likelihood."""
+    first: list[_Followed] = list(in_processes(weights, _followed, [(c, None) for c in clips], lambda p: progress(p / 2)))
+    actions = np.concatenate([each.actions for each in first])
+    mixed = actions[np.random.default_rng(0).permutation(len(actions))].astype(np.float32)
+    cuts = np.cumsum([len(c.joints) for c in clips])[:-1]
+    tasks = list(zip(clips, np.split(mixed, cuts), strict=True))
+    second: list[_Followed] = list(in_processes(weights, _followed, tasks, lambda p: progress(0.5 + p / 2)))
+    likeliest = actions.argmax(1)
+    share = np.bincount(likeliest, minlength=actions.shape[1]) / len(likeliest)
+    activity = np.repeat([c.activity for c in clips], [len(c.joints) for c in clips])
+
+    def nats(chosen: Sequence[str]) -> dict[str, Any]:
+        """Of clips of these activities: mean and median clip, and what mixed actions add to the mean."""
+        pairs = [(a.nats, b.nats - a.nats) for a, b in zip(first, second, strict=True) if a.clip.activity in chosen]
+        own, rise = (
+            row([Figures({"nats": (float(n.sum()), float(len(n)))}) for n in each]) for each in zip(*pairs, strict=True)
+        )
+        return {
+            "clips": len(pairs), "nll": own["nats"], "nll_interval": own["intervals"]["nats"],
+            "nll_median_clip": round(float(np.median([n.mean() for n, _ in pairs])), 3),
+            "shuffled_adds": rise["nats"], "shuffled_adds_interval": rise["intervals"]["nats"],
+            "shuffled_adds_median_clip": round(float(np.median([n.mean() for _, n in pairs])), 3),
+            "shuffled_worse_in_clips": round(float(np.mean([n.mean() > 0 for _, n in pairs])), 4),
+        }
+
+    present = [name for name in ACTIVITIES if (activity == name).any()]
+    return {
+        "clips": len(clips), "frames": len(actions),
+        "information_nats": round(action_information(actions), 4),
+        "likeliest_in_2_percent": int((share >= _LIKELY).sum()),
+        "normalised_mutual_information": round(mutual_information(likeliest, activity), 4),
+        "shares": {
+            "all": [round(float(s), 3) for s in share],
+            **{
+                name: [round(float((likeliest[activity == name] == k).mean()), 3) for k in range(len(share))]
+                for name in present
+            },
+        },
+        "likelihood": {"all": nats(present), **{name: nats([name]) for name in present}},
+    }
+
+
+def _diversity(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
+    """APD of the upper body by mode; of the legs under one upper body, and whether those stand on the floor and in nothing."""
+    lively = rows_of(clips, ["free_t1", "ee_t1", "full_t1"])
+    legs = rows_of(clips, ["ground_truth", "free_t0", "legs"])
+    fit = ("feet_off_floor", "toes_under_floor", "legs_penetration_mean", "foot_sliding_per_frame", "sits_within_6cm")
+
+    def kept(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
+        names = [name for name in names if name in values]
+        return {
+            "clips": values["clips"], "seat_episodes": values["seat_episodes"], **{name: values[name] for name in names},
+            "intervals": {name: values["intervals"][name] for name in names},
+        }
+
+    out = {run: kept(values, ["apd_upper", "apd_legs"]) for run, values in lively.items()}
+    out["free_t1"]["over_ee"] = round(lively["free_t1"]["apd_upper"] / lively["ee_t1"]["apd_upper"], 3)
+    out["ee_t1"]["over_full"] = round(lively["ee_t1"]["apd_upper"] / lively["full_t1"]["apd_upper"], 3)
+    out |= {run if run != "legs" else "legs_vary_t1": kept(v, ["apd_upper", "apd_legs", *fit]) for run, v in legs.items()}
+    return out
+
+
+def report(
+    weights: Weights, clips: Sequence[HeldClip], progress: Callable[[float], None] = lambda share: None, seed: int = 0
+) -> dict[str, Any]:
+    """Everything that is measured, by section: ``rows``, ``by_activity``, ``drift``, ``diversity``, ``seats``, ``actions``."""
+    shares = (0.7, 0.1, 0.1, 0.1)
+
+    def part(k: int) -> Callable[[float], None]:
+        return lambda share: progress(sum(shares[:k]) + shares[k] * share)
+
+    found = measured(weights, clips, part(0), seed)
+    unseen = [c for c in found if c.unseen and not c.composed]
+    captured = [c for c in clips if c.unseen and not c.composed]
+    groups: dict[str, list[Measured]] = defaultdict(list)
+    for each in unseen:
+        groups[each.activity].append(each)
+    return {
+        "rows": rows(found),
+        "by_activity": {
+            name: rows_of(groups[name], ["ground_truth", "free_t0", "ee_t0", "free_t1", "ee_t1"])
+            for name in ACTIVITIES if name in groups
+        },
+        "drift": _drift(weights, part(1)),
+        "diversity": _diversity(unseen),
+        "seats": _seats(weights, part(2)),
+        "actions": _actions(weights, captured, part(3)),
+    }
+
+
+def text(values: dict[str, Any]) -> str:
+    """A report in Markdown."""
+    parts = ["## Clips", table(values["rows"])]
+    for name, found in values["by_activity"].items():
+        parts += [f"### {name[0].upper()}{name[1:]}", table(found)]
+    parts += ["## Drift: first and last third of a minute", table(values["drift"])]
+    parts += ["## Diversity", table(values["diversity"])]
+    seats = [
+        f"| {name}, {way} | {each['seat']:.2f} | {each['wanted']:.2f} | {each['pelvis_median']:.3f} "
+        f"| {100 * each['right']:.0f} % | {found['paths_and_seeds']} |"
+        for way, found in values["seats"].items() for name, each in found.items() if isinstance(each, dict)
+    ]
+    parts += [
+        "## Low, medium and high seats on the same root path",
+        "\n".join(["| | seat, m | pelvis wanted, m | median, m | within 5 cm | takes |", "|---|---|---|---|---|---|", *seats]),
+        ", ".join(f"all three right, {way}: {100 * found['all_three_right']:.0f} %" for way, found in values["seats"].items()),
+    ]
+    told = values["actions"]
+    lines = [f"- {name.replace('_', ' ')}: {value}" for name, value in told.items() if not isinstance(value, dict)]
+    lines += [f"- likeliest action, {name}: {shares}" for name, shares in told["shares"].items()]
+    parts += ["## Action predictor and likelihood (nats a frame, poses in metres, 3 mm of noise)", "\n".join(lines)]
+    names = list(told["likelihood"]["all"])
+    head = "| | " + " | ".join(name.replace("_", " ") for name in names) + " |\n" + "|---" * (len(names) + 1) + "|"
+    body = [
+        f"| {label} | " + " | ".join(str(found[name]) for name in names) + " |" for label, found in told["likelihood"].items()
+    ]
+    return "\n\n".join([*parts, "\n".join([head, *body])])
+
+
+def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) -> list[Path]:
+    """Twenty held-out clips of unseen bodies, real above FREE at temperature 0, drawn into ``folder``; the files."""
+    chosen: list[HeldClip] = []
+    for activity, count in _SHEET_OF.items():
+        of_it = [clip for clip in clips if clip.unseen and clip.activity == activity]
+        chosen += [of_it[i] for i in np.unique(np.linspace(0, len(of_it) - 1, min(count, len(of_it))).astype(int))]
+    takes = in_processes(weights, _calm, chosen, lambda share: None)
+    folder.mkdir(parents=True, exist_ok=True)
+    drawn: list[tuple[str, np.ndarray, np.ndarray | None]] = [
+        (f"{clip.name}, {kind}", joints, clip.boxes)
+        for clip, take in zip(chosen, takes, strict=True) for kind, joints in (("real", clip.joints), ("generated", take))
+    ]
+    files = []
+    for k in range(0, len(drawn), 2 * _A_SHEET):
+        files.append(folder / f"held_out_{k // (2 * _A_SHEET) + 1:02d}.png")
+        sheet(files[-1], drawn[k : k + 2 * _A_SHEET])
+    return files
+
+
+def _calm(sampler: Sampler, clip: HeldClip) -> np.ndarray:
+    return made(sampler, shot_of(clip, "FREE"), noise_of(0, None, 0.0))[0]
