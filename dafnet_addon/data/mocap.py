@@ -94,7 +94,7 @@ def _arrays(file: Path) -> list[str]:
     try:
         with np.load(file) as z:
             return list(z.files)
-    except (OSError, ValueError, BadZipFile) as error:
+    except (OSError, ValueError, EOFError, BadZipFile) as error:
         raise InputError(f"The archive '{file}' cannot be read ({error}); download it again.") from None
 
 
