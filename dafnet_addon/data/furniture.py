@@ -427,7 +427,11 @@ def _fitted(
     fitted += [("seat", seat_for(rng, place, points)) for place in places]
     missing = next((kind for kind, rows in fitted if rows is None), "")
     if not missing:
-        for use in [*working(joints, path), *stroking(joints, path), *reaching(joints, path)]:
+        hands = working(joints, path) + stroking(joints, path)
+        reaches = reaching(joints, path)
+        if reaches and not hands:
+            hands = [reaches[rng.integers(len(reaches))]]
+        for use in hands:
             if rng.random() < _LIKELY[use.kind]:
                 fitted.append((use.kind, _FITS[use.kind](rng, use, points)))
     return fitted, missing

@@ -108,8 +108,8 @@ def working(joints: np.ndarray, path: RootPath) -> list[Use]:
     forearm = normalised(joints[:, _WRISTS] - joints[:, _ELBOWS])[..., 2]
     height = joints[:, _WRISTS, 2]
     stays = _speed(path.position[:, :2]) < 0.25
-    # The forearms of hanging arms are steeper, those of folded or raised ones rise.
-    level = (forearm > -0.75) & (forearm < 0.45)
+    # Arms that hang are steep and beside the body; folded or raised ones rise from the elbow.
+    level = (forearm > np.where(local[..., 1] > 0.2, -0.95, -0.75)) & (forearm < 0.45)
     before = (local[..., 1] > 0.12) & (height > 0.60) & (height < 1.15) & level & stays[:, None]
     seconds = _over_a_second(before).all(-1) & (_spread(_over_a_second(height)) < 0.06)
     seconds &= (_spread(_over_a_second(local[..., :2])) < 0.5).all(-1)
