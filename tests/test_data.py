@@ -8,16 +8,16 @@ import pytest
 
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.occupancy import occupancy as sensor_occupancy
-from dafnet_addon.core.root import RootPath, root_from_joints
+from dafnet_addon.core.root import RootPath, ahead, root_from_joints, velocities
 from dafnet_addon.core.rotations import yaw_matrix
-from dafnet_addon.core.skeleton import OFFSETS, PARENTS, REST, SEAT_TO_PELVIS, TOE_HEIGHT, joint
+from dafnet_addon.core.skeleton import OFFSETS, PARENTS, REST, TOE_HEIGHT, joint
 from dafnet_addon.core.solids import Box, Scene
 from dafnet_addon.data import boxes as b
-from dafnet_addon.data.canonical import LEG, calibrate, canonical
-from dafnet_addon.data.compose import entrance, joined, matches
-from dafnet_addon.data.furniture import probes, resting, scattered, seat_for
+from dafnet_addon.data.canonical import LEG, calibrate, canonical, pose_legs
+from dafnet_addon.data.furniture import resting
 from dafnet_addon.data.mocap import Clip, read_clips
-from dafnet_addon.data.windows import at_seat_height, draw, mirrored, motion_of
+from dafnet_addon.data.motions import read_motions, write_motions
+from dafnet_addon.data.windows import draw, mirrored, motion_of
 
 MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
 BONES = np.linalg.norm(OFFSETS[1:], axis=1)
@@ -43,7 +43,7 @@ def _sit_down(seated: float = 0.55, frames: int = 150) -> np.ndarray:
     joints[:, legs] = feet
     knees = [joint("left_knee"), joint("right_knee")]
     joints[:, knees] += np.array([0.0, 0.4, 0.2]) * ease[..., None]
-    return at_seat_height(joints, seated, seated)
+    return pose_legs(joints)
 
 
 def test_occupancy_of_upright_boxes_is_the_sensors():
@@ -58,44 +58,6 @@ def test_box_distances_are_exact():
     row = b.placed(b.box((0, 0, 0.5), (0.4, 0.2, 1.0))[None], np.array([1.0, 2.0]), np.pi / 2)
     points = np.array([[1.0, 2.0, 0.5], [1.0, 2.5, 0.5], [1.4, 2.0, 0.5], [1.0, 2.0, 2.0]])
     assert np.allclose(b.distances(row, points)[0], [-0.1, 0.3, 0.3, 1.0])
-
-
-def test_a_rest_is_found_and_a_seat_put_under_it_that_never_cuts_the_body():
-    joints = _sit_down()
-    path = root_from_joints(joints)
-    (rest,) = resting(joints, path)
-    assert rest.start > 60 and rest.end == len(joints) and abs(rest.position[2] - 0.55) < 0.01
-    points, found = probes(joints), 0
-    for seed in range(20):
-        seat = seat_for(np.random.default_rng(seed), rest, points)
-        if seat is None:
-            continue
-        found += 1
-        tops = seat[:, 2] + seat[:, 5]
-        assert np.abs(tops - (rest.position[2] - SEAT_TO_PELVIS)).min() < 0.02
-        legs = joints[:, [joint(s + n) for s in ("left_", "right_") for n in ("knee", "ankle", "foot")]].reshape(-1, 3)
-        assert b.distances(seat, legs).min() > -0.01
-    assert found >= 15
-
-
-def test_nothing_is_scattered_into_the_body():
-    joints = _sit_down()
-    path, points = root_from_joints(joints), probes(joints)
-    for seed in range(10):
-        pieces = scattered(np.random.default_rng(seed), points, path, 4)
-        if len(pieces):
-            assert b.distances(pieces, joints.reshape(-1, 3)).min() > 0.03
-
-
-@pytest.mark.parametrize("wanted", [0.42, 0.50, 0.65, 0.80])
-def test_other_seat_heights_keep_feet_and_bones(wanted):
-    joints = _sit_down()
-    moved = at_seat_height(joints, 0.55, wanted)
-    feet = [joint("left_foot"), joint("right_foot")]
-    assert abs(moved[-1, 0, 2] - wanted) < 1e-6 and np.abs(moved[0] - joints[0]).max() < 1e-6
-    assert np.abs(moved[:, feet] - joints[:, feet]).max() < 0.02
-    legs = [joint(s + n) - 1 for s in ("left_", "right_") for n in ("knee", "ankle")]
-    assert np.abs(_lengths(moved)[:, legs] - BONES[legs]).max() < 1e-6
 
 
 def test_a_mirror_swaps_sides_and_is_its_own_inverse():
@@ -117,9 +79,22 @@ def test_windows_hold_the_motion_they_were_drawn_from():
         drawn += 1
         joints = window.poses.reshape(80, 22, 3)
         assert np.abs(_lengths(joints) - BONES).max() < 0.03, "turning and mirroring keep lengths; re-timing nearly"
-        assert joints[..., 2].min() > TOE_HEIGHT - 0.03 and window.occupancy.shape == (70, 2640)
-        assert window.occupancy.max() > 200, "a seat is seen"
+        assert joints[..., 2].min() > TOE_HEIGHT - 0.03 and window.boxes.shape == (b.MOST, 7)
+        path = RootPath(np.c_[window.root[:, :2], np.zeros(70)], window.root[:, 2])
+        assert b.occupancy(window.boxes, path).max() > 0.8, "a seat is seen"
+        assert np.abs(velocities(path)[1:] - window.velocity[11:]).max() < 1e-9, "the root moves as it is said to"
+        assert np.abs(ahead(path)[:40] - window.ahead[:40]).max() < 1e-9, "and goes where it is said to"
     assert drawn > 15
+
+
+def test_motions_come_back_from_their_file(tmp_path):
+    motion = motion_of("made up", "test", "nobody", "sit_down", _sit_down())
+    draws = {"sit": (np.array([[0, 90], [0, 100]]), np.array([0.25, 0.75]))}
+    write_motions(tmp_path / "m.npz", [motion], draws)
+    (again,), moments = read_motions(tmp_path / "m.npz")
+    assert np.abs(again.joints - motion.joints).max() <= 0.00051 and (again.valid == motion.valid).all()
+    assert [(r.start, r.end, r.yaw) for r in again.rests] == [(r.start, r.end, r.yaw) for r in motion.rests]
+    assert (moments["sit"][0] == draws["sit"][0]).all() and (moments["sit"][1] == draws["sit"][1]).all()
 
 
 def test_a_canonical_body_keeps_planted_toes():
@@ -168,19 +143,6 @@ def test_real_windows_are_in_the_roots_frame(real_clips):
     assert np.abs(pelvis[..., :2]).max() < 0.35 and np.abs(np.median(pelvis[..., :2])) < 0.05
 
 
-def test_a_walk_is_joined_to_a_sit_down_without_a_jump():
-    sit = _sit_down()
-    walk = np.repeat(sit[:1], 120, axis=0)
-    glide = np.clip((np.arange(120) - 20) / 60, 0, 1)[:, None, None] * np.array([0.0, 1.0, 0.0])
-    walk = (walk + glide) @ yaw_matrix(np.array(0.7)).T
-    entry = entrance(sit, 100)
-    at = matches(walk, sit[entry : entry + 1])
-    assert entry is not None and 30 < entry < 60 and at is not None and at >= 80
-    whole = joined(walk, at, sit, entry)
-    step = np.linalg.norm(np.diff(whole, axis=0), axis=-1).max()
-    assert step < 0.05 and whole[-1, 0, 2] < 0.6 and np.abs(_lengths(whole) - BONES).max() < 0.01
-
-
 def test_the_split_is_by_body():
     if not MOCAP.is_dir():
         pytest.skip(f"needs the motion capture at {MOCAP}")
@@ -201,11 +163,11 @@ def test_a_dataset_is_made_and_gone_on_with(tmp_path):
     folder.mkdir()
     (folder / "rocketbox.npz").symlink_to(MOCAP / "rocketbox.npz")
     prepare(folder, out, windows=24)
-    pool = load_pool([out / "pool-000.npz"])
-    assert pool["poses"].shape == (24, 80, 66) and pool["occupancy"].dtype == np.uint8
+    pool = load_pool([out / "pool-0000.npz"])
+    assert pool["poses"].shape == (24, 80, 66) and pool["poses"].dtype == np.int16
     assert {"walk", "stand"} & set(pool["kinds"]) and {"approach", "descend", "sit"} & set(pool["kinds"])
     described = json.loads((out / "dataset.json").read_text())
     assert described["train"] == ["rocketbox/male"] and described["held_out"] == ["rocketbox/female"]
-    stamp = (out / "pool-000.npz").stat().st_mtime_ns
+    stamp = (out / "pool-0000.npz").stat().st_mtime_ns
     prepare(folder, out, windows=24)
-    assert (out / "pool-000.npz").stat().st_mtime_ns == stamp, "finished shards are kept"
+    assert (out / "pool-0000.npz").stat().st_mtime_ns == stamp, "finished shards are kept"

@@ -12,10 +12,10 @@ from ..core.root import RootPath, ahead, root_from_joints, smoothed, to_root, ve
 from ..core.rotations import normalised
 from ..core.skeleton import MIRROR, joint
 from .boxes import near
-from .canonical import pose_legs
 from .furniture import Rest, furnished, resting
+from .retarget import at_seat_height
 
-__all__ = ["COMPOSED", "HISTORY", "LENGTH", "Motion", "Window", "motion_of", "draw", "mirrored", "at_seat_height"]
+__all__ = ["COMPOSED", "HISTORY", "LENGTH", "Motion", "Window", "motion_of", "draw", "mirrored"]
 
 HISTORY, LENGTH = 10, 70
 COMPOSED = "composed"
@@ -23,8 +23,8 @@ COMPOSED = "composed"
 _FRAMES = HISTORY + LENGTH
 _MARGIN = 32  # the root is smoothed over 24 frames and known 30 ahead
 _HOLD = 45
-_LOWEST, _HIGHEST = 0.40, 0.82  # resting pelvis, metres: seats of 0.28 to 0.70
-_LEGS = [joint(s + n) for s in ("left_", "right_") for n in ("ankle", "foot")]
+_LOWEST, _HIGHEST = 0.40, 0.86  # resting pelvis, metres: seats of 0.28 to 0.74
+_LOWERED = 0.3  # metres; from a high stool further down, every wave of the pelvis would grow
 
 
 @dataclass(frozen=True)
@@ -88,18 +88,6 @@ def mirrored(joints: np.ndarray) -> np.ndarray:
     return joints[:, MIRROR] * (-1.0, 1.0, 1.0)
 
 
-def at_seat_height(joints: np.ndarray, resting_pelvis: float, wanted: float) -> np.ndarray:
-    """The motion with its resting pelvis moved from one height to another: feet stay where they are, legs bend to suit.
-
-    The body above the legs moves by the whole difference while seated, by none while standing, in between in proportion.
-    """
-    standing = max(0.90, resting_pelvis + 0.08)
-    share = np.clip((standing - joints[:, 0, 2]) / (standing - resting_pelvis), 0.0, 1.1)
-    out = joints + np.array([0.0, 0.0, 1.0]) * ((wanted - resting_pelvis) * share)[:, None, None]
-    out[:, _LEGS] = joints[:, _LEGS]
-    return pose_legs(out)
-
-
 def _retimed(joints: np.ndarray, speed: float) -> np.ndarray:
     times = np.arange(0.0, len(joints) - 1, speed)
     low = times.astype(int)
@@ -137,7 +125,7 @@ def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> 
     if rests:
         height = float(rests[0].position[2])
         wanted = rng.uniform(_LOWEST, _HIGHEST) if rng.random() < 0.75 else height + rng.normal(0, 0.02)
-        joints = at_seat_height(joints, height, float(np.clip(wanted, _LOWEST, _HIGHEST)))
+        joints = at_seat_height(joints, height, float(np.clip(wanted, max(_LOWEST, height - _LOWERED), _HIGHEST)))
     if speed != 1.0:
         joints = _retimed(joints, speed)
     seated = bool(rests)
