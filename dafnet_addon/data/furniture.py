@@ -13,7 +13,7 @@ from ..core.skeleton import SEAT_TO_PELVIS, joint
 from .boxes import NO_BOXES, box, placed
 from .uses import Use, lying, reaching, stroking, working
 
-__all__ = ["Rest", "resting", "probes", "seat_for", "scattered", "furnished"]
+__all__ = ["Rest", "resting", "probes", "seat_for", "scattered", "fitted", "furnished"]
 
 _PROBES = [  # bone from, bone to, share of the way, radius of the flesh there
     ("pelvis", "pelvis", 0.0, 0.09), ("left_hip", "left_knee", 0.5, 0.06), ("right_hip", "right_knee", 0.5, 0.06),
@@ -409,7 +409,7 @@ def _carried(boxes: np.ndarray, rest: Rest) -> bool:
     return len(boxes) > 0 and float(_nearest(boxes, at[None])[0]) < 0.05
 
 
-def _fitted(
+def fitted(
     rng: np.random.Generator, joints: np.ndarray, path: RootPath, points: np.ndarray
 ) -> tuple[list[tuple[str, np.ndarray | None]], str]:
     """What a motion uses, one word each, with the boxes fitted to it or None where none could be had; and what is missing.
@@ -419,15 +419,15 @@ def _fitted(
     beds, rests = lying(joints), resting(joints, path)
     if _cut_off(joints, [(u.start, u.end) for u in beds] + [(r.start, r.end) for r in rests]):
         return [], "cut"
-    fitted = [("bed", _bed_for(rng, use, points)) for use in beds]
-    carrying = np.concatenate([NO_BOXES, *(rows for _, rows in fitted if rows is not None)])
+    pieces = [("bed", _bed_for(rng, use, points)) for use in beds]
+    carrying = np.concatenate([NO_BOXES, *(rows for _, rows in pieces if rows is not None)])
     places: list[Rest] = []
     for rest in rests:
         apart = all(np.linalg.norm(rest.position - other.position) > _ONE_SEAT for other in places)
         if apart and rest.position[2] > _ON_THE_FLOOR and not _carried(carrying, rest):
             places.append(rest)
-    fitted += [("seat", seat_for(rng, place, points)) for place in places]
-    missing = next((kind for kind, rows in fitted if rows is None), "")
+    pieces += [("seat", seat_for(rng, place, points)) for place in places]
+    missing = next((kind for kind, rows in pieces if rows is None), "")
     if not missing:
         hands = working(joints, path) + stroking(joints, path)
         reaches = reaching(joints, path)
@@ -435,8 +435,8 @@ def _fitted(
             hands = [reaches[rng.integers(len(reaches))]]
         for use in hands:
             if rng.random() < _LIKELY[use.kind]:
-                fitted.append((use.kind, _FITS[use.kind](rng, use, points)))
-    return fitted, missing
+                pieces.append((use.kind, _FITS[use.kind](rng, use, points)))
+    return pieces, missing
 
 
 def furnished(rng: np.random.Generator, joints: np.ndarray, path: RootPath) -> tuple[np.ndarray | None, str]:
@@ -446,12 +446,12 @@ def furnished(rng: np.random.Generator, joints: np.ndarray, path: RootPath) -> t
     down to one. A desk, board or shelf that does not fit is left out. Paper, section 5.2.
     """
     points = probes(joints)
-    fitted, missing = _fitted(rng, joints, path, points)
+    pieces, missing = fitted(rng, joints, path, points)
     if missing:
         return None, missing
     count = int(rng.integers(1, 5)) if rng.random() < 0.8 else 0
-    pieces = [rows for _, rows in fitted if rows is not None]
-    return np.concatenate([NO_BOXES, *pieces, scattered(rng, points, path, count)]), ""
+    used = [rows for _, rows in pieces if rows is not None]
+    return np.concatenate([NO_BOXES, *used, scattered(rng, points, path, count)]), ""
 
 
 _FITS = {"desk": _desk_for, "board": _board_for, "shelf": _shelf_for}
