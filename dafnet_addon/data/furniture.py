@@ -41,7 +41,7 @@ _TRIES = 16
 _ONE_SEAT = 0.25
 _ON_THE_FLOOR = 0.22  # a pelvis that rests lower than this sits on the floor
 _HALF_DOWN = 0.80
-_LIKELY = {"desk": 0.85, "board": 0.8, "shelf": 0.6}
+_LIKELY = {"desk": 0.85, "board": 0.8, "shelf": 0.6, "spare desk": 0.35}
 _SOFT = 0.3
 
 
@@ -336,6 +336,22 @@ def _shelf_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.nda
     return None
 
 
+def _spare_desk(rng: np.random.Generator, rest: Rest, points: np.ndarray) -> np.ndarray | None:
+    """A desk before a seat whose sitter leaves it alone, drawn up until it would touch the body on its way to the seat."""
+    top, x, depth, thick = rng.uniform(0.6, 0.85), rng.uniform(0.3, 0.8), rng.uniform(0.4, 0.8), rng.uniform(0.02, 0.06)
+    style = ("legs", "panels", "wall", "column")[rng.integers(4)]
+    rows = [box((0, depth / 2, top - thick / 2), (2 * x, depth, thick)), *_carrier(rng, top, thick, x, 0, depth, (style,))]
+    desk = np.array(rows)
+    desk[:, 0] += rng.uniform(-0.5, 0.5) * x
+    forward = np.array([-np.sin(rest.yaw), np.cos(rest.yaw)])
+    gap = rng.uniform(0.01, 0.08)
+    for distance in np.arange(0.2, 1.0, 0.08):
+        candidate = placed(desk, rest.position[:2] + distance * forward, rest.yaw)
+        if _clearance(candidate, points) >= gap:
+            return candidate
+    return None
+
+
 def _desk_alone(rng: np.random.Generator) -> np.ndarray:
     top, x, y = rng.uniform(0.4, 1.05), rng.uniform(0.25, 0.9), rng.uniform(0.2, 0.45)
     thick = rng.uniform(0.02, 0.08)
@@ -436,6 +452,8 @@ def fitted(
         for use in hands:
             if rng.random() < _LIKELY[use.kind]:
                 pieces.append((use.kind, _FITS[use.kind](rng, use, points)))
+        if places and rng.random() < _LIKELY["spare desk"] and all(kind != "desk" or rows is None for kind, rows in pieces):
+            pieces.append(("spare desk", _spare_desk(rng, places[0], points)))
     return pieces, missing
 
 
