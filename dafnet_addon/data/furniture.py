@@ -11,7 +11,7 @@ import numpy as np
 from ..core.root import RootPath
 from ..core.skeleton import SEAT_TO_PELVIS, joint
 from .boxes import NO_BOXES, box, placed
-from .uses import Use, lying, reaching, stroking, working
+from .uses import Use, lying, reaching, runs, stroking, working
 
 __all__ = ["Rest", "resting", "probes", "seat_for", "scattered", "fitted", "furnished"]
 
@@ -42,7 +42,7 @@ _ONE_SEAT = 0.25
 _ON_THE_FLOOR = 0.22  # a pelvis that rests lower than this sits on the floor
 _HALF_DOWN = 0.80
 _LIKELY = {"desk": 0.85, "board": 0.8, "shelf": 0.6, "spare desk": 0.35}
-_SOFT = 0.3
+_SOFT = 0.4  # of the seats that may be
 
 
 def _pressed(rest: float, **parts: float) -> np.ndarray:
@@ -88,10 +88,10 @@ _SEATS = (
     _Seat((0.15, 0.22), (0.12, 0.2), (0.1, 0.25), (0.03, 0.08), 0.0, 0.0),  # stool
     _Seat((0.18, 0.26), (0.14, 0.30), (0.14, 0.36), (0.03, 0.08), 0.85, 0.2, ("legs", "legs", "panels")),  # chair
     _Seat((0.22, 0.30), (0.15, 0.30), (0.14, 0.36), (0.05, 0.10), 0.9, 0.6, ("column",)),  # office chair
-    _Seat((0.5, 1.0), (0.12, 0.25), (0.12, 0.3), (0.03, 0.12), 0.2, 0.0),  # bench
+    _Seat((0.5, 1.0), (0.12, 0.25), (0.12, 0.3), (0.03, 0.12), 0.2, 0.0, ("block", "legs", "panels")),  # bench
     _Seat((0.27, 0.36), (0.18, 0.35), (0.2, 0.42), (0.1, 0.25), 0.9, 0.8, ("block", "legs"), soft=True),  # armchair
     _Seat((0.5, 1.1), (0.18, 0.35), (0.2, 0.42), (0.1, 0.25), 0.9, 0.7, ("block", "legs"), soft=True),  # sofa
-    _Seat((0.3, 1.0), (0.3, 0.6), (0.04, 0.14), (0.03, 0.3), 0.3, 0.0),  # sitting on the edge
+    _Seat((0.3, 1.0), (0.3, 0.6), (0.04, 0.14), (0.03, 0.3), 0.3, 0.0, ("block", "legs", "panels")),  # its edge
 )
 _SEAT_SHARES = (0.14, 0.27, 0.15, 0.10, 0.10, 0.14, 0.10)
 
@@ -116,12 +116,10 @@ def resting(joints: np.ndarray, path: RootPath) -> list[Rest]:
     ankles = (joints[:, joint("left_ankle")] + joints[:, joint("right_ankle")]) / 2
     ahead = np.linalg.norm((ankles - pelvis)[:, :2], axis=-1) > 0.15
     still = (pelvis[:, 2] < 0.88) & (speed < 0.12) & upright & ahead
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
     episodes = []
-    for start, end in zip(edges[::2], edges[1::2], strict=True):
-        if end - start >= _MIN_REST:
-            middle = np.median(pelvis[start:end], axis=0)
-            episodes.append(Rest(int(start), int(end), middle, float(np.median(path.yaw[start:end]))))
+    for start, end in runs(still, _MIN_REST):
+        middle = np.median(pelvis[start:end], axis=0)
+        episodes.append(Rest(start, end, middle, float(np.median(path.yaw[start:end]))))
     return episodes
 
 
