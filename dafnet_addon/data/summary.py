@@ -10,6 +10,8 @@ from .mocap import UNSTATED, Clip
 
 __all__ = ["summary"]
 
+_Key = tuple[str, str, str, str, str]  # source, subject, activity, split, licence
+
 _MINUTE = 30 * 60
 
 
@@ -19,9 +21,9 @@ def summary(clips: Iterable[Clip]) -> str:
     Frames that are cut are counted by reason (see ``cuts``), once each under the first that holds. A last line tells how many
     clips are refused for training because nobody stated their licence.
     """
-    frames: Counter[tuple[str, ...]] = Counter()
-    count: Counter[tuple[str, ...]] = Counter()
-    cut: defaultdict[tuple[str, ...], Counter[str]] = defaultdict(Counter)
+    frames: Counter[_Key] = Counter()
+    count: Counter[_Key] = Counter()
+    cut: defaultdict[_Key, Counter[str]] = defaultdict(Counter)
     for clip in clips:
         key = (clip.source, clip.subject, clip.category, clip.split or "none", clip.licence)
         frames[key] += len(clip.joints)
@@ -52,5 +54,5 @@ def summary(clips: Iterable[Clip]) -> str:
     )
     unstated = sum(clips_of for key, clips_of in count.items() if key[4] == UNSTATED)
     if unstated:
-        lines.append(f"{unstated} clips are not trained on, since their licence is not stated; state it in clips.json or clips.csv")
+        lines.append(f"{unstated} clips are not trained on: state their licence in clips.json or clips.csv")
     return "\n".join(line.rstrip() for line in lines)
