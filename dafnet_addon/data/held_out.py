@@ -5,7 +5,8 @@ figures of different weights are of the same test. It holds no motion; that come
 """
 
 import json
-from dataclasses import dataclass
+from collections import defaultdict
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,14 @@ from ..core.errors import InputError
 from ..core.root import RootPath, raw_root_from_joints
 from ..core.rotations import yaw_matrix
 from ..core.solids import Box, Scene
+from .canonical import calibrate, canonical
+from .compose import joined
 from .furniture import Rest
+from .mocap import Clip, read_clips
 from .prepare import load_motions
-from .windows import Motion
+from .windows import Motion, mirrored, motion_of
 
-__all__ = ["ACTIVITIES", "FROZEN", "HeldClip", "fingerprint", "held_out", "scene_of"]
+__all__ = ["ACTIVITIES", "FROZEN", "HeldClip", "fingerprint", "held_out", "scene_of", "test_motions"]
 
 FROZEN = Path(__file__).with_name("held_out.json")
 ACTIVITIES = {
@@ -32,6 +36,7 @@ ACTIVITIES = {
 }
 """Activities, and the categories of clips that are of them."""
 _ACTIVITY = {category: activity for activity, categories in ACTIVITIES.items() for category in categories}
+_TEST_ONLY = {"hdm05_cuts"}  # share-alike: the weights that ship must not be of it
 _SAME = 0.01  # metres by which a fingerprint may be off
 
 
@@ -39,7 +44,8 @@ _SAME = 0.01  # metres by which a fingerprint may be off
 class HeldClip:
     """``joints`` (T, 22, 3): ground truth, 30 fps. ``path``: its raw root. ``boxes`` (B, 7): its furniture, the same as its
     ``scene``. ``rests``: seated episodes. ``activity``: one of ``ACTIVITIES``. ``unseen``: whether the body has no clip in
-    training. ``composed``: whether it was made of several clips.
+    training. ``composed``: whether it was made of several clips. ``room``: what there is in it beside seats and chance pieces,
+    "desk", "board" or "shelf" where the hands use one, else "".
     """
 
     name: str
@@ -47,6 +53,7 @@ class HeldClip:
     activity: str
     unseen: bool
     composed: bool
+    room: str
     joints: np.ndarray
     path: RootPath
     boxes: np.ndarray
@@ -69,6 +76,27 @@ def scene_of(rows: np.ndarray) -> Scene:
     return Scene(tuple(Box(center=r[:3], half_size=r[3:6], rotation=yaw_matrix(r[6])) for r in rows))
 
 
+def test_motions(folder: Path) -> dict[str, Motion]:
+    """All motions of the test by name: those of ``load_motions``, and of sources that are never trained on."""
+    found = load_motions(folder, "test")
+    bodies: dict[str, list[Clip]] = defaultdict(list)
+    for clip in read_clips(folder):
+        if clip.source in _TEST_ONLY:
+            bodies[clip.subject].append(clip)
+    for clips in bodies.values():
+        body, wanted = calibrate(clips), [c for c in clips if c.category in _ACTIVITY]
+        found += [motion_of(c.name, c.source, c.subject, c.category, canonical(c, body)) for c in wanted]
+    return {f"{m.source}/{m.name}": m for m in found}
+
+
+def _composed(recipe: dict[str, Any], motions: dict[str, Motion]) -> Motion:
+    """A walk joined to a sit-down, which may be a stand-up reversed, and mirrored."""
+    sit = motions[recipe["sit"]]
+    joints = sit.joints[::-1] if recipe["reversed"] else sit.joints
+    joints = mirrored(joints) if recipe["mirrored"] else joints
+    return replace(sit, joints=joined(motions[recipe["walk"]].joints, recipe["at"], joints, recipe["entry"]))
+
+
 def _clip(frozen: dict[str, Any], motion: Motion) -> HeldClip:
     start = frozen["start"]
     joints = motion.joints[start : start + frozen["frames"]]
@@ -81,19 +109,21 @@ def _clip(frozen: dict[str, Any], motion: Motion) -> HeldClip:
     rests = tuple(
         Rest(a, b, np.median(joints[a:b, 0], axis=0), float(np.median(path.yaw[a:b]))) for a, b in frozen["rests"]
     )
-    rows = np.array(frozen["boxes"]).reshape(-1, 7)
-    body = f"{motion.source}/{motion.subject}"
     return HeldClip(
-        frozen["name"], body, _ACTIVITY[motion.category], frozen["unseen"], "composed" in frozen, joints, path, rows, rests
+        frozen["name"], f"{motion.source}/{motion.subject}", _ACTIVITY[motion.category], frozen["unseen"],
+        "composed" in frozen, frozen.get("room", ""), joints, path, np.array(frozen["boxes"]).reshape(-1, 7), rests,
     )
 
 
 def held_out(folder: Path) -> list[HeldClip]:
     """The frozen clips, cut from the motion files in ``folder``. Raises InputError where one is missing or not the same."""
-    motions = {f"{m.source}/{m.name}": m for m in load_motions(folder, "test")}
+    motions = test_motions(folder)
     clips = []
     for frozen in json.loads(FROZEN.read_text())["clips"]:
-        if frozen["name"] not in motions:
-            raise InputError(f"The held-out clip '{frozen['name']}' is not in '{folder}'; give the folder with all files.")
-        clips.append(_clip(frozen, motions[frozen["name"]]))
+        recipe = frozen.get("composed")
+        needed = [recipe["walk"], recipe["sit"]] if recipe else [frozen["name"]]
+        for name in needed:
+            if name not in motions:
+                raise InputError(f"The held-out clip '{name}' is not in '{folder}'; give the folder with all files.")
+        clips.append(_clip(frozen, _composed(recipe, motions) if recipe else motions[frozen["name"]]))
     return clips

@@ -41,8 +41,8 @@ from ..core.weights import Weights
 from ..data.held_out import HeldClip
 
 __all__ = [
-    "SEEDS", "Figures", "Measured", "beside", "evaluate", "figures", "in_processes", "made", "measured", "row", "rows",
-    "rows_of", "shot_of", "table",
+    "SEEDS", "Figures", "Measured", "beside", "captured", "evaluate", "figures", "in_processes", "made", "measured", "row",
+    "rows", "rows_of", "shot_of", "table",
 ]
 
 SEEDS = 5
@@ -68,12 +68,9 @@ class Figures:
 
 @dataclass(frozen=True)
 class Measured:
-    """One clip measured: its runs by name."""
+    """One clip measured: the figures of its runs by name."""
 
-    name: str
-    activity: str
-    unseen: bool
-    composed: bool
+    clip: HeldClip
     runs: dict[str, Figures]
 
 
@@ -162,7 +159,7 @@ def beside(sampler: Sampler, clip: HeldClip, seed: int = 0, seeds: int = SEEDS) 
         noise, takes_of = _noise(seed, seeds, mode)
         takes = made(sampler, shots[mode], noise)
         runs |= {run: figures(clip, takes[chosen], mode) for run, chosen in takes_of.items()}
-    return Measured(clip.name, clip.activity, clip.unseen, clip.composed, runs)
+    return Measured(clip, runs)
 
 
 _sampler: Sampler | None = None
@@ -227,12 +224,20 @@ def rows_of(clips: Sequence[Measured], runs: Sequence[str]) -> dict[str, dict[st
     return {run: row([clip.runs[run] for clip in clips]) for run in runs} if clips else {}
 
 
+def captured(clips: Sequence[HeldClip]) -> list[HeldClip]:
+    """Those of unseen bodies that were captured as they are, among seats and chance furniture: the headline figures' clips."""
+    return [clip for clip in clips if clip.unseen and not clip.composed and not clip.room]
+
+
 def rows(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
-    """Ground truth and all runs on unseen bodies; then on composed clips of theirs, and on bodies that are also in training."""
+    """Ground truth and all runs on unseen bodies, captured as they are; then with a desk, board or shelf, on composed clips,
+    and on bodies that are also in training.
+    """
     groups = {
-        "": [c for c in clips if c.unseen and not c.composed],
-        "_composed": [c for c in clips if c.composed],
-        "_bodies_in_training": [c for c in clips if not c.unseen],
+        "": [m for m in clips if captured([m.clip])],
+        "_at_desks_and_shelves": [m for m in clips if m.clip.unseen and m.clip.room],
+        "_composed": [m for m in clips if m.clip.unseen and m.clip.composed],
+        "_bodies_in_training": [m for m in clips if not m.clip.unseen],
     }
     out: dict[str, dict[str, Any]] = {}
     for suffix, chosen in groups.items():

@@ -39,7 +39,20 @@ from ..data.boxes import box, placed
 from ..data.held_out import ACTIVITIES, HeldClip, scene_of
 from ..data.sheet import sheet
 from .batches import NOISE
-from .evaluate import SEEDS, Figures, Measured, in_processes, made, measured, row, rows, rows_of, shot_of, table
+from .evaluate import (
+    SEEDS,
+    Figures,
+    Measured,
+    captured,
+    in_processes,
+    made,
+    measured,
+    row,
+    rows,
+    rows_of,
+    shot_of,
+    table,
+)
 
 __all__ = ["contact_sheets", "report", "text"]
 
@@ -285,11 +298,11 @@ def report(
         return lambda share: progress(sum(shares[:k]) + shares[k] * share)
 
     found = measured(weights, clips, part(0), seed)
-    unseen = [c for c in found if c.unseen and not c.composed]
-    captured = [c for c in clips if c.unseen and not c.composed]
+    plain = [each for each in found if captured([each.clip])]
     groups: dict[str, list[Measured]] = defaultdict(list)
-    for each in unseen:
-        groups[each.activity].append(each)
+    for each in found:
+        if each.clip.unseen and not each.clip.composed:
+            groups[each.clip.activity].append(each)
     return {
         "rows": rows(found),
         "by_activity": {
@@ -297,9 +310,9 @@ def report(
             for name in ACTIVITIES if name in groups
         },
         "drift": _drift(weights, part(1)),
-        "diversity": _diversity(unseen),
+        "diversity": _diversity(plain),
         "seats": _seats(weights, part(2)),
-        "actions": _actions(weights, captured, part(3)),
+        "actions": _actions(weights, captured(clips), part(3)),
     }
 
 
