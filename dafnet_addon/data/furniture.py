@@ -428,7 +428,8 @@ def fitted(
 ) -> tuple[list[tuple[str, np.ndarray | None]], str]:
     """What a motion uses, one word each, with the boxes fitted to it or None where none could be had; and what is missing.
 
-    Hands may as well work in the air: now and then theirs is not tried, and not in the list.
+    Hands may as well work in the air: now and then theirs is not tried, and not in the list. A "spare desk" stands before some
+    of the seats, and nobody uses it.
     """
     beds, rests = lying(joints), resting(joints, path)
     if _cut_off(joints, [(u.start, u.end) for u in beds] + [(r.start, r.end) for r in rests]):
@@ -443,13 +444,13 @@ def fitted(
     pieces += [("seat", seat_for(rng, place, points)) for place in places]
     missing = next((kind for kind, rows in pieces if rows is None), "")
     if not missing:
-        hands = working(joints, path) + stroking(joints, path)
-        reaches = reaching(joints, path)
-        if reaches and not hands:
-            hands = [reaches[rng.integers(len(reaches))]]
-        for use in hands:
-            if rng.random() < _LIKELY[use.kind]:
-                pieces.append((use.kind, _FITS[use.kind](rng, use, points)))
+        hands = working(joints, path) + stroking(joints, path) or reaching(joints, path)
+        for i in rng.permutation(len(hands)):  # pieces do not know of one another, so hands get one
+            kind = hands[i].kind
+            if rng.random() < _LIKELY[kind]:
+                pieces.append((kind, _FITS[kind](rng, hands[i], points)))
+                if pieces[-1][1] is not None:
+                    break
         if places and rng.random() < _LIKELY["spare desk"] and all(kind != "desk" or rows is None for kind, rows in pieces):
             pieces.append(("spare desk", _spare_desk(rng, places[0], points)))
     return pieces, missing
