@@ -61,15 +61,19 @@ def z_up(joints: np.ndarray, up: str) -> np.ndarray:
 def floor_height(joints: np.ndarray) -> float:
     """Height of the floor under joints (T, 22, 3), metres, z up: a planted toe base is at ``TOE_HEIGHT`` over it.
 
-    Toes count while they hardly move; nothing of the body is under the floor, so that one that only lies is not sunk in it.
+    Toes count while they hardly move with the pelvis well above them. A body that only lies has none such: nothing of it is
+    under the floor. (Elsewhere that does not hold: captured hands that push off the floor may lie 20 cm in it.)
     """
     toes = joints[:, _TOES]
     speed = np.linalg.norm(np.gradient(toes, axis=0), axis=-1) * MODEL_FPS if len(joints) > 1 else np.zeros(toes.shape[:2])
-    planted = toes[..., 2][speed < 0.15]
-    # Both feet are planted in a stance; a foot that rests on a step or lies is above the lowest.
-    heights = planted if len(planted) >= 10 else toes[..., 2].ravel()
-    lowest = float(np.percentile(joints[..., 2].min(1), 2))
-    return min(float(np.percentile(heights, 10)) - TOE_HEIGHT, lowest)
+    planted = toes[..., 2][(speed < 0.15) & (joints[:, :1, 2] - toes[..., 2] > 0.3)]
+    if len(planted) < 10:
+        # Too fast to stand anywhere for a frame: the lower foot's lowest.
+        planted = toes[..., 2].min(1)[joints[:, 0, 2] - toes[..., 2].min(1) > 0.3]
+    if not len(planted):
+        return float(np.percentile(joints[..., 2].min(1), 2))
+    # Low among the planted ones: a foot may also rest on a step.
+    return float(np.percentile(planted, 10)) - TOE_HEIGHT
 
 
 def at_model_rate(joints: np.ndarray, rate: float) -> np.ndarray:
