@@ -61,8 +61,8 @@ _HEIGHTS = {"low": 0.35, "medium": 0.45, "high": 0.60}
 _RIGHT_HEIGHT, _SITS_WITHIN, _STANDS_ABOVE = 0.05, 0.06, 0.86  # metres
 _AWAY = 0.8  # metres from a seat's middle, beyond which one stands
 _LIKELY = 0.02  # share of frames in which an action has to be the likeliest
-_SHEET_OF = {"sit down or up": 7, "sit": 3, "walk": 4, "reach": 3, "stand": 3}
-_A_SHEET = 2  # clips
+_SHEETS_OF = {"sit down or up": 5, "composed": 3, "desk or shelf": 3, "sit": 2, "walk": 3, "reach": 2, "stand": 2}
+_A_SHEET, _COLOURS = 4, 48  # clips on a sheet; colours that it is reduced to
 
 
 @dataclass(frozen=True)
@@ -345,22 +345,32 @@ def text(values: dict[str, Any]) -> str:
     return "\n\n".join([*parts, "\n".join([head, *body])])
 
 
+def _kind(clip: HeldClip) -> str:
+    return "composed" if clip.composed else "desk or shelf" if clip.room else clip.activity
+
+
 def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) -> list[Path]:
     """Twenty held-out clips of unseen bodies, real above FREE at temperature 0, drawn into ``folder``; the files."""
+    from PIL import Image
+
     chosen: list[HeldClip] = []
-    for activity, count in _SHEET_OF.items():
-        of_it = [clip for clip in clips if clip.unseen and clip.activity == activity]
+    for kind, count in _SHEETS_OF.items():
+        of_it = [clip for clip in clips if clip.unseen and _kind(clip) == kind]
         chosen += [of_it[i] for i in np.unique(np.linspace(0, len(of_it) - 1, min(count, len(of_it))).astype(int))]
     takes = in_processes(weights, _calm, chosen, lambda share: None)
     folder.mkdir(parents=True, exist_ok=True)
     drawn: list[tuple[str, np.ndarray, np.ndarray | None]] = [
         (f"{clip.name}, {kind}", joints, clip.boxes)
-        for clip, take in zip(chosen, takes, strict=True) for kind, joints in (("real", clip.joints), ("generated", take))
+        for clip, take in zip(chosen, takes, strict=True)
+        for kind, joints in (("composed" if clip.composed else "real", clip.joints), ("generated", take))
     ]
     files = []
     for k in range(0, len(drawn), 2 * _A_SHEET):
-        files.append(folder / f"held_out_{k // (2 * _A_SHEET) + 1:02d}.png")
+        files.append(folder / f"held_out_{k // (2 * _A_SHEET) + 1}.png")
         sheet(files[-1], drawn[k : k + 2 * _A_SHEET])
+        with Image.open(files[-1]) as picture:
+            flat = picture.convert("RGB").quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+        flat.save(files[-1], optimize=True)
     return files
 
 
