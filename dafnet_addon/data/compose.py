@@ -4,21 +4,23 @@ Walking up to a seat and sitting down, getting up and walking off, working while
 made of captured motion on the canonical body; what is added are joins, lent upper bodies and paths of hands.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.kinematics import two_bone
 from ..core.root import root_from_joints, to_root
 from ..core.rotations import frame_from, normalised, rotate, transpose, yaw_matrix
-from ..core.skeleton import OFFSETS, PARENTS, REST, joint
+from ..core.skeleton import OFFSETS, PARENTS, REST, SEAT_TO_PELVIS, joint
 from .canonical import FOOT, pose_legs
 from .windows import COMPOSED, Motion, mirrored, motion_of
 
-__all__ = ["Composed", "composed", "entrance", "joined", "matches"]
+__all__ = ["Composed", "composed", "entrance", "joined", "lent", "handed"]
 
 _WALK = {"locomotion", "walk", "turn", "carry_other", "door", "reach-hand-task", "greeting", "standing"}
 _SIT = {"sit-stand", "sit_down", "stand_up"}
+_BUSY = {"standing_gesture", "social_gesture", "greeting", "documents", "work_standing", "reach-hand-task", "standing_idle"}
 _MATCHED = [
     joint(n) for n in ("pelvis", "neck", "left_knee", "right_knee", "left_foot", "right_foot", "left_wrist", "right_wrist")
 ]
@@ -32,6 +34,9 @@ _FADE = 20  # frames in which the difference at a join dies away
 _ALIKE = 0.09  # metres: mean weighted difference, of places and velocities, of poses that may be joined
 _CLEAR = 0.42  # metres between a seat's middle and the way to it
 _DIRECTIONS = 8
+_LEANS = (-0.3, -0.15, 0.0, 0.0, 0.15, 0.3)  # radians; back is positive
+_AT_DESK_LEANS = (-0.2, -0.1, 0.0, 0.0, 0.06)
+_WORKS = 180  # frames of work that are joined to a sit-down or a walk
 _SLOW = 0.45  # metres per second of the root
 _LONGEST, _STAYS = 120, 60  # frames of sitting down and of resting that are kept
 _FASTEST, _HARDEST = 5.0, 75.0  # metres per second, and per second squared: the 99.9th percentile of what is captured, about
@@ -97,14 +102,6 @@ def _features(joints: np.ndarray) -> np.ndarray:
     return np.concatenate([places * _WEIGHTS, velocity * _WEIGHTS], axis=1).reshape(len(joints), -1)
 
 
-def matches(walk: np.ndarray, pose: np.ndarray) -> int | None:
-    """The frame of ``walk`` (T, 22, 3) at which the body is slow and most like ``pose`` (1, 22, 3); None if not like enough."""
-    slow = np.linalg.norm(np.gradient(walk[:, 0, :2], axis=0), axis=-1) * 30 < _SLOW
-    frames = np.flatnonzero(slow & (np.arange(len(walk)) >= 45))
-    cost = np.abs(_features(walk)[frames] - _features(np.repeat(pose, 2, axis=0))[0]).mean(1)
-    return int(frames[np.argmin(cost)]) if cost.min(initial=np.inf) < _ALIKE else None
-
-
 def _ease(x: np.ndarray) -> np.ndarray:
     """1 at and below 0, 0 at and above 1, smooth."""
     x = np.clip(x, 0.0, 1.0)
@@ -149,6 +146,7 @@ class _Piece:
 
     name: str
     subject: str
+    borrowed: bool
     joints: np.ndarray
 
 
@@ -163,8 +161,8 @@ def _sit_downs(motions: list[Motion]) -> Iterator[_Piece]:
                 entry = entrance(joints[ended:start], start - ended)
                 if entry is not None and start - ended - entry < _LONGEST:
                     piece = joints[ended + entry : min(end, start + _STAYS)]
-                    yield _Piece(m.name + how, m.subject, piece)
-                    yield _Piece(m.name + how + " mirrored", m.subject, mirrored(piece))
+                    yield _Piece(m.name + how, m.subject, m.source == "ui_prmd", piece)
+                    yield _Piece(m.name + how + " mirrored", m.subject, m.source == "ui_prmd", mirrored(piece))
                 ended = end
 
 
@@ -172,7 +170,7 @@ def _sit_downs(motions: list[Motion]) -> Iterator[_Piece]:
 class _Pool:
     """Frames (N, 2: clip, frame) in which a body is slow that comes from, or goes, elsewhere.
 
-    ``features`` (N, 48) must match; ``tracks`` (N, T, 2): where it was before, or will be, as seen from it; the farthest moment first.
+    ``features`` (N, 48) must match; ``tracks`` (N, T, 2): where it was before, or will be, as seen from it, the farthest first.
     """
 
     clips: list[np.ndarray]
@@ -233,31 +231,219 @@ def _ways(pool: _Pool, pose: np.ndarray, seat: np.ndarray, each: int) -> Iterato
                 yield pool.clips[clip], at
 
 
-def _to_and_from_seats(motions: list[Motion]) -> Iterator[Composed]:
+def _made(kind: str, name: str, subject: str, category: str, joints: np.ndarray, focus: np.ndarray) -> Iterator[Composed]:
+    """The composed motion, where it is fluent; nothing where it is not."""
+    if _fluent(joints).all():
+        yield Composed(kind, motion_of(f"{name} {kind}", COMPOSED, subject, category, joints), focus)
+
+
+def _to_and_from_seats(motions: list[Motion], sits: list[_Piece], to: _Pool, away: _Pool) -> Iterator[Composed]:
     """Walks that end in a sit-down ("approach"), and stand-ups that go on as a walk ("leave"), all around the seat."""
-    to_seats, from_seats = _pool(motions, arriving=True), _pool(motions, arriving=False)
-    pieces = list(_sit_downs(motions))
-    borrowed = {m.name for m in motions if m.source == "ui_prmd"}  # their arms; many, and all from the front
-    own, lent = ([p for p in pieces if (p.name.split(" ")[0] in borrowed) == which] for which in (False, True))
-    for sit, each in [(p, 2) for p in own] + [(p, 1) for p in lent[::9]]:
+    for sit in sits:
+        each = 1 if sit.borrowed else 2
         path = root_from_joints(sit.joints)
         seat = rotate(path.rotation[0].T, sit.joints[-1, 0] - path.position[0])[:2]
         down, up = sit.joints, sit.joints[::-1]
-        for walk, at in _ways(to_seats, _features(down)[0], seat, each):
+        for walk, at in _ways(to, _features(down)[0], seat, each):
             whole = joined(walk, at, down, 0)
-            start = _BEFORE + len(down) - 1 - _STAYS
-            yield from _made("approach", sit, whole, np.arange(60, max(start, 90) + 20, 5))
-        for walk, at in _ways(from_seats, _features(up)[-1], seat, each):
+            focus = np.arange(60, max(_BEFORE + len(down) - _STAYS, 90) + 20, 5)
+            yield from _made("approach", sit.name, sit.subject, "sit-stand", whole, focus)
+        for walk, at in _ways(away, _features(up)[-1], seat, each):
             whole = joined(up, len(up) - 1, walk[: at + _BEFORE], at)
-            yield from _made("leave", sit, whole, np.arange(max(0, min(len(up), _BEFORE) - 60), len(whole) - 40, 5))
+            focus = np.arange(max(0, min(len(up), _BEFORE) - 60), len(whole) - 40, 5)
+            yield from _made("leave", sit.name, sit.subject, "sit-stand", whole, focus)
 
 
-def _made(kind: str, piece: _Piece, joints: np.ndarray, focus: np.ndarray) -> Iterator[Composed]:
-    """The composed motion, where it is fluent; nothing where it is not."""
-    if _fluent(joints).all():
-        yield Composed(kind, motion_of(f"{piece.name} {kind}", COMPOSED, piece.subject, "sit-stand", joints), focus)
+def _about_x(angle: np.ndarray) -> np.ndarray:
+    """Rotations (T, 3, 3) about x: forward, and up, tilt backward by ``angle`` (radians)."""
+    m = np.zeros((len(angle), 3, 3))
+    c, s = np.cos(angle), np.sin(angle)
+    m[:, 0, 0], m[:, 1, 1], m[:, 1, 2], m[:, 2, 1], m[:, 2, 2] = 1.0, c, -s, s, c
+    return m
+
+
+def _through(stops: np.ndarray, frames: Sequence[int]) -> np.ndarray:
+    """A course (sum of ``frames`` + 1, …) through ``stops`` (N, …) with the least jerk, at rest in each of them."""
+    parts = [stops[:1]]
+    for a, b, n in zip(stops[:-1], stops[1:], frames, strict=True):
+        s = (np.arange(n) + 1.0).reshape(-1, *(1,) * (stops.ndim - 1)) / n
+        parts.append(a + (b - a) * s**3 * (10.0 - 15.0 * s + 6.0 * s * s))
+    return np.concatenate(parts)
+
+
+def _wander(rng: np.random.Generator, frames: int, columns: int, sigma: float) -> np.ndarray:
+    """Smooth noise (T, columns) of unit size; ``sigma`` in frames."""
+    reach = np.arange(-int(3 * sigma), int(3 * sigma) + 1)
+    kernel = np.exp(-0.5 * (reach / sigma) ** 2)
+    kernel /= np.sqrt((kernel**2).sum())
+    noise = rng.normal(size=(frames + len(kernel) - 1, columns))
+    return np.stack([np.convolve(c, kernel, mode="valid") for c in noise.T], axis=1)
+
+
+def _swayed(joints: np.ndarray, lean: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """A seated body that leans back (``lean`` (T,), radians; forward where negative) and turns on its seat; its feet stay."""
+    yaw = root_from_joints(joints).yaw
+    about = yaw_matrix(yaw + turn) @ _about_x(lean) @ yaw_matrix(-yaw)
+    middle = (joints[:, 1] + joints[:, 2]) / 2
+    out = joints.copy()
+    above = [j for j in range(22) if j not in _LEGS]
+    out[:, above] = middle[:, None] + np.einsum("tij,tbj->tbi", about, joints[:, above] - middle[:, None])
+    knees = [joint("left_knee"), joint("right_knee")]
+    out[:, knees] = middle[:, None] + np.einsum("tij,tbj->tbi", yaw_matrix(turn / 2), joints[:, knees] - middle[:, None])
+    return _on_the_body(out)
+
+
+def lent(joints: np.ndarray, upper: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """The motion (T, 22, 3) with the chest's attitude, head and arms of another, as it has them in its root's frame.
+
+    ``share`` (T,): from 0, the motion's own, to 1, the other's. Legs and pelvis stay.
+    """
+    to_ours = root_from_joints(joints).rotation @ transpose(root_from_joints(upper).rotation)
+    other = joints[:, :1] + np.einsum("tij,tbj->tbi", to_ours, upper - upper[:, :1])
+    out = joints.copy()
+    (_, a), (_, b) = _frames(joints), _frames(other)
+    m = (1 - share)[:, None, None] * a + share[:, None, None] * b
+    # The chest is read off neck and collars; their places tell the frame alone.
+    chest = frame_from(m[..., :, 0], m[..., :, 2], "xz") @ _REST_CHEST
+    for name in ("neck", "left_collar", "right_collar"):
+        out[:, joint(name)] = out[:, joint("spine3")] + rotate(chest, OFFSETS[joint(name)])
+    for j in (joint("head"), *_ARMS):
+        ours, theirs = (normalised(x[:, j] - x[:, PARENTS[j]]) for x in (joints, other))
+        out[:, j] = out[:, PARENTS[j]] + normalised(ours + (theirs - ours) * share[:, None]) * _LENGTHS[j]
+    return _on_the_body(out)
+
+
+def handed(joints: np.ndarray, side: str, wrist: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """The motion with one hand (``side`` "left_" or "right_") led along ``wrist`` (T, 3), world, where ``share`` (T,) is 1."""
+    shoulder, elbow, hand = (joint(side + n) for n in ("shoulder", "elbow", "wrist"))
+    out, weight = joints.copy(), share[:, None]
+    target = joints[:, hand] + (wrist - joints[:, hand]) * weight
+    # Over a desk's edge the hand comes from above.
+    early = np.sin(np.pi / 2 * share)
+    target[:, 2] = joints[:, hand, 2] + (wrist[:, 2] - joints[:, hand, 2]) * early
+    outward = np.array([-0.12 if side == "left_" else 0.12, -0.05, -0.25])
+    hangs = (joints[:, shoulder] + wrist) / 2 + rotate(root_from_joints(joints).rotation, outward)
+    pole = joints[:, elbow] + (hangs - joints[:, elbow]) * weight
+    out[:, elbow], out[:, hand] = two_bone(joints[:, shoulder], target, pole, _LENGTHS[elbow], _LENGTHS[hand])
+    return out
+
+
+def _typing(rng: np.random.Generator, frames: int, side: float) -> np.ndarray:
+    """A hand's course (T, 3) over a desk: x right, y forward, z over the top; small quick moves about a slow place."""
+    home = np.array([side * rng.uniform(0.08, 0.16), rng.uniform(0.28, 0.36), 0.05])
+    return home + _wander(rng, frames, 3, 25) * (0.012, 0.012, 0.002) + _wander(rng, frames, 3, 2.5) * (0.007, 0.006, 0.005)
+
+
+def _handwriting(rng: np.random.Generator, frames: int, side: float) -> np.ndarray:
+    """Lines from left to right, letter by letter, over a desk."""
+    width, y = rng.uniform(0.10, 0.18), rng.uniform(0.28, 0.36)
+    left = side * rng.uniform(0.08, 0.14) - width / 2
+    stops = [np.array([left, y, 0.05])]
+    times: list[int] = []
+    while sum(times) < frames:
+        line = len(stops) // 2 % 6
+        stops += [np.array([left + width, y - 0.01 * line, 0.05]), np.array([left, y - 0.01 * (line + 1), 0.05])]
+        times += [int(rng.integers(80, 150)), int(rng.integers(18, 30))]
+    letters = _wander(rng, frames, 2, 2.5) * (0.004, 0.005)
+    return _through(np.array(stops), times)[:frames] + np.pad(letters, ((0, 0), (0, 1)))
+
+
+def _handling(rng: np.random.Generator, frames: int, side: float) -> np.ndarray:
+    """A hand that moves between places on a desk, stays there, and is lifted between."""
+    stops: list[tuple[float, float, float]] = []
+    times: list[int] = []
+    while sum(times) < frames:
+        stops += [(side * rng.uniform(0.02, 0.34), rng.uniform(0.24, 0.40), 0.05)] * 2
+        times += [int(rng.integers(8, 75)), int(rng.integers(16, 36))]
+    course = _through(np.array(stops), times[:-1])
+    speed = np.linalg.norm(np.gradient(course[:, :2], axis=0), axis=-1)
+    course[:, 2] += rng.uniform(0.02, 0.08) * speed / speed.max()
+    return np.concatenate([course, np.repeat(course[-1:], max(0, frames - len(course)), axis=0)])[:frames]
+
+
+def _resting_hand(rng: np.random.Generator, frames: int, side: float) -> np.ndarray:
+    """A hand that lies on a desk."""
+    home = np.array([side * rng.uniform(0.10, 0.28), rng.uniform(0.24, 0.36), 0.05])
+    return home + _wander(rng, frames, 3, 30) * (0.006, 0.006, 0.001)
+
+
+_AT_DESKS = (  # of the left and the right hand; None hangs or lies as captured
+    (_typing, _typing), (_typing, _typing), (_resting_hand, _handwriting), (_handling, _handling), (_resting_hand, _handling),
+    (_typing, _handling), (None, _handwriting), (None, _handling),
+)
+
+
+def _presence(frames: int, start: int, end: int, rise: int = 24) -> np.ndarray:
+    """A share (T,) that rises from 0 before ``start`` + ``rise`` to 1 and falls to 0 again before ``end``."""
+    t = np.arange(frames)
+    return np.asarray((1 - _ease((t - start) / rise)) * _ease((t - end + rise) / rise))
+
+
+def _at_top(
+    rng: np.random.Generator, joints: np.ndarray, start: int, end: int, height: float, farther: float = 0.0
+) -> np.ndarray:
+    """The motion with hands that work on a top at ``height`` in frames ``start`` to ``end``, wherever its root is then."""
+    path = root_from_joints(joints)
+    origin, turn = path.position[(start + end) // 2], path.rotation[(start + end) // 2]
+    out = joints
+    for side, sign, course in zip(("left_", "right_"), (-1.0, 1.0), _AT_DESKS[rng.integers(len(_AT_DESKS))], strict=True):
+        if course is not None:
+            local = course(rng, len(joints), sign) + np.array([0.0, farther, height])
+            first = start + int(rng.integers(0, 12))
+            out = handed(out, side, origin + rotate(turn, local), _presence(len(joints), first, end - int(rng.integers(0, 12))))
+    return out
+
+
+def _uppers(motions: list[Motion], categories: set[str]) -> list[np.ndarray]:
+    """Pieces (T, 22, 3) in which a body stays where it is, upright, and does something."""
+    found = []
+    for m in motions:
+        if m.category in categories:
+            for start in range(0, len(m.joints) - _WORKS + 1, _WORKS):
+                piece = m.joints[start : start + _WORKS]
+                trunk = normalised(piece[:, joint("neck")] - piece[:, 0])[:, 2]
+                stays = np.ptp(piece[:, 0, :2], axis=0).max() < 0.3
+                if stays and trunk.min() > 0.75 and m.valid[start : start + _WORKS].all() and _fluent(piece).all():
+                    found.append(piece)
+    return found
+
+
+def _leaning(rng: np.random.Generator, frames: int, rest: int, leans: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """How a body leans back and turns on its seat (T,), radians, once it rests; it goes from one of ``leans`` to another."""
+    stops = np.concatenate([[0.0, 0.0], rng.choice(leans, 5) * rng.uniform(0.6, 1.0, 5)])
+    lean = _through(stops, [rest, *rng.integers(30, 60, 5)])
+    lean = np.pad(lean, (0, frames), mode="edge")[:frames]
+    begun = 1 - _ease((np.arange(frames) - rest) / 40)
+    wander = _wander(rng, frames, 2, 30) * (0.02, 0.10) * begun[:, None]
+    return lean + wander[:, 0], wander[:, 1]
+
+
+def _while_seated(motions: list[Motion], sits: list[_Piece]) -> Iterator[Composed]:
+    """Seated legs under upper bodies that gesture, greet and reach ("work"), or whose hands work at a desk ("desk")."""
+    rng = np.random.default_rng(12)
+    seated = _uppers(motions, {"seated_chair", "seated_table"})
+    busy = _uppers(motions, _BUSY) + seated
+    for sit in sits * 3:
+        for kind, uppers, leans in (("work", busy, _LEANS), ("desk", seated, _AT_DESK_LEANS)):
+            if not uppers:
+                continue
+            body = np.concatenate([sit.joints, np.repeat(sit.joints[-1:], _WORKS, axis=0)])
+            rest, frames = len(sit.joints) - 20, len(body)
+            upper = uppers[rng.integers(len(uppers))]
+            upper = upper if rng.random() < 0.5 else mirrored(upper)
+            upper = np.pad(upper, ((rest, frames), (0, 0), (0, 0)), mode="edge")[:frames]
+            body = lent(body, upper, _presence(frames, rest, 2 * frames, 30))
+            body = _swayed(body, *_leaning(rng, frames, rest, leans))
+            if kind == "desk":
+                top = body[rest + 20, 0, 2] - SEAT_TO_PELVIS + rng.uniform(0.24, 0.33)
+                body = _at_top(rng, body, rest + 5, frames + 60, top)
+            yield from _made(kind, sit.name, sit.subject, "seated", body, np.arange(rest, frames - 20, 5))
 
 
 def composed(motions: list[Motion]) -> list[Composed]:
     """All composed motions of captured ones on the canonical body; the same for the same motions."""
-    return list(_to_and_from_seats(motions))
+    to, away = _pool(motions, arriving=True), _pool(motions, arriving=False)
+    sits = list(_sit_downs(motions))
+    # Many of those with borrowed arms, and all of them begin in front of the seat.
+    sits = [s for s in sits if not s.borrowed] + [s for s in sits if s.borrowed][::9]
+    return [*_to_and_from_seats(motions, sits, to, away), *_while_seated(motions, sits)]
