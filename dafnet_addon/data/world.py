@@ -66,14 +66,14 @@ def floor_height(joints: np.ndarray) -> float:
     """
     toes = joints[:, _TOES]
     speed = np.linalg.norm(np.gradient(toes, axis=0), axis=-1) * MODEL_FPS if len(joints) > 1 else np.zeros(toes.shape[:2])
-    planted = toes[..., 2][(speed < 0.15) & (joints[:, :1, 2] - toes[..., 2] > 0.3)]
-    if len(planted) < 10:
-        # Too fast to stand anywhere for a frame: the lower foot's lowest.
-        planted = toes[..., 2].min(1)[joints[:, 0, 2] - toes[..., 2].min(1) > 0.3]
-    if not len(planted):
+    carried = joints[:, :1, 2] - toes[..., 2] > 0.3
+    if not carried.any():
         return float(np.percentile(joints[..., 2].min(1), 2))
-    # Low among the planted ones: a foot may also rest on a step.
-    return float(np.percentile(planted, 10)) - TOE_HEIGHT
+    planted = toes[..., 2][carried & (speed < 0.15)]
+    # Low among them, since a foot may rest on a step; a runner's toes hardly stand, so that the lower of the two counts too.
+    lower = float(np.percentile(toes[..., 2].min(1)[carried.all(1)], 8)) if carried.all(1).any() else np.inf
+    lowest = float(np.percentile(planted, 10)) if len(planted) >= 10 else np.inf
+    return min(lower, lowest, float(toes[..., 2][carried].max())) - TOE_HEIGHT
 
 
 def at_model_rate(joints: np.ndarray, rate: float) -> np.ndarray:
