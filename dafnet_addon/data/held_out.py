@@ -94,7 +94,8 @@ def _composed(recipe: dict[str, Any], motions: dict[str, Motion]) -> Motion:
     sit = motions[recipe["sit"]]
     joints = sit.joints[::-1] if recipe["reversed"] else sit.joints
     joints = mirrored(joints) if recipe["mirrored"] else joints
-    return replace(sit, joints=joined(motions[recipe["walk"]].joints, recipe["at"], joints, recipe["entry"]))
+    walk = motions[recipe["walk"]].joints[: recipe["at"] + 1]
+    return replace(sit, joints=joined(walk, joints[recipe["entry"] :]))
 
 
 def _clip(frozen: dict[str, Any], motion: Motion) -> HeldClip:
