@@ -11,11 +11,14 @@ from dafnet_addon.core.rotations import rotate
 from dafnet_addon.core.skeleton import JOINTS, PARENTS, REST, TOE_HEIGHT, joint
 from dafnet_addon.data.acclaim import read_amc, read_asf
 from dafnet_addon.data.amass import read_amass
+from dafnet_addon.data.boxes import box
 from dafnet_addon.data.bvh import read_bvh
+from dafnet_addon.data.canonical import calibrate
 from dafnet_addon.data.cuts import bad_frames, cuts
-from dafnet_addon.data.mocap import UNSTATED, read_clips
+from dafnet_addon.data.mocap import UNSTATED, Clip, read_clips
 from dafnet_addon.data.recording import Recording, posed, rotation_about
 from dafnet_addon.data.rigs import mapped, rigs
+from dafnet_addon.data.sheet import sheet
 from dafnet_addon.data.summary import summary
 from dafnet_addon.data.world import at_model_rate, floor_height, unit_of
 
@@ -430,6 +433,29 @@ def test_the_summary_counts_minutes_clips_and_cuts(tmp_path):
     text = summary(read_clips(tmp_path))
     assert "2 clips" in text and "locomotion" in text and "0.1" in text and "2 clips are not trained on" in text
     assert "T-pose" in text, "the rest skeleton is a T-pose, swung a little"
+
+
+def test_legs_are_measured_standing():
+    """Legs from markers measure shorter when bent; a body scaled by that would hover over the floor when it stands."""
+    joints = np.concatenate([_standing(60), _standing(200)])
+    hips = [j for j in range(22) if j not in {joint(s + n) for s in ("left_", "right_") for n in ("ankle", "foot")}]
+    joints[60:, hips] -= (0.0, 0.0, 0.3)  # lower, with shins as much shorter
+    clip = Clip("a", "markers", "s1", "", "sit-stand", "train", "CC0", joints)
+    assert calibrate([clip]).scale == pytest.approx(1.0, abs=1e-3)
+    lying = Clip("b", "markers", "s1", "", "lying", "train", "CC0", joints[..., [0, 2, 1]] * (1, -1, 1))
+    with pytest.raises(InputError, match="'markers/s1' never stands") as error:
+        calibrate([lying])
+    _one_sentence(error)
+
+
+def test_a_sheet_is_drawn_for_any_length(tmp_path):
+    pytest.importorskip("matplotlib")
+    seat = box((0.0, 0.3, 0.4), (0.5, 0.5, 0.05))[None]
+    touching = np.ones((30, 5), dtype=bool)
+    plain, full = tmp_path / "plain.png", tmp_path / "full.png"
+    sheet(plain, [("a pose", REST[None], None), ("a motion", _standing(30), None)], columns=3)
+    sheet(full, [("a pose", REST[None], None), ("a motion", _standing(30), seat)], columns=3, contacts=[None, touching])
+    assert 5_000 < plain.stat().st_size < full.stat().st_size, "furniture and contacts are drawn too"
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,184 @@
+"""What fitting to the canonical body does to each source of motion: a table of distances and a picture of poses.
+
+Run as ``PYTHONPATH=. python benchmarks/canonical.py FOLDER PICTURE.png``; FOLDER holds motion capture, as
+``dafnet_addon.data.mocap`` reads it.
+"""
+
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from dafnet_addon.core.errors import InputError
+from dafnet_addon.core.root import root_from_joints
+from dafnet_addon.core.rotations import rotate, transpose
+from dafnet_addon.core.skeleton import PARENTS, TOE_HEIGHT, joint
+from dafnet_addon.data.canonical import Calibration, calibrate, canonical
+from dafnet_addon.data.cuts import bad_frames
+from dafnet_addon.data.mocap import Clip, read_clips
+
+_FPS = 30.0
+_PLANTED, _STILL = 0.25, 0.04  # metres a second: of a toe on the floor, of a hand that rests
+_TOES, _WRISTS = (joint("left_foot"), joint("right_foot")), (joint("left_wrist"), joint("right_wrist"))
+_SLIDE, _TOE, _ANKLE, _WRIST, _SEAT = "toe slide", "toe moved", "ankle moved", "wrist wander", "seat wander"
+
+Pair = tuple[np.ndarray, np.ndarray]
+
+
+def bodies(clips: list[Clip]) -> list[tuple[Calibration, list[Clip]]]:
+    """Clips of one source by body; those of bodies that never stand upright are fitted with the rest of their source."""
+    by_subject: dict[str, list[Clip]] = defaultdict(list)
+    for clip in clips:
+        by_subject[clip.subject].append(clip)
+    fitted = []
+    for own in by_subject.values():
+        try:
+            fitted.append((calibrate(own), own))
+        except InputError:
+            fitted.append((calibrate(clips), own))
+    return fitted
+
+
+def pairs(clips: list[Clip]) -> list[Pair]:
+    """Each clip (T, 22, 3) before, only scaled and on the floor, and after fitting."""
+    out = []
+    for body, own in bodies(clips):
+        for clip in own:
+            after = canonical(clip, body)
+            before = clip.joints * body.scale
+            toes = before[:, _TOES, 2].min(1)
+            before = before - (0.0, 0.0, float(np.percentile(toes, 8)) - TOE_HEIGHT)
+            out.append((before, after))
+    return out
+
+
+def _speed(joints: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(np.diff(joints, axis=0), axis=-1) * _FPS
+
+
+def _runs(flags: np.ndarray, least: int) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]]))).reshape(-1, 2)
+    return [(int(a), int(b)) for a, b in edges if b - a >= least]
+
+
+def _wander(joints: np.ndarray) -> float:
+    return float(np.linalg.norm(joints - joints.mean(0), axis=-1).max())
+
+
+def measured(found: list[Pair]) -> dict[str, tuple[float, float, int]]:
+    """Mean before and after (millimetres) of each figure of a source, and how many frames or episodes it is of.
+
+    Slide: how far a toe base that stands moves along the floor in a frame. Moved: how far from its place before fitting (before
+    is zero). Wander: how far a joint that rests for 0.7 s or more strays from its mean, of hands while the chest moves by 4 cm,
+    and of the seated pelvis.
+    """
+    values: dict[str, list[tuple[float, float]]] = defaultdict(list)
+    for before, after in found:
+        if len(before) < 3:
+            continue
+        for toe in _TOES:
+            planted = (before[:-1, toe, 2] < 0.05) & (_speed(before[:, toe]) < _PLANTED)
+            steps = [np.linalg.norm(np.diff(j[:, toe, :2], axis=0), axis=-1)[planted] for j in (before, after)]
+            values[_SLIDE] += list(zip(*steps, strict=True))
+            values[_TOE] += [(0.0, d) for d in np.linalg.norm(after[:, toe] - before[:, toe], axis=-1)]
+            values[_ANKLE] += [(0.0, d) for d in np.linalg.norm(after[:, toe - 3] - before[:, toe - 3], axis=-1)]
+        for wrist in _WRISTS:
+            for a, b in _runs(_speed(before[:, wrist]) < _STILL, 20):
+                if _wander(before[a:b, joint("spine3")]) > 0.04:
+                    values[_WRIST].append((_wander(before[a:b, wrist]), _wander(after[a:b, wrist])))
+        for a, b in _runs((_speed(before[:, 0]) < 0.1) & (before[:-1, 0, 2] < 0.7) & (before[:-1, 0, 2] > 0.3), 20):
+            values[_SEAT].append((_wander(before[a:b, 0]), _wander(after[a:b, 0])))
+    return {name: (*(1000 * np.array(v).mean(0)).tolist(), len(v)) for name, v in values.items()}
+
+
+def table(sources: dict[str, list[Pair]]) -> str:
+    """The figures of each source as text, "before → after" in millimetres, episodes in brackets."""
+    names = (_SLIDE, _TOE, _ANKLE, _WRIST, _SEAT)
+    heads = ("source", "toe slide, mm/frame", "toe moved", "ankle moved", "resting hand wanders", "seated pelvis wanders")
+    rows: list[tuple[str, ...]] = [heads]
+    for source, found in sources.items():
+        figures = measured(found)
+        cells = [source]
+        for name in names:
+            if name not in figures:
+                cells.append("-")
+                continue
+            before, after, count = figures[name]
+            text = f"{after:.1f}" if name in (_TOE, _ANKLE) else f"{before:.2f} → {after:.2f}"
+            cells.append(f"{text} ({count})" if name in (_WRIST, _SEAT) else text)
+        rows.append(tuple(cells))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows)
+
+
+def _poses(found: list[Pair]) -> list[Pair]:
+    """A standing, a striding and a low pose of a source, before and after, seen from the body's right front, (22, 2)."""
+    good = [(b, a, ~np.any(list(bad_frames(b).values()), axis=0)) for b, a in found if len(b) > 2]
+
+    def kinds(joints: np.ndarray) -> list[np.ndarray]:
+        """How far each frame is from each kind of pose, metres: feet so far apart under a high pelvis, and a pelvis so low."""
+        stride = np.linalg.norm(joints[:, joint("left_ankle")] - joints[:, joint("right_ankle")], axis=-1)
+        height = joints[:, 0, 2]
+        unfit = (height < 0.85) | (joints[:, _TOES, 2].min(1) > 0.04)
+        return [*(np.abs(stride - apart) + 9.0 * unfit for apart in (0.2, 0.65)), np.abs(height - 0.55)]
+
+    shown = []
+    for kind in range(3):
+        scores = [np.where(ok, -kinds(b)[kind], -99.0) for b, _, ok in good]
+        clip = int(np.argmax([s.max() for s in scores]))
+        frame = int(np.argmax(scores[clip]))
+        before, after = good[clip][0], good[clip][1]
+        path = root_from_joints(before)
+        seen = []
+        for joints in (before, after):
+            local = rotate(transpose(path.rotation[frame]), joints[frame] - path.position[frame])
+            turn = np.radians(60)
+            across = local[:, 1] * np.sin(turn) - local[:, 0] * np.cos(turn)
+            seen.append(np.stack([across, local[:, 2]], -1))
+        shown.append((seen[0], seen[1]))
+    return shown
+
+
+def picture(sources: dict[str, list[Pair]], file: Path) -> None:
+    """Poses of each source before (grey) and after fitting (blue the left, orange the right) in one picture."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    columns = 4
+    lines = -(-len(sources) // columns)
+    figure = Figure(figsize=(columns * 2.9, lines * 2.0), dpi=100, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(lines, columns).ravel()
+    for ax in axes:
+        ax.axis("off")
+    for ax, (source, found) in zip(axes, sources.items(), strict=False):
+        ax.set(xlim=(-0.6, 2.9), ylim=(-0.1, 1.85), aspect="equal")
+        ax.axhline(0.0, color="#c8c8c8", lw=0.8)
+        ax.set_title(source, fontsize=8)
+        for place, (before, after) in enumerate(_poses(found)):
+            shift = np.array([1.1 * place, 0.0])
+            for pose, fitted in ((before, False), (after, True)):
+                for j, parent in enumerate(PARENTS[1:], start=1):
+                    side = "#1f6fb4" if j in (1, 4, 7, 10, 13, 16, 18, 20) else "#3a3a3a"
+                    colour = "#e0701a" if j in (2, 5, 8, 11, 14, 17, 19, 21) else side
+                    ends = pose[[parent, j]] + shift
+                    ax.plot(*ends.T, color=colour if fitted else "#b4b4b4", lw=1.4 if fitted else 3.0, solid_capstyle="round")
+    key = "grey: as captured,\nscaled to our legs\ncoloured: fitted\n(blue left, orange right)"
+    axes[-1].text(0.02, 0.5, key, fontsize=8, va="center")
+    figure.savefig(file)
+
+
+def main(folder: Path, file: Path) -> None:
+    """Print the table and draw the picture of the compact sources in ``folder``."""
+    clips: dict[str, list[Clip]] = defaultdict(list)
+    for clip in read_clips(folder):
+        if clip.split:
+            clips[clip.source].append(clip)
+    sources = {source: pairs(own) for source, own in clips.items()}
+    print(table(sources))
+    picture(sources, file)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))
