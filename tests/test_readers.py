@@ -303,9 +303,16 @@ def test_what_is_known_of_a_clip_is_stated_beside_it(tmp_path):
     (tmp_path / "clips.json").rename(tmp_path / "other.json")
     (tmp_path / "clips.csv").write_text("file,licence,fps,up\n*,CC BY,60,\n")
     assert {c.licence for c in read_clips(tmp_path)} == {"CC BY"} and {len(c.joints) for c in read_clips(tmp_path)} == {6}
-    (tmp_path / "clips.csv").write_text("file,licence,split\n*,CC BY,all\n")
-    with pytest.raises(InputError, match="split"):
-        list(read_clips(tmp_path))
+    for wrong in ("file,split\n*,all\n", "file,fps\n*,fast\n", "file,up\n*,x\n", "file,colour\n*,red\n", "file,up\n*,z,more\n"):
+        (tmp_path / "clips.csv").write_text(wrong)
+        with pytest.raises(InputError, match="states for '\\*' what cannot be used") as error:
+            list(read_clips(tmp_path))
+        _one_sentence(error)
+    for wrong in ("[1]", "{", '{"a.bvh": 3}'):
+        (tmp_path / "clips.json").write_text(wrong)
+        with pytest.raises(InputError, match="does not list clips") as error:
+            list(read_clips(tmp_path))
+        _one_sentence(error)
 
 
 def _one_sentence(error: pytest.ExceptionInfo[InputError]) -> None:

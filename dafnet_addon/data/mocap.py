@@ -35,6 +35,7 @@ UNSTATED = "unknown"
 """The licence of a clip of which nobody says under what licence it is."""
 
 _FIELDS = {"source", "subject", "description", "category", "split", "licence", "fps", "up"}
+_FORMS = {"split": "|train|test", "up": "|y|z", "fps": r"|[1-9]\d*(\.\d+)?"}  # nothing, or what else it may be
 _AMC_RATE = 120.0  # CMU's and HDM05's; .amc files seldom say
 _CATEGORIES = {  # the first that has a word of the file's name
     "sit-stand": "sit sits sitting sitdown seat seated chair stool standup",
@@ -122,15 +123,19 @@ def _stated(folder: Path) -> list[tuple[str, dict[str, str]]]:
             rows = [(name, {k: str(v) for k, v in fields.items()}) for name, fields in json.loads(file.read_text()).items()]
         elif as_csv.exists():
             with file.open(newline="") as lines:
-                rows = [(row.pop("file"), {k: v for k, v in row.items() if v}) for row in csv.DictReader(lines)]
+                rows = [(row.pop("file"), {str(k): v for k, v in row.items() if v}) for row in csv.DictReader(lines)]
     except (ValueError, AttributeError, KeyError) as error:
-        raise InputError(f"The file '{file}' does not list clips by file name ({error}); see the docs for its form.") from None
+        raise InputError(
+            f"The file '{file}' does not list clips by file name ({error}); write it like "
+            """{"*.bvh": {"licence": "CC0", "subject": "s1"}}, or as CSV with a column 'file'."""
+        ) from None
     for pattern, fields in rows:
-        unknown = sorted(set(fields) - _FIELDS)
-        if unknown or fields.get("split", "train") not in ("train", "test") or fields.get("up", "z") not in ("y", "z"):
+        wrong = sorted(set(fields) - _FIELDS)
+        wrong += [k for k, form in _FORMS.items() if not re.fullmatch(form, fields.get(k, ""))]
+        if wrong:
             raise InputError(
-                f"The file '{file}' states for '{pattern}' what cannot be used ({', '.join(unknown) or 'split or up'}); give "
-                f"any of {', '.join(sorted(_FIELDS))}, with split 'train' or 'test' and up 'y' or 'z'."
+                f"The file '{file}' states for '{pattern}' what cannot be used ({', '.join(wrong)}); give any of "
+                f"{', '.join(sorted(_FIELDS))}, with split 'train' or 'test', up 'y' or 'z' and fps a number."
             )
     return rows
 
