@@ -34,6 +34,9 @@ _FADE = 20  # frames in which the difference at a join dies away
 _ALIKE = 0.09  # metres: mean weighted difference, of places and velocities, of poses that may be joined
 _CLEAR = 0.42  # metres between a seat's middle and the way to it
 _DIRECTIONS = 8
+_TOELESS = "reactidle"
+_IDLES = 45  # pieces of standing that are used, of many that are alike
+_BOARD = np.array([0.0, 0.6])  # from the root that stands before it; or a counter
 _LEANS = (-0.3, -0.15, 0.0, 0.0, 0.15, 0.3)  # radians; back is positive
 _AT_DESK_LEANS = (-0.2, -0.1, 0.0, 0.0, 0.06)
 _WORKS = 180  # frames of work that are joined to a sit-down or a walk
@@ -117,16 +120,15 @@ def _aligned(joints: np.ndarray, pose: np.ndarray, target: np.ndarray) -> np.nda
     return np.asarray(turned + np.append(b.mean(0), 0.0))
 
 
-def joined(first: np.ndarray, at: int, then: np.ndarray, entry: int) -> np.ndarray:
-    """``first`` (T, 22, 3) up to frame ``at``, then ``then`` from frame ``entry`` on, turned and moved to where the first led.
+def joined(first: np.ndarray, then: np.ndarray) -> np.ndarray:
+    """``first`` (T, 22, 3), and ``then`` turned and moved to go on from its last pose, which is left out.
 
     The difference of the poses at the join, and of their velocities, fades over two thirds of a second (inertialisation); a
     foot keeps its difference for as long as it stands, and works it off while it swings, so that it never slides.
     """
-    before = first[max(0, at - _BEFORE) : at]
-    after = _aligned(then[entry:], then[entry], first[at])
-    offset = first[at] - after[0]
-    drift = (first[at] - first[at - 1]) - (after[1] - after[0])
+    after = _aligned(then, then[0], first[-1])
+    offset = first[-1] - after[0]
+    drift = (first[-1] - first[-2]) - (after[1] - after[0])
     t = np.arange(len(after))
     fade = _ease(t / _FADE)[:, None, None]
     out = after + (offset + drift * np.minimum(t, _FADE)[:, None, None]) * fade
@@ -137,7 +139,7 @@ def joined(first: np.ndarray, at: int, then: np.ndarray, entry: int) -> np.ndarr
         for j in (ankle, foot):
             out[:, j, :2] = after[:, j, :2] + offset[j, :2] * left
             out[:, j, 2] = after[:, j, 2] + offset[j, 2] * fade[:, 0, 0]
-    return np.concatenate([before, _on_the_body(out)])
+    return np.concatenate([first[:-1], _on_the_body(out)])
 
 
 @dataclass(frozen=True)
@@ -173,6 +175,7 @@ class _Pool:
     ``features`` (N, 48) must match; ``tracks`` (N, T, 2): where it was before, or will be, as seen from it, the farthest first.
     """
 
+    arriving: bool
     clips: list[np.ndarray]
     rows: np.ndarray
     features: np.ndarray
@@ -191,7 +194,7 @@ def _pool(motions: list[Motion], arriving: bool) -> _Pool:
     rows, features, tracks = [], [], []
     offsets = np.arange(_TRAVELLED, -1, -8) * (-1 if arriving else 1)
     for m in motions:
-        if m.category not in _WALK or m.source == "reactidle" or len(m.joints) < 2 * _BEFORE:
+        if m.category not in _WALK or m.source == _TOELESS or len(m.joints) < 2 * _BEFORE:
             continue
         for joints in (m.joints, mirrored(m.joints)):
             path = root_from_joints(joints)
@@ -207,28 +210,31 @@ def _pool(motions: list[Motion], arriving: bool) -> _Pool:
                 features.append(_features(joints)[frames].astype(np.float32))
                 clips.append(joints)
     if not clips:
-        return _Pool([], np.zeros((0, 2), int), np.zeros((0, 48), np.float32), np.zeros((0, len(offsets), 2)))
-    return _Pool(clips, np.concatenate(rows), np.concatenate(features), np.concatenate(tracks))
+        return _Pool(arriving, [], np.zeros((0, 2), int), np.zeros((0, 48), np.float32), np.zeros((0, len(offsets), 2)))
+    return _Pool(arriving, clips, np.concatenate(rows), np.concatenate(features), np.concatenate(tracks))
 
 
-def _ways(pool: _Pool, pose: np.ndarray, seat: np.ndarray, each: int) -> Iterator[tuple[np.ndarray, int]]:
-    """Clips of the pool, and frames, that match a pose's features: the best ``each`` for every direction seen from a seat.
+def _ways(
+    pool: _Pool, pose: np.ndarray, place: np.ndarray, each: int, directions: Sequence[int] = range(_DIRECTIONS)
+) -> Iterator[np.ndarray]:
+    """Walks that end, or begin, with a pose that matches ``pose`` (48,): the best ``each`` in every direction from a place.
 
-    ``seat`` (2,): its middle, in the root's frame at the join. A way that leads through the seat is none.
+    ``place`` (2,): a seat's middle, say, in the root's frame at the join; a way that leads through it is none. Direction 0 is
+    the one that the body faces, the others follow counter-clockwise.
     """
     cost = np.abs(pool.features - pose.astype(np.float32)).mean(1)
     like = np.flatnonzero(cost < _ALIKE)
     like = like[np.argsort(cost[like])]
-    way = pool.tracks[like] - seat
+    way = pool.tracks[like] - place
     clear = np.linalg.norm(way[:, :-2], axis=-1).min(1) > _CLEAR
     like, way = like[clear], way[clear]
     sector = np.round(np.arctan2(-way[:, 0, 0], way[:, 0, 1]) / (2 * np.pi / _DIRECTIONS)).astype(int) % _DIRECTIONS
-    for direction in range(_DIRECTIONS):
+    for direction in directions:
         used: set[int] = set()
         for clip, at in pool.rows[like[sector == direction]]:
             if clip not in used and len(used) < each:
                 used.add(clip)
-                yield pool.clips[clip], at
+                yield pool.clips[clip][at - _BEFORE : at + 1] if pool.arriving else pool.clips[clip][at : at + _BEFORE]
 
 
 def _made(kind: str, name: str, subject: str, category: str, joints: np.ndarray, focus: np.ndarray) -> Iterator[Composed]:
@@ -244,13 +250,13 @@ def _to_and_from_seats(motions: list[Motion], sits: list[_Piece], to: _Pool, awa
         path = root_from_joints(sit.joints)
         seat = rotate(path.rotation[0].T, sit.joints[-1, 0] - path.position[0])[:2]
         down, up = sit.joints, sit.joints[::-1]
-        for walk, at in _ways(to, _features(down)[0], seat, each):
-            whole = joined(walk, at, down, 0)
+        for walk in _ways(to, _features(down)[0], seat, each):
+            whole = joined(walk, down)
             focus = np.arange(60, max(_BEFORE + len(down) - _STAYS, 90) + 20, 5)
             yield from _made("approach", sit.name, sit.subject, "sit-stand", whole, focus)
-        for walk, at in _ways(away, _features(up)[-1], seat, each):
-            whole = joined(up, len(up) - 1, walk[: at + _BEFORE], at)
-            focus = np.arange(max(0, min(len(up), _BEFORE) - 60), len(whole) - 40, 5)
+        for walk in _ways(away, _features(up)[-1], seat, each):
+            whole = joined(up, walk)
+            focus = np.arange(max(0, len(up) - 60), len(whole) - 40, 5)
             yield from _made("leave", sit.name, sit.subject, "sit-stand", whole, focus)
 
 
@@ -440,10 +446,60 @@ def _while_seated(motions: list[Motion], sits: list[_Piece]) -> Iterator[Compose
             yield from _made(kind, sit.name, sit.subject, "seated", body, np.arange(rest, frames - 20, 5))
 
 
+def _lettering(rng: np.random.Generator, frames: int) -> np.ndarray:
+    """The right hand's course (T, 3) over a board: x right, y off the body, z over the floor; lines of letters."""
+    left, width, top, y = rng.uniform(-0.08, 0.05), rng.uniform(0.22, 0.34), rng.uniform(1.35, 1.62), rng.uniform(0.34, 0.42)
+    down = rng.uniform(0.06, 0.11)
+    stops = [np.array([left, y, top])]
+    times: list[int] = []
+    while sum(times) < frames:
+        z = top - down * (len(stops) // 2 % 5)
+        stops += [np.array([left + width, y, z]), np.array([left, y, top - down * ((len(stops) // 2 + 1) % 5)])]
+        times += [int(rng.integers(50, 110)), int(rng.integers(20, 32))]
+    course = _through(np.array(stops), times)[:frames]
+    off = np.maximum(0.0, np.gradient(-course[:, 0]))  # on its way back the hand is off the board
+    letters = _wander(rng, frames, 2, 4) * (0.010, 0.018)
+    return course + np.stack([letters[:, 0], -0.06 * off / max(float(off.max()), 1e-6), letters[:, 1]], axis=1)
+
+
+def _drawing(rng: np.random.Generator, frames: int) -> np.ndarray:
+    """Large strokes in all directions, or wiping."""
+    middle = np.array([rng.uniform(0.05, 0.2), rng.uniform(0.34, 0.42), rng.uniform(1.25, 1.5)])
+    course: np.ndarray = middle + _wander(rng, frames, 3, rng.uniform(7, 14)) * (0.08, 0.0, 0.09)
+    return course
+
+
+def _while_standing(motions: list[Motion], to: _Pool, away: _Pool) -> Iterator[Composed]:
+    """A walk up to a board ("write") or a counter ("counter"), work there on captured standing, and a walk away."""
+    rng = np.random.default_rng(13)
+    behind = range(_DIRECTIONS // 4, 3 * _DIRECTIONS // 4 + 1)
+    idles = _uppers([m for m in motions if m.source != _TOELESS], {"standing_idle", "standing"})
+    for idle in idles[:: max(1, len(idles) // _IDLES)]:
+        for stands in (idle, mirrored(idle)):
+            features = _features(stands)
+            for kind in ("write", "counter"):
+                come, go = (list(_ways(p, f, _BOARD, 1, behind)) for p, f in ((to, features[0]), (away, features[-1])))
+                if not come or not go:
+                    continue
+                whole = joined(joined(come[rng.integers(len(come))], stands), go[rng.integers(len(go))])
+                start, end = _BEFORE + 8, _BEFORE + _WORKS - 4
+                if kind == "counter":
+                    whole = _at_top(rng, whole, start, end, rng.uniform(0.85, 1.05))
+                else:
+                    path = root_from_joints(whole)
+                    turn = path.rotation[(start + end) // 2]
+                    course = (_lettering, _lettering, _drawing)[rng.integers(3)](rng, len(whole))
+                    wrist = path.position[(start + end) // 2] + rotate(turn, course)
+                    whole = handed(whole, "right_", wrist, _presence(len(whole), start, end))
+                if rng.random() < 0.5:
+                    whole = mirrored(whole)
+                yield from _made(kind, "standing", "composed", "standing", whole, np.arange(start - 30, end + 30, 5))
+
+
 def composed(motions: list[Motion]) -> list[Composed]:
     """All composed motions of captured ones on the canonical body; the same for the same motions."""
     to, away = _pool(motions, arriving=True), _pool(motions, arriving=False)
     sits = list(_sit_downs(motions))
     # Many of those with borrowed arms, and all of them begin in front of the seat.
     sits = [s for s in sits if not s.borrowed] + [s for s in sits if s.borrowed][::9]
-    return [*_to_and_from_seats(motions, sits, to, away), *_while_seated(motions, sits)]
+    return [*_to_and_from_seats(motions, sits, to, away), *_while_seated(motions, sits), *_while_standing(motions, to, away)]
