@@ -202,3 +202,14 @@ def test_actions_that_tell_frames_apart():
     assert mutual_information(names, labels) == pytest.approx(1.0)
     assert mutual_information(np.tile([0, 1], 10), np.repeat([0, 1], 10)) == pytest.approx(0.0, abs=1e-9)
     assert mutual_information(np.zeros(20, int), labels) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_criteria_know_what_is_at_most_and_what_is_at_least():
+    pytest.importorskip("torch")
+    from dafnet_addon.training.report import Criterion
+
+    def met(value: float, most: bool) -> str:
+        return Criterion("", value, 2.0, 1.5 if most else 2.5, most, "").met
+
+    assert [met(value, True) for value in (1.4, 1.9, 2.1)] == ["goal", "must", "no"]
+    assert [met(value, False) for value in (2.6, 2.1, 1.9)] == ["goal", "must", "no"]

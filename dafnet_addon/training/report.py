@@ -54,7 +54,7 @@ from .evaluate import (
     table,
 )
 
-__all__ = ["contact_sheets", "report", "text"]
+__all__ = ["Criterion", "contact_sheets", "criteria", "report", "text"]
 
 _MINUTE, _LOOPS = 1800, 3  # frames of a long take; how often it goes round
 _HEIGHTS = {"low": 0.35, "medium": 0.45, "high": 0.60}
@@ -316,9 +316,88 @@ def report(
     }
 
 
+@dataclass(frozen=True)
+class Criterion:
+    """What was asked for and found: ``value`` is to be at least ``must``, better ``goal``; at most, where ``most`` is True."""
+
+    name: str
+    value: float
+    must: float
+    goal: float
+    most: bool
+    count: str
+
+    @property
+    def met(self) -> str:
+        """"goal", "must" or "no"."""
+        sign = -1.0 if self.most else 1.0
+        return "goal" if sign * self.value >= sign * self.goal else "must" if sign * self.value >= sign * self.must else "no"
+
+
+def criteria(values: dict[str, Any]) -> list[Criterion]:
+    """The figures of a report that weights are judged by, and their bounds: FS within 2, better 1.5 times the real motion's."""
+    found: list[Criterion] = []
+
+    def add(name: str, value: float, must: float, goal: float | None = None, most: bool = False, count: str = "") -> None:
+        found.append(Criterion(name, value, must, must if goal is None else goal, most, count))
+
+    rows = values["rows"]
+
+    def against_real(real: dict[str, Any], run: dict[str, Any], label: str) -> None:
+        clips = f"{run['clips']} clips"
+        slides, collides = (real[f"{name}_per_frame"] for name in ("foot_sliding", "bad_collisions"))
+        add(f"{label}: FS", run["foot_sliding_per_frame"], 2.0 * slides, 1.5 * slides, most=True, count=clips)
+        add(f"{label}: BCC", run["bad_collisions_per_frame"], max(1.2 * collides, collides + 0.02), most=True, count=clips)
+
+    for suffix in ("", "_at_desks_and_shelves", "_composed"):
+        for run in ("free_t0", "free_t1", "ee_t0", "ee_t1", "full_t0", "full_t1"):
+            if run + suffix not in rows:
+                continue
+            row_, label = rows[run + suffix], (run + suffix).replace("_", " ")
+            if "sits_within_6cm" in row_:
+                add(f"{label}: sits", row_["sits_within_6cm"], 0.85, 0.95, count=f"{row_['seat_episodes']} episodes")
+            if "stands_when_it_should" in row_:
+                add(f"{label}: stands", row_["stands_when_it_should"], 0.98, count=f"{row_['clips']} clips")
+            if run.startswith("ee"):
+                add(f"{label}: EED", row_["end_effector_error"], 0.04, 0.026, most=True, count=f"{row_['clips']} clips")
+            if run.startswith("full"):
+                add(f"{label}: upper body error", row_["upper_body_error"], 0.02, most=True, count=f"{row_['clips']} clips")
+            else:
+                against_real(rows["ground_truth" + suffix], row_, label)
+    for name, by_run in values["by_activity"].items():
+        for run in ("free_t0", "ee_t0"):
+            against_real(by_run["ground_truth"], by_run[run], f"{name}, {run.replace('_', ' ')}")
+    for temperature in ("t0", "t1"):
+        first, last = (values["drift"][f"{which}_third_{temperature}"] for which in ("first", "last"))
+        takes = f"{last['seat_episodes']} episodes"
+        slides = last["foot_sliding_per_frame"] / first["foot_sliding_per_frame"]
+        add(f"drift {temperature}: foot sliding, last over first third", slides, 1.1, most=True, count=takes)
+        lost = first["sits_within_6cm"] - last["sits_within_6cm"]
+        add(f"drift {temperature}: sits, first less last third", lost, 0.05, most=True, count=takes)
+        seats = values["seats"][temperature]
+        right = seats["all_three_right"]
+        add(f"three seats on one path {temperature}: all right", right, 1.0, count=f"{seats['paths_and_seeds']} trios")
+    diversity, told = values["diversity"], values["actions"]
+    clips = f"{told['clips']} clips"
+    add("diversity of the upper body: FREE over EE", diversity["free_t1"]["over_ee"], 2.0, count=clips)
+    add("diversity of the upper body: EE over FULL", diversity["ee_t1"]["over_full"], 2.0, count=clips)
+    add("actions: information, nats", told["information_nats"], 1.0, count=clips)
+    add("actions: likeliest in 2 % of frames", told["likeliest_in_2_percent"], 6.0, count=clips)
+    add("actions: mutual information with activities", told["normalised_mutual_information"], 0.3, count=clips)
+    shuffled = told["likelihood"]["all"]
+    add("actions: nats lost by shuffling them", shuffled["shuffled_adds"], 0.0, count=clips)
+    add("actions: clips that lose by shuffling them", shuffled["shuffled_worse_in_clips"], 0.5, count=clips)
+    return found
+
+
 def text(values: dict[str, Any]) -> str:
     """A report in Markdown."""
-    parts = ["## Clips", table(values["rows"])]
+    judged = [
+        f"| {c.name} | {c.value:.3g} | {'≤' if c.most else '≥'} {c.must:.3g} | {c.goal:.3g} | {c.met} | {c.count} |"
+        for c in criteria(values)
+    ]
+    head = "| | found | must | goal | met | of |\n|---|---|---|---|---|---|"
+    parts = ["## What has to be seen", "\n".join([head, *judged]), "## Clips", table(values["rows"])]
     for name, found in values["by_activity"].items():
         parts += [f"### {name[0].upper()}{name[1:]}", table(found)]
     parts += ["## Drift: first and last third of a minute", table(values["drift"])]
