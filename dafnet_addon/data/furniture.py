@@ -444,11 +444,12 @@ def fitted(
     pieces += [("seat", seat_for(rng, place, points)) for place in places]
     missing = next((kind for kind, rows in pieces if rows is None), "")
     if not missing:
-        hands = working(joints, path) + stroking(joints, path) or reaching(joints, path)
-        for i in rng.permutation(len(hands)):  # pieces do not know of one another, so hands get one
-            kind = hands[i].kind
+        # Hands get one piece, as pieces do not know of one another; a top first, as a hand that moves to and fro has both.
+        reaches = reaching(joints, path)
+        for use in working(joints, path) + stroking(joints, path) or [reaches[i] for i in rng.permutation(len(reaches))]:
+            kind = use.kind
             if rng.random() < _LIKELY[kind]:
-                pieces.append((kind, _FITS[kind](rng, hands[i], points)))
+                pieces.append((kind, _FITS[kind](rng, use, points)))
                 if pieces[-1][1] is not None:
                     break
         if places and rng.random() < _LIKELY["spare desk"] and all(kind != "desk" or rows is None for kind, rows in pieces):
