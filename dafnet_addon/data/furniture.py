@@ -41,7 +41,7 @@ _TRIES = 16
 _ONE_SEAT = 0.25
 _ON_THE_FLOOR = 0.22  # a pelvis that rests lower than this sits on the floor
 _HALF_DOWN = 0.80
-_LIKELY = {"desk": 0.85, "board": 0.8, "shelf": 0.6, "spare desk": 0.35}
+_LIKELY = {"desk": 0.95, "board": 0.8, "shelf": 0.6, "spare desk": 0.35}
 _SOFT = 0.4  # of the seats that may be
 
 
