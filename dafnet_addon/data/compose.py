@@ -14,6 +14,7 @@ from ..core.root import root_from_joints, to_root
 from ..core.rotations import frame_from, normalised, rotate, transpose, yaw_matrix
 from ..core.skeleton import OFFSETS, PARENTS, REST, SEAT_TO_PELVIS, joint
 from .canonical import FOOT, pose_legs
+from .uses import runs
 from .windows import COMPOSED, Motion, mirrored, motion_of
 
 __all__ = ["Composed", "composed", "entrance", "joined", "lent", "handed"]
@@ -34,6 +35,8 @@ _FADE = 20  # frames in which the difference at a join dies away
 _ALIKE = 0.09  # metres: mean weighted difference, of places and velocities, of poses that may be joined
 _CLEAR = 0.42  # metres between a seat's middle and the way to it
 _DIRECTIONS = 8
+_HIGHEST_BED = 0.62
+_TURNING = 66  # frames of getting onto a bed
 _TOELESS = "reactidle"
 _IDLES = 45  # pieces of standing that are used, of many that are alike
 _BOARD = np.array([0.0, 0.6])  # from the root that stands before it; or a counter
@@ -496,10 +499,75 @@ def _while_standing(motions: list[Motion], to: _Pool, away: _Pool) -> Iterator[C
                 yield from _made(kind, "standing", "composed", "standing", whole, np.arange(start - 30, end + 30, 5))
 
 
+def _lying_down(motions: list[Motion]) -> list[np.ndarray]:
+    """Captured pieces that begin sitting on the floor, lie back and stay; also made by reversing sitting up from lying."""
+    found = []
+    for m in (m for m in motions if m.category == "lying"):
+        for joints in (m.joints, m.joints[::-1]):
+            trunk = normalised(joints[:, joint("neck")] - joints[:, 0])[:, 2]
+            low, face = joints[:, 0, 2] < 0.2, _frames(joints)[1][:, 2, 1]
+            sits = np.flatnonzero(low & (trunk > 0.85))
+            for start, _ in runs(low & (np.abs(trunk) < 0.35) & (face > 0.5), 30):
+                before = sits[(sits < start) & (sits > start - 60)]
+                if len(before):
+                    found.append(joints[before[-1] : start + 75])
+    return found
+
+
+def _lifted(joints: np.ndarray, height: float) -> np.ndarray:
+    """A body on the floor, on a bed of that height instead; hands that sank into the floor lie on it."""
+    out = joints + np.array([0.0, 0.0, height])
+    for side in ("left_", "right_"):
+        wrist = out[:, joint(side + "wrist")].copy()
+        over = wrist[:, 2] - height - 0.03
+        wrist[:, 2] = height + 0.03 + 0.5 * (over + np.sqrt(over**2 + 0.03**2))
+        shoulder, elbow, hand = (joint(side + n) for n in ("shoulder", "elbow", "wrist"))
+        out[:, elbow], out[:, hand] = two_bone(out[:, shoulder], wrist, out[:, elbow], _LENGTHS[elbow], _LENGTHS[hand])
+    return out
+
+
+def _onto_the_bed(seated: np.ndarray, lying: np.ndarray, turn: float, inward: float) -> np.ndarray:
+    """From one seated pose (22, 3) on a bed's edge to one that sits on the bed along it: the legs rise, the body turns."""
+    t = np.linspace(0.0, 1.0, _TURNING)
+    rise, turned, place = (1 - _ease(x)[:, None, None] for x in (t / 0.6, (t - 0.15) / 0.85, t))
+    poses = []
+    for pose in (seated, lying):
+        path = root_from_joints(np.repeat(pose[None], 2, axis=0))
+        poses.append(to_root(path, np.repeat(pose[None], 2, axis=0))[0])
+    a, b = poses
+    local = a + (b - a) * place
+    feet = [j for pair in _FEET for j in pair]
+    local[:, feet, 2] = (a + (b - a) * rise)[:, feet, 2] + 0.05 * np.sin(np.pi * rise[:, :, 0])
+    yaw = root_from_joints(np.repeat(seated[None], 2, axis=0)).yaw[0]
+    origin = seated[0] * (1, 1, 0) + rotate(yaw_matrix(np.array(yaw)), np.array([0.0, -inward, 0.0])) * turned[:, 0]
+    return _on_the_body(rotate(yaw_matrix(yaw + turn * turned[:, 0, 0])[:, None], local) + origin[:, None])
+
+
+def _lying(motions: list[Motion], sits: list[_Piece]) -> Iterator[Composed]:
+    """Sitting down on a bed's edge, turning onto it and lying back ("lie"), and the same reversed."""
+    rng = np.random.default_rng(14)
+    pieces = _lying_down(motions)
+    for sit in (s for s in sits if pieces and not s.borrowed):
+        top = sit.joints[-1, 0, 2] - SEAT_TO_PELVIS
+        if top > _HIGHEST_BED:
+            continue
+        piece = pieces[rng.integers(len(pieces))]
+        lies = _lifted(piece if rng.random() < 0.5 else mirrored(piece), top)
+        turn, inward = rng.choice([-1.0, 1.0]) * rng.uniform(1.3, 1.7), rng.uniform(0.1, 0.25)
+        turning = _onto_the_bed(sit.joints[-1], lies[0], turn, inward)
+        whole = joined(np.concatenate([sit.joints, turning[1:]]), lies)
+        start, frames = len(sit.joints) - 20, len(whole)
+        yield from _made("lie", sit.name, sit.subject, "lying", whole, np.arange(start, frames, 5))
+        yield from _made("lie", sit.name + " reversed", sit.subject, "lying", whole[::-1], np.arange(0, frames - start, 5))
+
+
 def composed(motions: list[Motion]) -> list[Composed]:
     """All composed motions of captured ones on the canonical body; the same for the same motions."""
     to, away = _pool(motions, arriving=True), _pool(motions, arriving=False)
     sits = list(_sit_downs(motions))
     # Many of those with borrowed arms, and all of them begin in front of the seat.
     sits = [s for s in sits if not s.borrowed] + [s for s in sits if s.borrowed][::9]
-    return [*_to_and_from_seats(motions, sits, to, away), *_while_seated(motions, sits), *_while_standing(motions, to, away)]
+    return [
+        *_to_and_from_seats(motions, sits, to, away), *_while_seated(motions, sits), *_while_standing(motions, to, away),
+        *_lying(motions, sits),
+    ]
