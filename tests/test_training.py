@@ -102,7 +102,7 @@ def _pool(dataset: Path) -> Pool:
 
 def test_statistics_standardise_and_keep_their_floor(dataset):
     pool = _pool(dataset)
-    pool.arrays["poses"][..., 0] = 1000
+    next(iter(pool.shards.values()))["poses"][..., 0] = 1000
     statistics = pool.statistics()
     assert statistics.pose_std.min() >= 0.01
     batch = pool.batch(torch.arange(12), statistics, TINY)
@@ -114,6 +114,9 @@ def test_pools_take_in_new_shards(dataset):
     (dataset / "pool-0001.npz").write_bytes((dataset / "pool-0000.npz").read_bytes())
     pool.refresh()
     assert len(pool) == 24
+    unit = Statistics(np.zeros(66), np.ones(66), np.zeros(3), np.ones(3), np.zeros(18), np.ones(18))
+    batch = pool.batch(torch.tensor([3, 15, 23]), unit, TINY)
+    assert (batch.root[0] == batch.root[1]).all() and not (batch.root[0] == batch.root[2]).all()
 
 
 def test_the_sensor_in_torch_is_the_one_in_numpy():

@@ -28,9 +28,9 @@ _STAND = {"standing", "standing_idle", "standing_gesture", "social_gesture", "gr
           "reach-hand-task"}
 _SIT = {"sit-stand", "sit_down", "stand_up", "seated", "seated_chair", "seated_table"}
 _AVOID = ("jump", "uneven", "hop", "march", "kick", "flip", "squat", "balance", "crouch", "swing legs", "lie")
-_SHARES = {"approach": 0.20, "descend": 0.29, "sit": 0.10, "walk": 0.27, "stand": 0.14}
-"""Shares of windows: walking up to a seat and sitting down (composed), around a captured sit-down or stand-up, seated,
-walking, standing.
+_SHARES = {"approach": 0.20, "leave": 0.10, "descend": 0.22, "sit": 0.10, "walk": 0.25, "stand": 0.13}
+"""Shares of windows: walking up to a seat and sitting down, standing up and walking off (composed), around a captured sit-down
+or stand-up, seated, walking, standing.
 """
 _COMPOSITION = (
     "walks joined to sit-downs; seats moved to other heights; mirrored, reversed, re-timed; arms lent to the UI-PRMD bodies; "
@@ -53,7 +53,9 @@ POSE_UNIT = 1e-4
 
 
 def _wanted(clip: Clip) -> bool:
-    if clip.source in _SHARE_ALIKE or clip.category not in _WALK | _STAND | _SIT:
+    if clip.category == "lying":
+        return True
+    if clip.category not in _WALK | _STAND | _SIT:
         return False
     return not any(word in f"{clip.name} {clip.description}".lower() for word in _AVOID)
 

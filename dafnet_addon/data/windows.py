@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.root import RootPath, ahead, root_from_joints, smoothed, to_root, velocities
-from ..core.rotations import normalised
 from ..core.skeleton import MIRROR, joint
 from .boxes import near
+from .cuts import bad_frames
 from .furniture import Rest, furnished, resting
 from .retarget import at_seat_height
 
@@ -53,34 +53,29 @@ class Window:
     boxes: np.ndarray
 
 
-def _held(joints: np.ndarray) -> np.ndarray:
+def _usable(joints: np.ndarray) -> np.ndarray:
+    """False in frames of a T-pose, a flip or an impossible speed, and where an upright body has left the floor."""
+    airborne = np.minimum(joints[:, joint("left_foot"), 2], joints[:, joint("right_foot"), 2]) > 0.22
+    airborne &= joints[:, joint("neck"), 2] - joints[:, 0, 2] > 0.35
+    return ~np.any([airborne, *bad_frames(joints).values()], axis=0)
+
+
+def _held(joints: np.ndarray, valid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The clip with its first and last pose held for a while, where it is at rest there: stillness is otherwise rare."""
     if len(joints) < 3:
-        return joints
+        return joints, valid
     speed = np.linalg.norm(np.diff(joints, axis=0), axis=-1).max(1) * 30
-    parts = [joints]
-    if speed[:3].max() < 0.35:
-        parts.insert(0, np.repeat(joints[:1], _HOLD, axis=0))
-    if speed[-3:].max() < 0.35:
-        parts.append(np.repeat(joints[-1:], _HOLD, axis=0))
-    return np.concatenate(parts)
-
-
-def _usable(joints: np.ndarray) -> np.ndarray:
-    """False in frames of a T-pose, a jump or an impossible speed."""
-    left = normalised(joints[:, joint("left_wrist")] - joints[:, joint("left_shoulder")])
-    right = normalised(joints[:, joint("right_wrist")] - joints[:, joint("right_shoulder")])
-    t_pose = ((left * right).sum(-1) < -0.93) & (np.abs(left[:, 2]) < 0.25)
-    airborne = np.minimum(joints[:, joint("left_foot"), 2], joints[:, joint("right_foot"), 2]) > 0.22
-    step = np.linalg.norm(np.diff(joints, axis=0, prepend=joints[:1]), axis=-1).max(1)
-    return ~(t_pose | airborne | (step > 0.4))
+    before = _HOLD * bool(speed[:3].max() < 0.35)
+    after = _HOLD * bool(speed[-3:].max() < 0.35)
+    frames = np.clip(np.arange(-before, len(joints) + after), 0, len(joints) - 1)
+    return joints[frames], valid[frames]
 
 
 def motion_of(name: str, source: str, subject: str, category: str, joints: np.ndarray) -> Motion:
     """A motion ready to be drawn from."""
-    held = _held(joints)
+    held, valid = _held(joints, _usable(joints))
     rests = tuple(resting(held, root_from_joints(held))) if len(held) > 2 else ()
-    return Motion(name, source, subject, category, held, _usable(held), rests)
+    return Motion(name, source, subject, category, held, valid, rests)
 
 
 def mirrored(joints: np.ndarray) -> np.ndarray:

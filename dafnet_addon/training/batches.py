@@ -71,48 +71,58 @@ def past_of(poses: Tensor, velocity: Tensor, history: int) -> Tensor:
 
 
 class Pool:
-    """Windows of a dataset on a device. New shards may be written while training goes on: ``refresh`` takes them in."""
+    """Windows of a dataset, sent to a device batch by batch. New shards may be written while training goes on: ``refresh``
+    takes them in.
+    """
 
     def __init__(self, files: Callable[[], Sequence[Path]], device: torch.device) -> None:
         self.files, self.device = files, device
-        self.known: set[Path] = set()
-        self.arrays: dict[str, Tensor] = {}
+        self.shards: dict[Path, dict[str, np.ndarray]] = {}
         self.refresh()
 
     def __len__(self) -> int:
-        return len(self.arrays["poses"]) if self.arrays else 0
+        return int(self.ends[-1]) if len(self.ends) else 0
 
     def refresh(self) -> None:
         """Read the shards that were not there before."""
-        new = [file for file in self.files() if file not in self.known]
-        if new:
-            read = load_pool(new)
-            fresh = {name: torch.from_numpy(a).to(self.device) for name, a in read.items() if name != "kinds"}
-            self.arrays = {name: torch.cat([self.arrays[name], a]) if self.arrays else a for name, a in fresh.items()}
-            self.known.update(new)
+        for file in self.files():
+            if file not in self.shards:
+                self.shards[file] = load_pool([file])
+        self.ends = np.cumsum([len(shard["poses"]) for shard in self.shards.values()])
 
-    def statistics(self) -> Statistics:
-        """Means and deviations over the windows that are there."""
-        poses, velocity, ahead = (self.arrays[name].cpu().numpy() for name in ("poses", "velocity", "ahead"))
-        return Statistics.of(poses * POSE_UNIT, velocity, ahead)
+    def statistics(self, most: int = 20) -> Statistics:
+        """Means and deviations over the windows of the first shards."""
+        shards = list(self.shards.values())[:most]
+        poses, velocity, ahead = (np.concatenate([shard[name] for shard in shards]) for name in ("poses", "velocity", "ahead"))
+        return Statistics.of(poses * np.float32(POSE_UNIT), velocity, ahead)
+
+    def _rows(self, rows: Tensor) -> dict[str, Tensor]:
+        shards = list(self.shards.values())
+        which = np.searchsorted(self.ends, rows.numpy(), side="right")
+        first = np.concatenate([[0], self.ends])[which]
+        places = list(zip(which, rows.numpy() - first, strict=True))
+        return {
+            name: torch.from_numpy(np.stack([shards[s][name][r] for s, r in places])).to(self.device)
+            for name in shards[0] if name != "kinds"
+        }
 
     def batch(self, rows: Tensor, statistics: Statistics, config: ModelConfig) -> Batch:
-        """Windows ``rows``, poses with dequantisation noise."""
+        """Windows ``rows`` (whole numbers, on the CPU), poses with dequantisation noise."""
         mean, std, v_mean, v_std, a_mean, a_std = (
             torch.as_tensor(getattr(statistics, name), dtype=torch.float32, device=self.device)
             for name in ("pose_mean", "pose_std", "velocity_mean", "velocity_std", "ahead_mean", "ahead_std")
         )
-        a, history = self.arrays, config.history
+        a, history = self._rows(rows), config.history
         order = torch.as_tensor(model_order(np.arange(66)), device=self.device)
-        poses = a["poses"][rows].float()[..., order] * POSE_UNIT
+        poses = a["poses"].float()[..., order] * POSE_UNIT
         poses = (poses + NOISE * torch.randn_like(poses) - mean) / std
-        step = a["velocity"][rows]
+        step = a["velocity"]
         velocity = (step - v_mean) / v_std
-        way = ((a["ahead"][rows] - a_mean) / a_std)[..., : config.ahead]
+        way = ((a["ahead"] - a_mean) / a_std)[..., : config.ahead]
         now = poses[:, history:]
         return Batch(
             past_of(poses, velocity, history), now[..., :UPPER_SIZE], now[..., UPPER_SIZE:],
-            torch.cat([velocity[:, history:], way], dim=-1), occupancy_of(a["boxes"][rows], a["root"][rows]), step[:, history:],
+            torch.cat([velocity[:, history:], way], dim=-1), occupancy_of(a["boxes"], a["root"]), step[:, history:],
         )
 
 

@@ -187,7 +187,7 @@ class Run:
         """The loss on unseen bodies, with the same draws each time."""
         state = _generators(self.device)
         torch.manual_seed(1)
-        rows = torch.arange(min(windows, len(held)), device=self.device)
+        rows = torch.arange(min(windows, len(held)))
         loss = float(self.loss(held.batch(rows, self.statistics, self.model)))
         _set_generators(state, self.device)
         return loss
@@ -244,7 +244,7 @@ def train_part(
     writer = SummaryWriter(str(folder / "tensorboard" / part)) if ranks.rank() == 0 else None
     while run.share < 1.0:
         begin = time.monotonic()
-        rows = torch.randint(len(pool), (config.batch,), device=run.device)
+        rows = torch.randint(len(pool), (config.batch,))
         for group in run.optimiser.param_groups:
             group["lr"] = run.rate()
         loss = run.loss(pool.batch(rows, run.statistics, run.model), initialise=run.step == 0)
