@@ -5,7 +5,7 @@ made of captured motion on the canonical body; what is added are joins, lent upp
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -241,9 +241,15 @@ def _ways(
 
 
 def _made(kind: str, name: str, subject: str, category: str, joints: np.ndarray, focus: np.ndarray) -> Iterator[Composed]:
-    """The composed motion, where it is fluent; nothing where it is not."""
-    if _fluent(joints).all():
-        yield Composed(kind, motion_of(f"{name} {kind}", COMPOSED, subject, category, joints), focus)
+    """The composed motion, where it is fluent; nothing where it is not. ``focus`` counts frames of ``joints``."""
+    if not _fluent(joints).all():
+        return
+    motion = motion_of(f"{name} {kind}", COMPOSED, subject, category, joints)
+    if category == "lying":  # on a bed the feet are off the floor
+        motion = replace(motion, valid=np.ones(len(motion.joints), dtype=bool))
+    # ``motion_of`` holds the first pose where the body rests in it.
+    held = [int(np.argmax((j != j[0]).any((1, 2)))) for j in (motion.joints, joints)]
+    yield Composed(kind, motion, focus + held[0] - held[1])
 
 
 def _to_and_from_seats(motions: list[Motion], sits: list[_Piece], to: _Pool, away: _Pool) -> Iterator[Composed]:
