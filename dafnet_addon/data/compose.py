@@ -36,6 +36,7 @@ _ALIKE = 0.09  # metres: mean weighted difference, of places and velocities, of 
 _CLEAR = 0.42  # metres between a seat's middle and the way to it
 _DIRECTIONS = 8
 _HIGHEST_BED = 0.62
+_CARRIES, _WRIST_LIES = 0.02, 0.09  # metres over a bed: of a body, against the bare floor; and of a wrist whose hand lies on it
 _TURNING = 66  # frames of getting onto a bed
 _TOELESS = "reactidle"
 _IDLES = 45  # pieces of standing that are used, of many that are alike
@@ -522,11 +523,11 @@ def _lying_down(motions: list[Motion]) -> list[np.ndarray]:
 
 def _lifted(joints: np.ndarray, height: float) -> np.ndarray:
     """A body on the floor, on a bed of that height instead; hands that sank into the floor lie on it."""
-    out = joints + np.array([0.0, 0.0, height])
+    out = joints + np.array([0.0, 0.0, height + _CARRIES])
     for side in ("left_", "right_"):
         wrist = out[:, joint(side + "wrist")].copy()
-        over = wrist[:, 2] - height - 0.03
-        wrist[:, 2] = height + 0.03 + 0.5 * (over + np.sqrt(over**2 + 0.03**2))
+        over = wrist[:, 2] - height - _WRIST_LIES
+        wrist[:, 2] = height + _WRIST_LIES + 0.5 * (over + np.sqrt(over**2 + 0.03**2))
         shoulder, elbow, hand = (joint(side + n) for n in ("shoulder", "elbow", "wrist"))
         out[:, elbow], out[:, hand] = two_bone(out[:, shoulder], wrist, out[:, elbow], _LENGTHS[elbow], _LENGTHS[hand])
     return out
