@@ -41,6 +41,7 @@ _TRIES = 16
 _ONE_SEAT = 0.25
 _ON_THE_FLOOR = 0.22  # a pelvis that rests lower than this sits on the floor
 _HALF_DOWN = 0.80
+_NEAR_BY = 0.8
 _LIKELY = {"desk": 0.95, "board": 0.8, "shelf": 0.6, "spare desk": 0.35}
 _SOFT = 0.4  # of the seats that may be
 
@@ -53,6 +54,8 @@ def _pressed(rest: float, **parts: float) -> np.ndarray:
             name = "hand" if share > 1 else "wrist" if share == 1 else "elbow"
         elif start.endswith("hip"):
             name = "thigh" if share else "hip"
+        elif start.endswith("shoulder"):
+            name = "elbow" if share else "shoulder"
         else:
             name = {"pelvis": "hip", "spine1": "trunk", "spine3": "trunk", "neck": "head"}.get(start, "")
         out[i] = parts.get(name, rest)
@@ -62,7 +65,7 @@ def _pressed(rest: float, **parts: float) -> np.ndarray:
 # The hand's probe lies where a stretched wrist would carry it; on a top or a board the wrist bends.
 _ON_SEAT = _pressed(0.025, hip=0.07, thigh=0.07)
 _SINKS = _pressed(0.0, hip=1.0, thigh=1.0)
-_ON_BED = _pressed(0.06, hip=0.08, thigh=0.08, trunk=0.08, head=0.08, wrist=0.09, hand=0.10)
+_ON_BED = _pressed(0.06, hip=0.08, thigh=0.08, trunk=0.08, head=0.10, shoulder=0.09, elbow=0.10, wrist=0.09, hand=0.10)
 _ON_DESK = _pressed(0.0, wrist=0.035, hand=0.09, elbow=0.03)
 _ON_BOARD = _pressed(0.0, wrist=0.01, hand=0.12)
 _STYLES = ("block", "legs", "legs", "column", "panels")
@@ -231,9 +234,16 @@ def seat_for(rng: np.random.Generator, rest: Rest, points: np.ndarray) -> np.nda
     return None
 
 
-def _bed_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
-    """A bed, or a sofa with its back to one side, under a lying body, head end along +y."""
+def _carried(boxes: np.ndarray, rest: Rest) -> bool:
+    """Whether a bed is the seat of this rest as well: one sits down on its edge, a little higher than one lies."""
+    at = rest.position - (0.0, 0.0, SEAT_TO_PELVIS)
+    return len(boxes) > 0 and float(_nearest(boxes, at[None])[0]) < 0.1
+
+
+def _bed_for(rng: np.random.Generator, use: Use, points: np.ndarray, rests: list[Rest]) -> np.ndarray | None:
+    """A bed, or a sofa with its back to one side, under a lying body, head end along +y; it carries the rests beside it too."""
     middle = use.points.mean(0)
+    beside_it = [rest for rest in rests if np.linalg.norm((rest.position - middle)[:2]) < _NEAR_BY]
     for attempt in range(_TRIES):
         sofa = rng.random() < 0.35
         x = rng.uniform(0.32, 0.45) if sofa else rng.uniform(0.4, 0.95)
@@ -254,7 +264,7 @@ def _bed_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarr
         beside = np.array(extra) if extra else NO_BOXES
         yaw = use.yaw + rng.normal(0.0, 0.05)
         carrying, beside = (placed(part, middle[:2], yaw) for part in (carrying, beside))
-        if _clearance(carrying, points, _ON_BED) < 0:
+        if _clearance(carrying, points, _ON_BED) < 0 or not all(_carried(carrying[:1], rest) for rest in beside_it):
             continue
         return np.concatenate([carrying, beside if _clearance(beside, points, 0.02) >= 0 else NO_BOXES])
     return None
@@ -404,23 +414,18 @@ def scattered(rng: np.random.Generator, points: np.ndarray, path: RootPath, coun
     return np.concatenate(kept)
 
 
-def _cut_off(joints: np.ndarray, stays: list[tuple[int, int]]) -> bool:
-    """Whether the motion begins or ends half-way down to a seat: low, off its feet, and not (yet) in one of its ``stays``.
+def _cut_off(joints: np.ndarray, beds: list[Use], rests: list[Rest]) -> bool:
+    """Whether the motion begins or ends half-way down to a seat: low, off its feet, and not near a place known from the motion.
 
     What it sits down on is then not known, and nothing must be learnt of sitting down on air.
     """
-    for end in (0, len(joints) - 1):
+    places = [*(use.points.mean(0) for use in beds), *(rest.position for rest in rests)]
+    for end in (0, -1):
         ankles = (joints[end, joint("left_ankle")] + joints[end, joint("right_ankle")]) / 2
         low = _ON_THE_FLOOR < joints[end, 0, 2] < _HALF_DOWN and np.linalg.norm((ankles - joints[end, 0])[:2]) > 0.15
-        if low and not any(a - _MIN_REST < end < b + _MIN_REST for a, b in stays):
+        if low and all(np.linalg.norm((joints[end, 0] - place)[:2]) > _NEAR_BY for place in places):
             return True
     return False
-
-
-def _carried(boxes: np.ndarray, rest: Rest) -> bool:
-    """Whether a bed is already the seat of this rest: one sits down on its edge."""
-    at = rest.position - (0.0, 0.0, SEAT_TO_PELVIS)
-    return len(boxes) > 0 and float(_nearest(boxes, at[None])[0]) < 0.05
 
 
 def fitted(
@@ -432,9 +437,9 @@ def fitted(
     of the seats, and nobody uses it.
     """
     beds, rests = lying(joints), resting(joints, path)
-    if _cut_off(joints, [(u.start, u.end) for u in beds] + [(r.start, r.end) for r in rests]):
+    if _cut_off(joints, beds, rests):
         return [], "cut"
-    pieces = [("bed", _bed_for(rng, use, points)) for use in beds]
+    pieces = [("bed", _bed_for(rng, use, points, rests)) for use in beds]
     carrying = np.concatenate([NO_BOXES, *(rows for _, rows in pieces if rows is not None)])
     places: list[Rest] = []
     for rest in rests:
