@@ -1,4 +1,4 @@
-"""From a training run to the weights file that ships: plain matrices in half precision, everything said in its metadata."""
+"""From a training run to the weights file that ships: plain matrices in 8 bits, everything said in its metadata."""
 
 import json
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.skeleton import JOINTS, OFFSETS
-from ..core.weights import FORMAT, read_safetensors, write_safetensors
+from ..core.weights import FORMAT, quantised, read_safetensors, write_safetensors
 from ..model.config import ModelConfig
 from ..model.flow import PartFlow, TwoPartFlow
 from ..model.predictor import ActionPredictor
@@ -40,7 +40,8 @@ def export(
 ) -> None:
     """Write the weights file; ``words`` are its metadata (licence, provenance, metrics), texts or JSON texts.
 
-    Matrices of a thousand values or more are halved; what the flow inverts and what it standardises with stays single.
+    Matrices of a thousand values or more are stored in 8 bits with a scale for each row, which changes no figure that was
+    measured; what the flow inverts and what it standardises with stays single.
     """
     config: ModelConfig = flow.config
     description = {
@@ -48,8 +49,11 @@ def export(
     }
     tensors = {}
     for name, array in tensors_of(flow, predictor, statistics).items():
-        keep = array.size < 1000 or (name.count(".") == 2 and name.endswith(".weight") and name[:5] in ("upper", "lower"))
-        tensors[name] = array if keep else array.astype(np.float16)
+        inverted = name.count(".") == 2 and name.endswith(".weight") and name[:5] in ("upper", "lower")
+        if array.ndim < 2 or array.size < 1000 or inverted:
+            tensors[name] = array
+        else:
+            tensors[name], tensors[f"{name}.scale"] = quantised(array)
     write_safetensors(file, tensors, {"format": FORMAT, "config": json.dumps(description), **words})
 
 

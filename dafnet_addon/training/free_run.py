@@ -2,8 +2,8 @@
 
 The likelihood is learnt along captured poses; sampling walks along the model's own, with one noise vector for all frames. These
 losses are of the poses that such a vector makes after some captured frames (the memory knows the phase of the gait from them):
-at z = 0 they should be the captured ones, and with any noise targets are met, bones keep their length and planted feet stay
-(paper, section 7, asks for a foot-velocity loss). All in metres and seconds, summed with fixed weights.
+at z = 0 they should be the captured ones; with any noise targets are met, the pelvis is as high as floor or seat asks, bones
+keep their length and planted feet stay (the paper's section 7 asks for a foot-velocity loss). Metres and seconds.
 """
 
 import torch
@@ -13,7 +13,7 @@ from ..core.skeleton import LOWER, OFFSETS, PARENTS, TOE_HEIGHT, UPPER
 
 __all__ = ["upper_loss", "lower_loss", "sliding"]
 
-_POSE, _GIVEN, _BONE, _SPEED, _SLIDE = 100.0, 200.0, 100.0, 3.0, 20.0  # nats for each metre, or metre a second
+_POSE, _GIVEN, _HEIGHT, _BONE, _SPEED, _SLIDE = 100.0, 200.0, 50.0, 100.0, 3.0, 20.0  # nats for each metre, or metre a second
 _FPS = 30.0
 _PLANTED = 0.15  # metres a second
 _LOW = 0.03  # metres over where a planted toe base is
@@ -49,7 +49,8 @@ def _followed(made: Tensor, true: Tensor, calm: Tensor) -> Tensor:
 def upper_loss(made: Tensor, true: Tensor, calm: Tensor, given: Tensor) -> Tensor:
     """Loss of made upper bodies (B, T, 14, 3) beside the captured; ``calm`` (B,) where z = 0; ``given`` (B, T, 14)."""
     missed = ((made - true).norm(dim=-1) * given).sum() / given.sum().clamp_min(1.0)
-    return _followed(made, true, calm) + _GIVEN * missed + _BONE * _bone_error(made, _UPPER_BONES)
+    height = (made[..., 0, 2] - true[..., 0, 2]).abs().mean()
+    return _followed(made, true, calm) + _GIVEN * missed + _HEIGHT * height + _BONE * _bone_error(made, _UPPER_BONES)
 
 
 def sliding(feet: Tensor, step: Tensor) -> Tensor:
