@@ -95,7 +95,7 @@ def test_the_frozen_furniture_is_under_those_who_sit():
         for rest in clip.rests:
             tops = [solid.center[2] + solid.half_size[2] for solid in clip.scene.solids]
             gaps = np.abs(rest.position[2] - SEAT_TO_PELVIS - np.array(tops))
-            assert gaps.min() < 0.041, clip.name
+            assert gaps.min() < (0.10 if clip.room == "bed" else 0.041), clip.name
 
 
 def test_the_real_motion_has_no_errors():
@@ -137,10 +137,12 @@ def test_rows_keep_kinds_of_clips_apart():
     names = ("ground_truth", *(f"{mode}_t{t}" for mode in ("free", "ee", "full") for t in (0, 1)))
     runs = {run: e.Figures({"a": (1.0, 1.0)}) for run in names}
     kinds = [{}, {}, {}, {"composed": True}, {"composed": True}, {"room": "desk"}, {"unseen": False}]
+    kinds.append({"room": "bed", "composed": True})
     rows = e.rows([e.Measured(_clip(**kind), runs) for kind in kinds])
     counts = {name: values["clips"] for name, values in rows.items() if name.startswith("free_t0")}
     assert counts == {
-        "free_t0": 3, "free_t0_composed": 2, "free_t0_at_desks_and_shelves": 1, "free_t0_bodies_in_training": 1,
+        "free_t0": 3, "free_t0_composed": 2, "free_t0_at_desks_and_shelves": 1, "free_t0_on_beds": 1,
+        "free_t0_bodies_in_training": 1,
     }
     text = e.table(rows)
     assert len(text.splitlines()) == 2 + len(rows) and "free t0 composed" in text

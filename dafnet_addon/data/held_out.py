@@ -43,9 +43,9 @@ _SAME = 0.01  # metres by which a fingerprint may be off
 @dataclass(frozen=True)
 class HeldClip:
     """``joints`` (T, 22, 3): ground truth, 30 fps. ``path``: its raw root. ``boxes`` (B, 7): its furniture, the same as its
-    ``scene``. ``rests``: seated episodes. ``activity``: one of ``ACTIVITIES``. ``unseen``: whether the body has no clip in
-    training. ``composed``: whether it was made of several clips. ``room``: what there is in it beside seats and chance pieces,
-    "desk", "board" or "shelf" where the hands use one, else "".
+    ``scene``. ``rests``: seated episodes, on a bed lying ones. ``activity``: one of ``ACTIVITIES``. ``unseen``: whether the
+    body has no clip in training. ``composed``: whether it was made of several clips, or raised from the floor onto a bed.
+    ``room``: what there is beside seats and chance pieces, "desk", "shelf" or "bed" where the body uses one, else "".
     """
 
     name: str
@@ -100,7 +100,8 @@ def _composed(recipe: dict[str, Any], motions: dict[str, Motion]) -> Motion:
 
 def _clip(frozen: dict[str, Any], motion: Motion) -> HeldClip:
     start = frozen["start"]
-    joints = motion.joints[start : start + frozen["frames"]]
+    raised = frozen.get("raised", 0.0)
+    joints = motion.joints[start : start + frozen["frames"]] + np.array([0.0, 0.0, raised])
     if len(joints) < frozen["frames"] or np.abs(np.subtract(fingerprint(joints), frozen["fingerprint"])).max() > _SAME:
         raise InputError(
             f"The held-out clip '{frozen['name']}' is not the motion that the test's furniture was fitted to; "
@@ -112,7 +113,8 @@ def _clip(frozen: dict[str, Any], motion: Motion) -> HeldClip:
     )
     return HeldClip(
         frozen["name"], f"{motion.source}/{motion.subject}", _ACTIVITY[motion.category], frozen["unseen"],
-        "composed" in frozen, frozen.get("room", ""), joints, path, np.array(frozen["boxes"]).reshape(-1, 7), rests,
+        "composed" in frozen or raised > 0, frozen.get("room", ""), joints, path,
+        np.array(frozen["boxes"]).reshape(-1, 7), rests,
     )
 
 

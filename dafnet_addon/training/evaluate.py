@@ -230,13 +230,14 @@ def captured(clips: Sequence[HeldClip]) -> list[HeldClip]:
 
 
 def rows(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
-    """Ground truth and all runs on unseen bodies, captured as they are; then with a desk, board or shelf, on composed clips,
-    and on bodies that are also in training.
+    """Ground truth and all runs on unseen bodies, captured as they are; then at desks and shelves, raised onto beds, on
+    composed clips, and on bodies that are also in training.
     """
     groups = {
         "": [m for m in clips if captured([m.clip])],
-        "_at_desks_and_shelves": [m for m in clips if m.clip.unseen and m.clip.room],
-        "_composed": [m for m in clips if m.clip.unseen and m.clip.composed],
+        "_at_desks_and_shelves": [m for m in clips if m.clip.unseen and m.clip.room not in ("", "bed")],
+        "_on_beds": [m for m in clips if m.clip.unseen and m.clip.room == "bed"],
+        "_composed": [m for m in clips if m.clip.unseen and m.clip.composed and not m.clip.room],
         "_bodies_in_training": [m for m in clips if not m.clip.unseen],
     }
     out: dict[str, dict[str, Any]] = {}

@@ -61,7 +61,7 @@ _HEIGHTS = {"low": 0.35, "medium": 0.45, "high": 0.60}
 _RIGHT_HEIGHT, _SITS_WITHIN, _STANDS_ABOVE = 0.05, 0.06, 0.86  # metres
 _AWAY = 0.8  # metres from a seat's middle, beyond which one stands
 _LIKELY = 0.02  # share of frames in which an action has to be the likeliest
-_SHEETS_OF = {"sit down or up": 5, "composed": 3, "desk or shelf": 3, "sit": 2, "walk": 3, "reach": 2, "stand": 2}
+_SHEETS_OF = {"sit down or up": 4, "composed": 3, "desk or shelf": 3, "bed": 2, "sit": 2, "walk": 3, "reach": 1, "stand": 2}
 _A_SHEET, _COLOURS = 4, 48  # clips on a sheet; colours that it is reduced to
 
 
@@ -349,7 +349,7 @@ def criteria(values: dict[str, Any]) -> list[Criterion]:
         add(f"{label}: FS", run["foot_sliding_per_frame"], 2.0 * slides, 1.5 * slides, most=True, count=clips)
         add(f"{label}: BCC", run["bad_collisions_per_frame"], max(1.2 * collides, collides + 0.02), most=True, count=clips)
 
-    for suffix in ("", "_at_desks_and_shelves", "_composed"):
+    for suffix in ("", "_at_desks_and_shelves", "_on_beds", "_composed"):
         for run in ("free_t0", "free_t1", "ee_t0", "ee_t1", "full_t0", "full_t1"):
             if run + suffix not in rows:
                 continue
@@ -425,7 +425,9 @@ def text(values: dict[str, Any]) -> str:
 
 
 def _kind(clip: HeldClip) -> str:
-    return "composed" if clip.composed else "desk or shelf" if clip.room else clip.activity
+    if clip.room:
+        return "bed" if clip.room == "bed" else "desk or shelf"
+    return "composed" if clip.composed else clip.activity
 
 
 def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) -> list[Path]:
