@@ -76,21 +76,24 @@ def _away(rows: np.ndarray) -> float:
 
 
 def lying(joints: np.ndarray) -> list[Use]:
-    """Where the body lies off the floor, trunk level and still, for a quarter of a second or more.
+    """Where the body lies off the floor, or is about to: the trunk within 30 degrees of level, the pelvis still, for 0.25 s.
 
-    Lying on the floor itself needs no bed, and a body that bends down stands on feet far under its pelvis. Places within half a
-    metre and a hand's breadth in height are one bed: ``points`` are its medians of pelvis and chest.
+    Lying on the floor itself needs no bed; a body that bends down stands on feet far under its pelvis, and one that bows on a
+    seat has its chest over its knees. Places within half a metre and a hand's breadth in height are one bed: ``points`` are its
+    medians of pelvis and chest.
     """
     trunk = joints[:, _NECK] - joints[:, _PELVIS]
-    level = np.abs(trunk[:, 2]) < 0.35 * np.linalg.norm(trunk, axis=-1)
-    still = _speed(joints[:, [_PELVIS, _CHEST]]).max(-1) < 0.4
+    level = np.abs(trunk[:, 2]) < 0.5 * np.linalg.norm(trunk, axis=-1)
     height = joints[:, _PELVIS, 2]
-    legs_up = joints[:, _KNEES, 2].mean(-1) > height - 0.2
-    feet = joints[:, _ANKLES].mean(1) - joints[:, _PELVIS]
+    off_floor = (height > _OFF_THE_FLOOR) & (_speed(joints[:, _PELVIS]) < 0.4)
+    knees, feet = (joints[:, rows].mean(1) - joints[:, _PELVIS] for rows in (_KNEES, _ANKLES))
+    back = (trunk * knees)[:, :2].sum(-1) < 0
     stands = (np.linalg.norm(feet[:, :2], axis=-1) < 0.3) & (feet[:, 2] < -0.2)
     found: list[Use] = []
-    for a, b in runs(level & still & legs_up & ~stands & (height > _OFF_THE_FLOOR), _SHORT):
-        line = np.median(joints[a:b, [_PELVIS, _CHEST]], axis=0)
+    for a, b in runs(level & off_floor & back & (knees[:, 2] > -0.2) & ~stands, _SHORT):
+        lowest = a + np.argsort(np.abs(trunk[a:b, 2]))[: max(_SHORT, (b - a) // 2)]
+        line = np.median(joints[lowest][:, [_PELVIS, _CHEST]], axis=0)
+        line[1, 2] = min(line[1, 2], line[0, 2] + 0.05)  # a chest that is still on its way down
         known = any(
             np.linalg.norm((u.points - line).mean(0)[:2]) < 0.5 and abs((u.points - line)[:, 2].mean()) < 0.1 for u in found
         )
