@@ -9,8 +9,10 @@ from dafnet_addon.core.skeleton import REST, SEAT_TO_PELVIS, joint
 from dafnet_addon.data.boxes import distances
 from dafnet_addon.data.canonical import pose_legs
 from dafnet_addon.data.contacts import CONTACTS, contacts
-from dafnet_addon.data.furniture import furnished, probes, resting, scattered, seat_for
+from dafnet_addon.data.fits import fit_report
+from dafnet_addon.data.furniture import fitted, furnished, probes, resting, scattered, seat_for
 from dafnet_addon.data.uses import lying, reaching, stroking, working
+from dafnet_addon.data.windows import motion_of
 
 FEET = [joint(side + part) for side in ("left_", "right_") for part in ("ankle", "foot")]
 TORSO = [joint(name) for name in ("spine1", "spine2", "spine3", "neck", "head", "left_shoulder", "right_shoulder")]
@@ -218,6 +220,35 @@ def test_bending_down_is_no_lying():
     assert not lying(joints)
 
 
+def test_bowing_on_a_seat_is_no_lying():
+    joints = _seated(down=-40)
+    upper = [joint(name) for name in ("spine1", "spine2", "spine3", "neck", "head", "left_shoulder", "right_shoulder")]
+    offset = joints[:, upper] - joints[:, :1]
+    joints[:, upper] = joints[:, :1] + np.stack([offset[..., 0], offset[..., 2], 0.2 * offset[..., 2]], axis=-1)
+    assert not lying(joints)
+
+
+def test_who_sits_on_the_edge_and_lies_down_has_one_bed():
+    sits = _seated(60, 0.57, down=-40)
+    place = sits[-1, 0]
+    lies = _turned(_lies(0.55, 60), 0.0)
+    lies += place - lies[0, 0] + np.array([0.0, -0.2, -0.02])
+    legs = [joint(side + part) for side in ("left_", "right_") for part in ("knee", "ankle", "foot")]
+    share = _ease(20, 0, 20)[:, None, None]
+    over = sits[-1] * (1 - share) + lies[0] * share
+    over[:, legs, 2] += 0.15 * np.sin(np.pi * share[..., 0])  # the feet clear the edge
+    joints = np.concatenate([sits, over, lies])
+    path, found = root_from_joints(joints), 0
+    for seed in range(10):
+        pieces, missing = fitted(np.random.default_rng(seed), joints, path, probes(joints))
+        if not missing:
+            found += 1
+            (bed,) = [rows for kind, rows in pieces if kind == "bed"]
+            assert all(kind != "seat" for kind, _ in pieces)
+            assert distances(bed, (place - (0, 0, SEAT_TO_PELVIS))[None]).min() < 0.1
+    assert found >= 4
+
+
 def test_motion_cut_off_half_way_down_is_not_used():
     joints = _seated(frames=120, down=40)[:58]
     boxes, reason = furnished(np.random.default_rng(0), joints, root_from_joints(joints))
@@ -271,3 +302,13 @@ def test_contacts_of_a_step_and_of_noise():
     assert touch[:, 0].all(), "one bad frame breaks no contact"
     assert touch[:18, 1].all() and not touch[24:36, 1].any() and touch[43:, 1].all()
     assert not touch[:, 2:].any()
+
+
+def test_report_counts_what_fits_and_why_not():
+    sits = motion_of("sits", "made", "0", "sit-stand", _seated(150, down=60))
+    moments = {"rest": (np.array([[0, 165]]), np.ones(1)), "on the way": (np.array([[0, 60]]), np.ones(1))}
+    head, rest, on_the_way = fit_report([sits], moments, np.random.default_rng(0), count=10).splitlines()
+    columns = head.split()
+    assert columns[:6] == ["moments", "of", "used", "no", "seat", "no"] and rest.split()[:2] == ["rest", "10"]
+    assert "10/10" in rest, "a seat for every one of the ten"
+    assert on_the_way.split()[3:7] == ["0", "0", "0", "10"], "all are cut off half-way down"
