@@ -1,6 +1,6 @@
 """What a body does to furniture that motion capture did not record: lies, works on a top, strokes a board, reaches.
 
-Sitting has a module of its own history: see ``furniture.resting``. All joints are (T, 22, 3), world, metres, z up, 30 fps.
+Sitting is found by ``furniture.resting``. All joints are (T, 22, 3), world, metres, z up, 30 fps.
 """
 
 from dataclasses import dataclass
