@@ -381,6 +381,12 @@ def criteria(values: dict[str, Any]) -> list[Criterion]:
     clips = f"{told['clips']} clips"
     add("diversity of the upper body: FREE over EE", diversity["free_t1"]["over_ee"], 2.0, count=clips)
     add("diversity of the upper body: EE over FULL", diversity["ee_t1"]["over_full"], 2.0, count=clips)
+    legs, real = diversity["legs_vary_t1"], diversity["ground_truth"]
+    add("legs under one upper body: their diversity over its", legs["apd_legs"] / legs["apd_upper"], 2.0, count=clips)
+    add("legs under one upper body: sits", legs["sits_within_6cm"], 0.85, 0.95, count=f"{legs['seat_episodes']} episodes")
+    for name in ("feet_off_floor", "legs_penetration_mean"):
+        label = f"legs under one upper body: {name.replace('_', ' ')}"
+        add(label, legs[name], max(2.0 * real[name], real[name] + 0.002), most=True, count=clips)
     add("actions: information, nats", told["information_nats"], 1.0, count=clips)
     add("actions: likeliest in 2 % of frames", told["likeliest_in_2_percent"], 6.0, count=clips)
     add("actions: mutual information with activities", told["normalised_mutual_information"], 0.3, count=clips)
