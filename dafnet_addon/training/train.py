@@ -173,7 +173,8 @@ class Run:
         mean, std = (torch.as_tensor(a, dtype=made.dtype, device=made.device) for a in statistics)
 
         def metres(values: torch.Tensor, which: slice) -> torch.Tensor:
-            return (values * std[which] + mean[which]).unflatten(-1, (-1, 3))
+            # An unlearnt flow's inverse may be anywhere; such poses teach nothing.
+            return (values.clamp(-20.0, 20.0) * std[which] + mean[which]).unflatten(-1, (-1, 3))
 
         if self.part == "upper":
             upper = slice(0, UPPER_SIZE)
