@@ -310,8 +310,9 @@ class Sampler:
         return pose, actions
 
     def absorb(self, index: int, pose: Array, actions: Array | None = None) -> tuple[Array, Array, Array]:
-        """Noise (B, 66), action probabilities (B, K) and log-determinant (B,) of a kept frame: pose to noise, which rebuilds the
-        memory to go on from. ``actions`` stand in for the predictor's.
+        """Noise (B, 66), action probabilities (B, K) and log-determinant (B,) of a kept frame: pose to noise.
+
+        This rebuilds the memory to go on from. ``actions`` stand in for the predictor's.
         """
         xp = self.xp
         actions = self._act(index) if actions is None else actions

@@ -32,8 +32,9 @@ _SHARES = {
     "approach": 0.17, "leave": 0.08, "descend": 0.16, "sit": 0.07, "work": 0.07, "desk": 0.06, "counter": 0.03, "write": 0.04,
     "lie": 0.04, "walk": 0.18, "stand": 0.10,
 }
-"""Shares of windows. Composed: walking up to a seat and sitting down, standing up and walking off, hands at work over seated legs,
-at a desk, at a board, lying down on a bed or getting up. Captured: around a sit-down or stand-up, seated, walking, standing.
+"""Shares of windows. Composed: walking up to a seat and sitting down, standing up and walking off, hands at work over seated
+legs, at a desk, at a board, lying down on a bed or getting up. Captured: around a sit-down or stand-up, seated, walking,
+standing.
 """
 _COMPOSITION = (
     "walks joined to sit-downs; seats moved to other heights; mirrored, reversed, re-timed; arms lent to the UI-PRMD bodies; "

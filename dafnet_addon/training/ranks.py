@@ -1,4 +1,4 @@
-"""Training on several devices: each rank of ``torchrun`` draws its own windows, gradients are averaged, rank 0 keeps the run."""
+"""Training on several devices: each rank of ``torchrun`` draws its own windows; gradients are averaged, rank 0 saves."""
 
 import os
 
