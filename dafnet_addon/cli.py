@@ -100,12 +100,14 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     train.add_argument("dataset", type=Path, metavar="DATASET", help="made by 'prepare'")
     train.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="folder of the run")
     train.add_argument("--minutes", type=float, help="of the flow's training, instead of the configuration's")
+    train.add_argument("--from", dest="begin_with", type=Path, metavar="WEIGHTS", help="weights that a new run begins with")
     train.add_argument("--device", default="cpu", help="'cpu', or 'cuda'; several GPUs through torchrun")
 
     evaluate = command("evaluate", _evaluate, "measure weights on held-out clips, beside the clips themselves")
     evaluate.add_argument("folder", type=Path, metavar="FOLDER", help="holds the motion files")
     evaluate.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
     evaluate.add_argument("--save", action="store_true", help="write the figures into the weights' metadata")
+    evaluate.add_argument("--sheets", type=Path, metavar="FOLDER", help="also draw twenty clips, real beside generated")
 
     bench = command("bench", _bench, "measure: 'seats' sits on ten heights from three sides")
     bench.add_argument("name", choices=["seats"])
@@ -207,18 +209,18 @@ def _prepare(options: argparse.Namespace) -> None:
     _require_checkout("data")
     from .data.prepare import prepare
 
-    if not any(options.folder.glob("*.npz")):
-        raise InputError(f"The folder '{options.folder}' holds no motion files (.npz); choose the one that does.")
     with _Bar() as bar:
         prepare(options.folder, options.output, options.windows, options.processes, options.seed, bar)
     if options.json:
         print((options.output / "dataset.json").read_text())
     else:
-        print(f"Written to {options.output}")
+        print((options.output / "summary.txt").read_text() + (options.output / "fits.txt").read_text())
+        print(f"Written to {options.output}; look at its preview.png")
 
 
 def _train(options: argparse.Namespace) -> None:
     _require_checkout("training")
+    from .core.weights import load_weights
     from .training import ranks
     from .training.export import export
     from .training.train import account, read_config, train, trained
@@ -226,8 +228,9 @@ def _train(options: argparse.Namespace) -> None:
     model, config = read_config(options.config)
     if options.minutes is not None:
         config = replace(config, minutes_flow=options.minutes)
+    begin_with = load_weights(options.begin_with) if options.begin_with else None
     with _Bar() as bar:
-        train(options.dataset, options.output, model, config, bar, options.device)
+        train(options.dataset, options.output, model, config, bar, options.device, begin_with)
     if ranks.rank():
         return
     file = options.output / "dafnet.safetensors"
@@ -240,16 +243,18 @@ def _evaluate(options: argparse.Namespace) -> None:
     _require_checkout("training")
     from .core.weights import load_weights
     from .data.held_out import held_out
-    from .training.evaluate import evaluate, table
     from .training.export import annotate
+    from .training.report import contact_sheets, report, text
 
-    weights = load_weights(options.weights)
+    weights, clips = load_weights(options.weights), held_out(options.folder)
     with _Bar() as bar:
-        rows = evaluate(weights, held_out(options.folder), bar)
+        found = report(weights, clips, bar)
     if options.save:
-        ground_truth = rows["ground_truth"]
-        annotate(weights.path, {"ground_truth": json.dumps(ground_truth), "held_out": json.dumps(rows)})
-    print(json.dumps(rows, indent=2) if options.json else table(rows))
+        rows = found["rows"]
+        annotate(weights.path, {"ground_truth": json.dumps(rows["ground_truth"]), "held_out": json.dumps(rows)})
+    if options.sheets:
+        contact_sheets(weights, clips, options.sheets)
+    print(json.dumps(found, indent=2) if options.json else text(found))
 
 
 def _bench(options: argparse.Namespace) -> None:

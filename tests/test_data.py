@@ -168,6 +168,32 @@ def test_a_dataset_is_made_and_gone_on_with(tmp_path):
     assert {"walk", "stand"} & set(pool["kinds"]) and {"approach", "descend", "sit"} & set(pool["kinds"])
     described = json.loads((out / "dataset.json").read_text())
     assert described["train"] == ["rocketbox/male"] and described["held_out"] == ["rocketbox/female"]
+    summary = (out / "summary.txt").read_text()
+    assert "sit_down" in summary and "MIT" in summary and "minutes" in summary
+    assert "no seat" in (out / "fits.txt").read_text() and (out / "preview.png").stat().st_size > 10_000
     stamp = (out / "pool-0000.npz").stat().st_mtime_ns
     prepare(folder, out, windows=24)
     assert (out / "pool-0000.npz").stat().st_mtime_ns == stamp, "finished shards are kept"
+
+
+def test_a_dataset_of_raw_files_needs_a_licence_and_a_held_out_body(tmp_path):
+    raw = MOCAP / "raw_samples"
+    if not raw.is_dir():
+        pytest.skip(f"needs the motion capture at {raw}")
+    from dafnet_addon.data.prepare import prepare
+
+    folder, out = tmp_path / "mocap", tmp_path / "dataset"
+    folder.mkdir()
+    with pytest.raises(InputError, match="no motion files"):
+        prepare(folder, out, windows=4)
+    for name in ("cmu69_69_02_1.bvh", "accad_male1_B3_walk.bvh"):
+        (folder / name).symlink_to(raw / name)
+    free = {"licence": "CC0", "category": "locomotion"}
+    for stated, lacking in ({}, "test"), ({"*": free}, "test"), ({"*": {**free, "split": "test"}}, "train"):
+        (folder / "clips.json").write_text(json.dumps(stated))
+        with pytest.raises(InputError, match=f"split '{lacking}'.*clips.json"):
+            prepare(folder, out, windows=4)
+    (out / "test.npz").unlink()
+    (folder / "clips.json").write_text(json.dumps({"*": free, "accad*": {"subject": "a", "split": "test"}}))
+    prepare(folder, out, windows=4)
+    assert (out / "pool-0000.npz").exists() and json.loads((out / "dataset.json").read_text())["held_out"] == ["mocap/a"]

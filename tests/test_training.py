@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from dafnet_addon.core.errors import InputError  # noqa: E402
+from dafnet_addon.core.errors import InputError, WeightsError  # noqa: E402
 from dafnet_addon.core.root import RootPath  # noqa: E402
 from dafnet_addon.core.skeleton import MODEL_ORDER  # noqa: E402
 from dafnet_addon.core.weights import load_weights  # noqa: E402
@@ -19,7 +20,13 @@ from dafnet_addon.data import boxes as boxes_module  # noqa: E402
 from dafnet_addon.data.prepare import POSE_UNIT  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training.batches import Pool, Statistics, observation_for, occupancy_of, past_of  # noqa: E402
-from dafnet_addon.training.export import annotate, export, tensors_of  # noqa: E402
+from dafnet_addon.training.export import (  # noqa: E402
+    adopt_predictor,
+    adopted_statistics,
+    annotate,
+    export,
+    tensors_of,
+)
 from dafnet_addon.training.train import Run, TrainingConfig, read_config, train_part, trained  # noqa: E402
 
 TINY = ModelConfig(
@@ -57,7 +64,7 @@ class _Enough(Exception):
     pass
 
 
-def _until(part: str, dataset: Path, folder: Path, steps: int, saves: int = 1) -> Run:
+def _until(part: str, dataset: Path, folder: Path, steps: int, saves: int = 1, model: ModelConfig = TINY) -> Run:
     """Train a part for ``saves`` times ``steps`` steps; the run as it was saved last."""
     seen: list[float] = []
 
@@ -68,7 +75,7 @@ def _until(part: str, dataset: Path, folder: Path, steps: int, saves: int = 1) -
         seen.append(loss)
 
     with pytest.raises(_Enough):
-        train_part(part, dataset, folder, TINY, _config(steps), progress=progress)
+        train_part(part, dataset, folder, model, _config(steps), progress=progress)
     return Run.load(part, folder)
 
 
@@ -182,6 +189,64 @@ def test_what_is_exported_is_what_was_trained(dataset, tmp_path):
     again = load_weights(tmp_path / "w.safetensors")
     assert again.metadata["licence"] == "none" and json.loads(again.metadata["held_out"]) == {"a": 1}
     assert all((again.tensors[name] == weights.tensors[name]).all() for name in weights.tensors)
+
+
+def _exported(dataset: Path, folder: Path, model: ModelConfig) -> Path:
+    """Weights of a hardly trained model, in a file."""
+    for part in ("predictor", "upper", "lower"):
+        _until(part, dataset, folder, steps=2, model=model)
+    flow, predictor, statistics = trained(folder)
+    export(folder / "w.safetensors", flow, predictor, statistics, {"licence": "none"})
+    return folder / "w.safetensors"
+
+
+def test_a_run_begins_with_what_weights_have_learnt(dataset, tmp_path):
+    weights = load_weights(_exported(dataset, tmp_path / "one", TINY))
+    for part in ("predictor", "upper", "lower"):
+        before = Run.load(part, tmp_path / "one")
+        before.gmvae.load_state_dict(Run.load("predictor", tmp_path / "one").network.state_dict())
+        after = Run(part, tmp_path / "two", TINY, _config(2), before.statistics)
+        after.gmvae.load_state_dict(before.gmvae.state_dict())
+        fresh = _loss_at(after, dataset)
+        after.adopt(weights)
+        # What was stored in 8 bits is off by a little.
+        assert abs(_loss_at(after, dataset) - _loss_at(before, dataset)) < 0.02 * abs(_loss_at(before, dataset) - fresh) + 0.5
+
+
+def test_weights_that_were_not_told_of_the_way_ahead_begin_a_model_that_is(dataset, tmp_path):
+    weights = load_weights(_exported(dataset, tmp_path / "one", TINY))
+    told = replace(TINY, ahead=18)
+    found = _pool(dataset).statistics()
+    statistics = adopted_statistics(weights, found)
+    assert (statistics.pose_mean == weights.tensors["pose_mean"]).all()
+    for part in ("upper", "lower"):
+        short, long = (Run(part, tmp_path / "two", model, _config(2), statistics) for model in (TINY, told))
+        for run in (short, long):
+            adopt_predictor(run.gmvae.predictor, weights)
+            run.adopt(weights)
+        assert abs(_loss_at(short, dataset) - _loss_at(long, dataset)) < 1e-2
+    with pytest.raises(WeightsError, match="choose another"):
+        Run("upper", tmp_path / "two", replace(TINY, width=8), _config(2), found).adopt(weights)
+
+
+def test_mixed_precision_is_nearly_the_same(dataset, tmp_path):
+    weights = load_weights(_exported(dataset, tmp_path / "one", TINY))
+    statistics = adopted_statistics(weights, _pool(dataset).statistics())
+    losses = []
+    for mixed in (False, True):
+        run = Run("upper", tmp_path / "two", TINY, replace(_config(2), mixed=mixed, free_run=1.0), statistics)
+        adopt_predictor(run.gmvae.predictor, weights)
+        run.adopt(weights)
+        losses.append(_loss_at(run, dataset))
+    assert abs(losses[0] - losses[1]) < 0.02 * abs(losses[0]) + 0.2
+
+
+def test_what_a_cpu_reads_of_the_sensor_is_what_other_devices_make(dataset):
+    pool = _pool(dataset)
+    rows = pool._rows(torch.arange(12))
+    made = occupancy_of(rows["boxes"], rows["root"])
+    assert made.max() > 0.5 and (rows["seen"].float() / 255 - made).abs().max() < 0.5 / 255 + 1e-6
+    assert (dataset / "pool-0000.seen.npy").exists() and len(_pool(dataset)) == 12
 
 
 def test_configurations_are_read_and_bad_ones_refused(tmp_path):

@@ -1,7 +1,8 @@
 """From motion files to a training set: clips on the canonical body, and a pool of augmented, furnished windows on disk.
 
 A dataset is a folder: ``train.npz`` and ``test.npz`` (motions, captured and composed), ``dataset.json`` (what they were made
-from), ``pool-NNNN.npz`` (training windows) and ``held.npz`` (windows of held-out motions, for the likelihood).
+from), ``pool-NNNN.npz`` (training windows) and ``held.npz`` (windows of held-out motions, for the likelihood). For people:
+``summary.txt`` (what was read, and what was cut from it), ``fits.txt`` (how often furniture fits) and ``preview.png``.
 """
 
 import json
@@ -13,12 +14,16 @@ from typing import Any
 
 import numpy as np
 
+from ..core.errors import InputError
 from ..core.rotations import frame_from, normalised
 from ..core.skeleton import OFFSETS, PARENTS
 from .canonical import calibrate, canonical
 from .compose import composed
+from .fits import fit_report
 from .mocap import Clip, read_clips
 from .motions import Draws, read_motions, write_motions
+from .preview import preview
+from .summary import summary
 from .windows import COMPOSED, Motion, Window, draw, motion_of
 
 __all__ = ["load_motions", "sample", "prepare", "load_pool", "POSE_UNIT", "TRAINED_ON_PARTLY"]
@@ -51,6 +56,7 @@ TRAINED_ON_PARTLY = {"cmu69", "snu_tiling/wd2(dir 1)", "snu_ys2010", "gazebo_act
 
 _ARMS = [18, 20, 19, 21]  # elbow and wrist, left then right
 _SHARD = 1000
+_FIT_TRIES = 60  # moments of each kind that are furnished for the report
 _STORED = ("poses", "velocity", "ahead", "root", "boxes")
 POSE_UNIT = 1e-4
 """Poses are stored as whole numbers of these (metres)."""
@@ -170,11 +176,20 @@ def _shard(task: tuple[Path, int, int]) -> Path:
     return file
 
 
+def _written(file: Path, text: Callable[[], str]) -> None:
+    """Write what ``text`` gives, unless the file is there already."""
+    if not file.exists():
+        file.write_text(text() + "\n")
+
+
 def prepare(
     folder: Path, out: Path, windows: int = 12000, processes: int = 1, seed: int = 0,
     progress: Callable[[float], None] = lambda _: None,
 ) -> None:
-    """Make (or go on making) the dataset ``out`` from the motion files in ``folder``. What is finished is kept."""
+    """Make (or go on making) the dataset ``out`` from the motion files in ``folder``. What is finished is kept.
+
+    Raises InputError where the folder holds no motion files, or none to train on or none that are held out.
+    """
     out.mkdir(parents=True, exist_ok=True)
     size = min(_SHARD, windows)
     train = [(out / f"pool-{i:04d}.npz", seed * 10000 + i, size) for i in range(max(1, windows // _SHARD))]
@@ -183,7 +198,13 @@ def prepare(
     for split, tasks in (("test", [(out / "held.npz", 99, min(600, windows))]), ("train", train)):
         file = out / f"{split}.npz"
         if not file.exists():
-            write_motions(file, *_draws(load_motions(folder, split)))
+            motions, draws = _draws(load_motions(folder, split))
+            if not draws:
+                raise InputError(
+                    f"The folder '{folder}' has no clip of split '{split}' that can be used; state in its clips.json the "
+                    "clips' licence, their split ('train', or 'test' for held-out subjects) and category (as 'locomotion')."
+                )
+            write_motions(file, motions, draws)
         known = read_motions(file)
         described["train" if split == "train" else "held_out"] = sorted(
             {f"{m.source}/{m.subject}" for m in known[0] if m.source != COMPOSED}
@@ -194,6 +215,10 @@ def prepare(
             for k, _ in enumerate(pool.imap_unordered(_shard, missing)):
                 progress((done + k + 1) / (1 + len(train)))
         done += len(tasks)
+    _written(out / "summary.txt", lambda: summary(read_clips(folder)))
+    _written(out / "fits.txt", lambda: fit_report(*read_motions(out / "train.npz"), np.random.default_rng(seed), _FIT_TRIES))
+    if not (out / "preview.png").exists():
+        preview(out / "preview.png", *read_motions(out / "train.npz"), np.random.default_rng(seed))
     (out / "dataset.json").write_text(json.dumps(described, indent=1))
 
 

@@ -49,13 +49,21 @@ class InvertibleLinear(nn.Module):
 
     def __init__(self, size: int) -> None:
         super().__init__()
-        rotation = torch.linalg.qr(torch.randn(size, size))[0]
-        p, lower, upper = torch.linalg.lu(rotation)
-        self.register_buffer("permutation", p)
-        self.register_buffer("sign", upper.diagonal().sign())
-        self.log_s = nn.Parameter(upper.diagonal().abs().log())
-        self.lower = nn.Parameter(lower.tril(-1))
-        self.upper = nn.Parameter(upper.triu(1))
+        self.register_buffer("permutation", torch.empty(size, size))
+        self.register_buffer("sign", torch.empty(size))
+        self.log_s = nn.Parameter(torch.empty(size))
+        self.lower, self.upper = (nn.Parameter(torch.empty(size, size)) for _ in range(2))
+        self.adopt(torch.linalg.qr(torch.randn(size, size))[0])
+
+    @torch.no_grad()
+    def adopt(self, weight: Tensor) -> None:
+        """Become ``weight`` (size, size), an invertible matrix."""
+        p, lower, upper = torch.linalg.lu(weight)
+        self.permutation.copy_(p)
+        self.sign.copy_(upper.diagonal().sign())
+        self.log_s.copy_(upper.diagonal().abs().log())
+        self.lower.copy_(lower.tril(-1))
+        self.upper.copy_(upper.triu(1))
 
     def factors(self) -> tuple[Tensor, Tensor]:
         eye = torch.eye(len(self.log_s), dtype=self.log_s.dtype, device=self.log_s.device)
@@ -79,7 +87,12 @@ class InvertibleLinear(nn.Module):
 
 
 class Coupling(nn.Module):
-    """Affine coupling: the first half passes; an LSTM on it and the condition gives shift and scale of the second."""
+    """Affine coupling: the first half passes; an LSTM on it and the condition gives shift and scale of the second.
+
+    ``mixed``: the LSTM computes in bfloat16. What the flow itself computes, and inverts, stays single.
+    """
+
+    mixed = False
 
     def __init__(self, size: int, condition: int, width: int, layers: int) -> None:
         super().__init__()
@@ -90,7 +103,9 @@ class Coupling(nn.Module):
         nn.init.zeros_(self.out.bias)
 
     def _affine(self, passed: Tensor, condition: Tensor, state: LSTMState | None) -> tuple[Tensor, Tensor, LSTMState]:
-        hidden, state = self.lstm(torch.cat([passed, condition], dim=-1), state)
+        with torch.autocast(passed.device.type, torch.bfloat16, enabled=self.mixed):
+            hidden, state = self.lstm(torch.cat([passed, condition], dim=-1), state)
+            hidden = hidden.to(passed.dtype)
         shift, raw = self.out(hidden).chunk(2, dim=-1)
         return shift, torch.sigmoid(raw + 2.0) + 1e-6, state
 
@@ -194,7 +209,9 @@ def _log_density(z: Tensor, log_det: Tensor) -> Tensor:
 
 
 class EnvironmentEncoder(nn.Module):
-    """Occupancy (…, 2640) to a code: Linear, ReLU, Linear (paper, Table 4)."""
+    """Occupancy (…, 2640) to a code: Linear, ReLU, Linear (paper, Table 4). ``mixed``: in bfloat16."""
+
+    mixed = False
 
     def __init__(self, code: int) -> None:
         super().__init__()
@@ -202,7 +219,8 @@ class EnvironmentEncoder(nn.Module):
         self.second = nn.Linear(code, code)
 
     def forward(self, occupancy: Tensor) -> Tensor:
-        return self.second(torch.relu(self.first(occupancy)))
+        with torch.autocast(occupancy.device.type, torch.bfloat16, enabled=self.mixed):
+            return self.second(torch.relu(self.first(occupancy))).to(occupancy.dtype)
 
 
 class TwoPartFlow(nn.Module):

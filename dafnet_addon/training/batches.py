@@ -1,5 +1,6 @@
 """Training windows as standardised tensors: the pool they are drawn from, what the sensor sees, the modes drawn for each."""
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,13 +15,14 @@ from ..core.skeleton import END_EFFECTORS, MODEL_ORDER, UPPER
 from ..data.prepare import POSE_UNIT, load_pool
 from ..model.config import UPPER_SIZE, ModelConfig
 
-__all__ = ["Statistics", "Pool", "Batch", "past_of", "observation_for", "occupancy_of"]
+__all__ = ["Statistics", "Pool", "Batch", "past_of", "observation_for", "occupancy_of", "seen"]
 
 _EFFECTORS = [MODEL_ORDER.index(j) for j in END_EFFECTORS.values()]
 _PELVIS = MODEL_ORDER.index(0)
 NOISE = 0.003
 """Dequantisation (metres): constant bone lengths would else make the likelihood unbounded."""
 _SEGMENTS = 4
+_AT_ONCE = 2  # windows: what is computed of them stays in a core's cache
 _FREE, _EE, _FULL = range(3)
 
 
@@ -70,9 +72,26 @@ def past_of(poses: Tensor, velocity: Tensor, history: int) -> Tensor:
     return torch.cat(past + [velocity[:, k : k + frames] for k in range(history + 1)], dim=-1)
 
 
+def seen(file: Path) -> np.ndarray:
+    """Occupancy of a shard's windows (N, 70, 2640) in bytes, 255 of which are 1; made once and kept beside the shard."""
+    kept = file.with_suffix(".seen.npy")
+    if not kept.exists():
+        shard = load_pool([file])
+        boxes, root = torch.from_numpy(shard["boxes"]), torch.from_numpy(shard["root"])
+        part = file.with_suffix(f".{os.getpid()}.npy")
+        out = np.lib.format.open_memmap(part, "w+", np.uint8, (*root.shape[:2], len(SPHERES)))
+        for k in range(0, len(root), _AT_ONCE):
+            some = slice(k, k + _AT_ONCE)
+            out[some] = (255.0 * occupancy_of(boxes[some], root[some])).round().to(torch.uint8).numpy()
+        out.flush()
+        part.rename(kept)
+    return np.load(kept, mmap_mode="r")
+
+
 class Pool:
     """Windows of a dataset, sent to a device batch by batch. New shards may be written while training goes on: ``refresh``
-    takes them in.
+    takes them in. A CPU reads what the sensor sees from disk (see ``seen``), since making it costs as much as a step of
+    training; other devices make it.
     """
 
     def __init__(self, files: Callable[[], Sequence[Path]], device: torch.device) -> None:
@@ -88,6 +107,8 @@ class Pool:
         for file in self.files():
             if file not in self.shards:
                 self.shards[file] = load_pool([file])
+                if self.device.type == "cpu":
+                    self.shards[file]["seen"] = seen(file)
         self.ends = np.cumsum([len(shard["poses"]) for shard in self.shards.values()])
 
     def statistics(self, most: int = 20) -> Statistics:
@@ -120,9 +141,10 @@ class Pool:
         velocity = (step - v_mean) / v_std
         way = ((a["ahead"] - a_mean) / a_std)[..., : config.ahead]
         now = poses[:, history:]
+        occupancy = a["seen"].float() / 255.0 if "seen" in a else occupancy_of(a["boxes"], a["root"])
         return Batch(
             past_of(poses, velocity, history), now[..., :UPPER_SIZE], now[..., UPPER_SIZE:],
-            torch.cat([velocity[:, history:], way], dim=-1), occupancy_of(a["boxes"], a["root"]), step[:, history:],
+            torch.cat([velocity[:, history:], way], dim=-1), occupancy, step[:, history:],
         )
 
 

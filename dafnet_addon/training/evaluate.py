@@ -41,7 +41,7 @@ from ..core.weights import Weights
 from ..data.held_out import HeldClip
 
 __all__ = [
-    "SEEDS", "Figures", "Measured", "beside", "captured", "evaluate", "figures", "in_processes", "made", "measured", "row",
+    "SEEDS", "Figures", "Measured", "beside", "captured", "figures", "in_processes", "made", "measured", "row",
     "rows", "rows_of", "shot_of", "table",
 ]
 
@@ -244,13 +244,6 @@ def rows(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
     for suffix, chosen in groups.items():
         out |= {run + suffix: values for run, values in rows_of(chosen, _RUNS).items()}
     return out
-
-
-def evaluate(
-    weights: Weights, clips: Sequence[HeldClip], progress: Callable[[float], None] = lambda share: None, seed: int = 0
-) -> dict[str, dict[str, Any]]:
-    """The rows of ``rows``. ``end_effector_error`` in FREE is no fault, it says how far a free body is from the real one."""
-    return rows(measured(weights, clips, progress, seed))
 
 
 _COLUMNS = (

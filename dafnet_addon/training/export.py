@@ -1,4 +1,4 @@
-"""From a training run to the weights file that ships: plain matrices in 8 bits, everything said in its metadata."""
+"""From a training run to the weights file that ships, plain matrices in 8 bits, everything said in its metadata; and back."""
 
 import json
 from collections.abc import Mapping
@@ -6,15 +6,17 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+import torch
 
+from ..core.errors import WeightsError
 from ..core.skeleton import JOINTS, OFFSETS
-from ..core.weights import FORMAT, quantised, read_safetensors, write_safetensors
-from ..model.config import ModelConfig
-from ..model.flow import PartFlow, TwoPartFlow
+from ..core.weights import FORMAT, Weights, quantised, read_safetensors, write_safetensors
+from ..model.config import VELOCITY_SIZE, ModelConfig
+from ..model.flow import Coupling, PartFlow, TwoPartFlow
 from ..model.predictor import ActionPredictor
 from .batches import NOISE, Statistics
 
-__all__ = ["tensors_of", "export", "annotate"]
+__all__ = ["tensors_of", "adopt_predictor", "adopt_part", "adopted_statistics", "export", "annotate"]
 
 
 def tensors_of(flow: TwoPartFlow, predictor: ActionPredictor, statistics: Statistics) -> dict[str, np.ndarray]:
@@ -33,6 +35,53 @@ def tensors_of(flow: TwoPartFlow, predictor: ActionPredictor, statistics: Statis
             for name, tensor in coupling.state_dict().items():
                 out[f"{prefix}.{name}"] = tensor.numpy()
     return out
+
+
+def _copied(weights: Weights, name: str, target: torch.Tensor) -> None:
+    target.copy_(torch.from_numpy(np.array(weights.require(name, tuple(target.shape)))))
+
+
+@torch.no_grad()
+def adopt_predictor(predictor: ActionPredictor, weights: Weights) -> None:
+    """Give a predictor what a weights file of the same sizes holds. Raises WeightsError where the sizes differ."""
+    for name, target in predictor.state_dict().items():
+        _copied(weights, f"predictor.{name}", target)
+
+
+@torch.no_grad()
+def adopt_part(part: PartFlow, name: str, weights: Weights, config: ModelConfig) -> None:
+    """Give the flow's part ``name`` what a weights file of the same sizes holds. Raises WeightsError where the sizes differ.
+
+    A file that was not told of the root's way ahead serves a model that is: what weighs it starts at zero.
+    """
+    for key, target in part.encoders.state_dict().items():
+        _copied(weights, f"{name}.encoders.{key}", target)
+    told = int(weights.config["model"].get("ahead", 0))
+    if told not in (0, config.ahead):
+        raise WeightsError(f"The weights '{weights.path}' are told of the root's way in another manner; choose another file.")
+    for k, (norm, linear, coupling) in enumerate(part.steps()):
+        prefix = f"{name}.{k}"
+        _copied(weights, f"{prefix}.bias", norm.bias)
+        _copied(weights, f"{prefix}.log_scale", norm.log_scale)
+        linear.adopt(torch.from_numpy(np.array(weights.require(f"{prefix}.weight", tuple(linear.weight().shape)))))
+        for key, target in coupling.state_dict().items():
+            if key == "lstm.weight_ih_l0" and told < config.ahead:
+                _adopt_first(coupling, weights.require(f"{prefix}.{key}"), target, config)
+            else:
+                _copied(weights, f"{prefix}.{key}", target)
+
+
+def _adopt_first(coupling: Coupling, matrix: np.ndarray, target: torch.Tensor, config: ModelConfig) -> None:
+    before = coupling.passes + config.actions + VELOCITY_SIZE
+    wide = np.insert(matrix, [before] * config.ahead, 0.0, axis=1)
+    if wide.shape != tuple(target.shape):
+        raise WeightsError(f"A layer of the shape {matrix.shape} does not fit this model; choose other weights to begin with.")
+    target.copy_(torch.from_numpy(wide))
+
+
+def adopted_statistics(weights: Weights, found: Statistics) -> Statistics:
+    """What a weights file standardises with; of the way ahead, where it is not told of it, what was ``found``."""
+    return Statistics(**{name: weights.tensors.get(name, value) for name, value in asdict(found).items()})
 
 
 def export(

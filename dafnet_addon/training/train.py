@@ -20,11 +20,13 @@ import torch
 from torch import nn
 
 from ..core.errors import InputError
+from ..core.weights import Weights
 from ..model.config import LOWER_SIZE, PAPER, POSE_SIZE, SMALL, UPPER_SIZE, ModelConfig
-from ..model.flow import TwoPartFlow
+from ..model.flow import Coupling, EnvironmentEncoder, TwoPartFlow
 from ..model.predictor import GMVAE, ActionPredictor, gumbel_temperature
 from . import ranks
 from .batches import Batch, Pool, Statistics, observation_for
+from .export import adopt_part, adopt_predictor, adopted_statistics
 from .free_run import lower_loss, upper_loss
 
 __all__ = ["TrainingConfig", "read_config", "Run", "account", "train", "train_part", "trained"]
@@ -37,7 +39,9 @@ class TrainingConfig:
     ``environment_dropout``: share of sensor values hidden from both, in a share ``dropout_windows`` of the windows (the paper
     hides them in all; then only whole layers of spheres are told apart, and seats are met to 12 cm). ``clip_norm``: largest
     gradient norm. ``free_run``: weight of the losses of motion that the flow makes by itself (see ``free_run``; 0 as in the
-    paper), which begins after ``captured`` frames of a window; ``calm`` of the windows make it from z = 0.
+    paper), which begins after ``captured`` frames of a window, in a share ``cold`` of the batches after the first, with an
+    empty memory, as a take begins; ``calm`` of the windows make it from z = 0. ``mixed``: LSTMs and environment encoders
+    compute in bfloat16.
     """
 
     minutes_predictor: float = 5.0
@@ -52,7 +56,9 @@ class TrainingConfig:
     clip_norm: float = 50.0
     free_run: float = 0.0
     captured: int = 20
+    cold: float = 0.25
     calm: float = 0.5
+    mixed: bool = False
     save_every: int = 100
     seed: int = 0
 
@@ -88,9 +94,20 @@ class Run:
         self.part, self.folder, self.model, self.config, self.statistics = part, folder, model, config, statistics
         self.device = torch.device(device)
         self.gmvae, self.flow = GMVAE(model).to(self.device), TwoPartFlow(model).to(self.device)
+        for module in self.flow.modules():
+            if isinstance(module, Coupling | EnvironmentEncoder):
+                module.mixed = config.mixed
         self.network: nn.Module = self.gmvae if part == "predictor" else getattr(self.flow, part)
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=config.peak)
-        self.step, self.seconds = 0, 0.0
+        self.step, self.seconds, self.adopted = 0, 0.0, False
+
+    def adopt(self, weights: Weights) -> None:
+        """Begin with what these weights have learnt. Raises WeightsError where their sizes are others."""
+        if self.part == "predictor":
+            adopt_predictor(self.gmvae.predictor, weights)
+        else:
+            adopt_part(getattr(self.flow, self.part), self.part, weights, self.model)
+        self.adopted = True
 
     @property
     def budget(self) -> float:
@@ -107,7 +124,7 @@ class Run:
         state = {
             "model": self.model.as_dict(), "config": asdict(self.config), "statistics": asdict(self.statistics),
             "network": self.network.state_dict(), "optimiser": self.optimiser.state_dict(), "step": self.step,
-            "seconds": self.seconds, "generators": _generators(self.device),
+            "seconds": self.seconds, "adopted": self.adopted, "generators": _generators(self.device),
         }
         part = self.folder / f"{self.part}.part"
         torch.save(state, part)
@@ -124,7 +141,7 @@ class Run:
         )
         run.network.load_state_dict(state["network"])
         run.optimiser.load_state_dict(state["optimiser"])
-        run.step, run.seconds = state["step"], state["seconds"]
+        run.step, run.seconds, run.adopted = state["step"], state["seconds"], state["adopted"]
         _set_generators(state["generators"], run.device)
         return run
 
@@ -159,16 +176,17 @@ class Run:
             condition = self.flow.lower_condition(base, observation, given, batch.upper)
         if initialise or not self.config.free_run:
             return -part.log_likelihood(x, condition, occupancy, initialise).mean()
-        kept, calm = self.config.captured, torch.rand(len(x), device=self.device) < self.config.calm
+        kept = 1 if float(torch.rand(())) < self.config.cold else self.config.captured
+        calm = torch.rand(len(x), device=self.device) < self.config.calm
         z = torch.randn(len(x), x.shape[-1], device=self.device) * ~calm[:, None]
         density, made = part.run_on(x, condition, occupancy, z, kept)
-        own = self._free_run(made, x[:, kept:], calm, batch, given)
+        own = self._free_run(made, x[:, kept:], calm, batch, given, kept)
         return -density.mean() + self.config.free_run * own
 
     def _free_run(
-        self, made: torch.Tensor, true: torch.Tensor, calm: torch.Tensor, batch: Batch, given: torch.Tensor
+        self, made: torch.Tensor, true: torch.Tensor, calm: torch.Tensor, batch: Batch, given: torch.Tensor, kept: int
     ) -> torch.Tensor:
-        kept, joints = self.config.captured, UPPER_SIZE // 3
+        joints = UPPER_SIZE // 3
         statistics = self.statistics.pose_mean, self.statistics.pose_std
         mean, std = (torch.as_tensor(a, dtype=made.dtype, device=made.device) for a in statistics)
 
@@ -211,11 +229,12 @@ def _set_generators(states: dict[str, torch.Tensor], device: torch.device) -> No
 def train_part(
     part: str, dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig, threads: int | None = None,
     progress: Callable[[str, float, float], None] = lambda part, share, loss: None, device: str = "cpu",
+    begin_with: Weights | None = None,
 ) -> Run:
     """Train one part, or go on with it, until its budget is spent. Raises InputError without a dataset.
 
-    A loss that is not a number stops the run with the last good checkpoint kept. Shards that 'prepare' is still writing are
-    taken in as they come.
+    A new run begins with what ``begin_with`` has learnt, where given: weights of the same sizes. A loss that is not a number
+    stops the run with the last good checkpoint kept. Shards that 'prepare' is still writing are taken in as they come.
     """
     from torch.utils.tensorboard import SummaryWriter
 
@@ -233,7 +252,11 @@ def train_part(
     else:
         # All parts are standardised alike, whatever shards there were when each began.
         statistics = pool.statistics() if predictor is None else predictor.statistics
+        if begin_with is not None:
+            statistics = adopted_statistics(begin_with, statistics)
         run = Run(part, folder, model, config, statistics, device)
+        if begin_with is not None:
+            run.adopt(begin_with)
         if ranks.rank() == 0:
             run.save()
     if ranks.rank():
@@ -248,7 +271,7 @@ def train_part(
         rows = torch.randint(len(pool), (config.batch,))
         for group in run.optimiser.param_groups:
             group["lr"] = run.rate()
-        loss = run.loss(pool.batch(rows, run.statistics, run.model), initialise=run.step == 0)
+        loss = run.loss(pool.batch(rows, run.statistics, run.model), initialise=run.step == 0 and not run.adopted)
         run.optimiser.zero_grad()
         loss.backward()
         if run.step == 0:
@@ -284,25 +307,28 @@ def train_part(
 
 def train(
     dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig,
-    progress: Callable[[float], None] = lambda share: None, device: str = "cpu",
+    progress: Callable[[float], None] = lambda share: None, device: str = "cpu", begin_with: Weights | None = None,
 ) -> None:
     """Train the predictor, then both parts of the flow in two processes; what a folder holds is gone on with.
+
+    What is new begins with what the weights ``begin_with`` have learnt, where given.
 
     Under ``torchrun`` all processes train one part after another, together.
     """
     whole = max(config.minutes_predictor + config.minutes_flow, 1e-9)
     first = config.minutes_predictor / whole
     report = lambda part, share, loss: progress(first * share)  # noqa: E731
-    train_part("predictor", dataset, folder, model, config, progress=report, device=device)
+    train_part("predictor", dataset, folder, model, config, progress=report, device=device, begin_with=begin_with)
     if ranks.joined():
         for part in ("upper", "lower"):
-            train_part(part, dataset, folder, model, config, device=device)
+            train_part(part, dataset, folder, model, config, device=device, begin_with=begin_with)
         return
     threads = max(1, (os.cpu_count() or 2) // 2)
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
         begin = time.monotonic()
         parts = [
-            pool.submit(train_part, part, dataset, folder, model, config, threads, device=device) for part in ("upper", "lower")
+            pool.submit(train_part, part, dataset, folder, model, config, threads, device=device, begin_with=begin_with)
+            for part in ("upper", "lower")
         ]
         while wait(parts, timeout=2.0).not_done:
             spent = (time.monotonic() - begin) / max(60.0 * config.minutes_flow, 1e-9)
