@@ -4,6 +4,7 @@ Axes are equal and in metres. The body's left is blue, its right orange; an arro
 is drawn as wireframes, contacts as green dots. Needs matplotlib, which is imported when a sheet is drawn.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -125,7 +126,9 @@ def _plan(
     ax.text(corner[0], cell[1] + 0.04, "1 m, from above", ha="center", va="bottom", fontsize=6)
 
 
-def sheet(file: Path, rows: list[Row], columns: int = 8, contacts: list[np.ndarray | None] | None = None) -> None:
+def sheet(
+    file: Path, rows: Sequence[Row], columns: int = 8, contacts: Sequence[np.ndarray | None] | None = None
+) -> None:
     """Draw a contact sheet into ``file`` (.png or .svg).
 
     A row is a title, joints (T, 22, 3) at 30 fps in world metres, and boxes (B, 7) or None; it is shown at ``columns`` times
