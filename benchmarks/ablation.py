@@ -1,0 +1,120 @@
+"""What each addition to the paper's model gives: narrow models, trained alike but for one thing, measured on held-out clips.
+
+    python benchmarks/ablation.py DATASET FOLDER -o RUNS --minutes 5
+
+``DATASET`` is made by ``dafnet prepare``, ``FOLDER`` holds its motion files. Every variant gets the same minutes, seeds and
+predictor; what is finished is kept. Writes ``ablation.md`` and ``ablation.json`` into ``RUNS``. Equal minutes, not equal steps:
+what makes a step dearer has to earn it.
+"""
+
+import argparse
+import json
+import os
+import shutil
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from dafnet_addon.core.weights import load_weights
+from dafnet_addon.data.held_out import HeldClip, held_out
+from dafnet_addon.model.config import SMALL, ModelConfig
+from dafnet_addon.training.batches import Pool
+from dafnet_addon.training.evaluate import captured, measured, rows_of
+from dafnet_addon.training.export import export
+from dafnet_addon.training.train import Run, TrainingConfig, train_part, trained
+
+MODEL = replace(SMALL, width=96, code=96, ahead=18)
+TRAINING = TrainingConfig(batch=32, free_run=1.0, mixed=True, dropout_windows=0.5)
+VARIANTS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "all that ships": ({}, {}),
+    "without the way ahead": ({"ahead": 0}, {}),
+    "without the free run": ({}, {"free_run": 0.0}),
+    "sensor dropout in all windows, as in the paper": ({}, {"dropout_windows": 1.0}),
+    "an environment encoder for each step": ({"shared_encoder": False}, {}),
+    "without the mask": ({"mask": False}, {}),
+    "the paper's: none of these": (
+        {"ahead": 0, "shared_encoder": False, "mask": False}, {"free_run": 0.0, "dropout_windows": 1.0},
+    ),
+}
+FIGURES = (
+    "sits_within_6cm", "stands_when_it_should", "end_effector_error", "foot_sliding_per_frame", "bad_collisions_per_frame",
+    "jerk",
+)
+
+
+def _train(part: str, dataset: Path, folder: Path, model: ModelConfig, training: TrainingConfig) -> None:
+    train_part(part, dataset, folder, model, training, threads=1)
+
+
+def _likelihood(folder: Path, dataset: Path) -> float:
+    """Negative log-likelihood a frame of held-out windows, nats, in standardised units; the same draws for all variants."""
+    held = Pool(lambda: [dataset / "held.npz"], torch.device("cpu"))
+    predictor = Run.load("predictor", folder)
+    total = 0.0
+    for part in ("upper", "lower"):
+        run = Run.load(part, folder)
+        run.gmvae.load_state_dict(predictor.network.state_dict())
+        run.config = replace(run.config, free_run=0.0, dropout_windows=0.0)
+        total += run.held_loss(held, 200)
+    return total
+
+
+def variant(
+    name: str, dataset: Path, out: Path, minutes: float, predictor: Path, clips: list[HeldClip]
+) -> dict[str, Any]:
+    """Train (or go on with) one variant, and measure it."""
+    changed, trained_as = VARIANTS[name]
+    model, training = replace(MODEL, **changed), replace(TRAINING, minutes_flow=minutes, **trained_as)
+    folder = out / name.replace(" ", "_").replace(":", "").replace(",", "")
+    folder.mkdir(parents=True, exist_ok=True)
+    if not (folder / "predictor.pt").exists():
+        shutil.copy(predictor, folder / "predictor.pt")
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+        for job in [pool.submit(_train, part, dataset, folder, model, training) for part in ("upper", "lower")]:
+            job.result()
+    file = folder / "weights.safetensors"
+    export(file, *trained(folder), {})
+    found = rows_of(measured(load_weights(file), clips, seeds=1), ["ground_truth", "free_t0", "ee_t0"])
+    steps = {part: Run.load(part, folder).step for part in ("upper", "lower")}
+    return {"steps": steps, "nll": round(_likelihood(folder, dataset), 2), **found}
+
+
+def table(results: dict[str, dict[str, Any]]) -> str:
+    """The results in Markdown, FREE / EE at temperature 0."""
+    head = ["", "steps", "held-out NLL", *(f"{name.replace('_', ' ')}, FREE / EE" for name in FIGURES)]
+    truth = next(iter(results.values()))["ground_truth"]
+    lines = ["| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
+    lines.append("| **ground truth** | – | – | " + " | ".join(f"{truth[name]:.3g}" for name in FIGURES) + " |")
+    for name, found in results.items():
+        cells = [f"{found['free_t0'][figure]:.3g} / {found['ee_t0'][figure]:.3g}" for figure in FIGURES]
+        steps = f"{found['steps']['upper']} + {found['steps']['lower']}"
+        lines.append("| " + " | ".join([name, steps, f"{found['nll']:.1f}", *cells]) + " |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("dataset", type=Path)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--minutes", type=float, default=5.0)
+    parser.add_argument("--every", type=int, default=3, help="measure on every N-th captured clip of an unseen body")
+    options = parser.parse_args()
+    torch.set_num_threads(max(1, (os.cpu_count() or 2)))
+    clips = captured(held_out(options.folder))[:: options.every]
+    first = options.output / "predictor"
+    train_part("predictor", options.dataset, first, MODEL, replace(TRAINING, minutes_predictor=2.0))
+    results: dict[str, dict[str, Any]] = {}
+    for name in VARIANTS:
+        results[name] = variant(name, options.dataset, options.output, options.minutes, first / "predictor.pt", clips)
+        (options.output / "ablation.json").write_text(json.dumps(results, indent=1))
+        (options.output / "ablation.md").write_text(table(results) + "\n")
+    print(table(results))
+
+
+if __name__ == "__main__":
+    main()
