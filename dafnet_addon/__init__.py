@@ -4,6 +4,7 @@
 progress on the way.
 """
 
+from .core.cleanup import CleanUp
 from .core.errors import DafnetError, InputError, WeightsError
 from .core.generate import generate, generate_steps
 from .core.solids import Box, Mesh, Scene
@@ -11,6 +12,6 @@ from .core.take import Controls, Take
 from .core.weights import load_weights
 
 __all__ = [
-    "Box", "Controls", "DafnetError", "InputError", "Mesh", "Scene", "Take", "WeightsError", "generate",
+    "Box", "CleanUp", "Controls", "DafnetError", "InputError", "Mesh", "Scene", "Take", "WeightsError", "generate",
     "generate_steps", "load_weights",
 ]

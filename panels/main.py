@@ -61,6 +61,11 @@ class DAFNET_PT_character(bpy.types.Panel):
         legs.active = settings.use_lower_seed
         legs.prop(settings, "lower_seed", text="")
 
+        column = layout.column()
+        column.prop(settings, "plant_feet", slider=True)
+        if settings.mode == "EE" or animated:
+            column.prop(settings, "reach_targets", slider=True)
+
         if DAFNET_OT_generate.progress is None:
             row = layout.row()
             row.scale_y = 1.5

@@ -81,7 +81,7 @@ def test_operator_and_api_give_the_same_keys(shot: Shot, addon) -> None:
     addon("dafnet_addon.blender.job").run(shot.bpy.context, shot.settings(), weights)
     job = shot.keys()
     read = addon("dafnet_addon.blender.scene_reader").read_scene(shot.bpy.context, shot.settings())
-    take = api.generate(read.scene, read.controls, weights, seed=3, temperature=0.5)
+    take = api.generate(read.scene, read.controls, weights, seed=3, temperature=0.5, clean_up=api.CleanUp(1.0, 1.0))
     addon("dafnet_addon.blender.baker").bake(take, shot.ann, 1, "By hand")
     by_hand = shot.keys()
     assert button.keys() == job.keys() == by_hand.keys() and len(button) == 6 + 3 + 22 * 4

@@ -134,12 +134,12 @@ def test_rows_pool_clips_by_their_frames():
 
 
 def test_rows_keep_kinds_of_clips_apart():
-    names = ("ground_truth", *(f"{mode}_t{t}" for mode in ("free", "ee", "full") for t in (0, 1)))
+    names = ("ground_truth", *(f"{mode}_t{t}" for mode in ("free", "ee", "full") for t in ("0", "0_clean", "1")))
     runs = {run: e.Figures({"a": (1.0, 1.0)}) for run in names}
     kinds = [{}, {}, {}, {"composed": True}, {"composed": True}, {"room": "desk"}, {"unseen": False}]
     kinds.append({"room": "bed", "composed": True})
     rows = e.rows([e.Measured(_clip(**kind), runs) for kind in kinds])
-    counts = {name: values["clips"] for name, values in rows.items() if name.startswith("free_t0")}
+    counts = {name: values["clips"] for name, values in rows.items() if name.startswith("free_t0") and "clean" not in name}
     assert counts == {
         "free_t0": 3, "free_t0_composed": 2, "free_t0_at_desks_and_shelves": 1, "free_t0_on_beds": 1,
         "free_t0_bodies_in_training": 1,
@@ -164,7 +164,8 @@ def test_beside_measures_all_modes_and_the_likelihood_of_real_poses():
 
     sampler, clip = Sampler(load_weights()), _clip(40, seated=0)
     runs = e.beside(sampler, clip, seeds=2).runs
-    assert set(runs) == {"ground_truth", "free_t0", "free_t1", "ee_t0", "ee_t1", "full_t0", "full_t1", "legs"}
+    assert set(runs) == {"ground_truth", "legs", *(f"{m}_t{t}" for m in ("free", "ee", "full") for t in ("0", "0_clean", "1"))}
+    assert _figure(runs["ee_t0_clean"], "end_effector_error") < 0.2 * _figure(runs["ee_t0"], "end_effector_error")
     assert _figure(runs["legs"], "apd_upper") < 0.1 * _figure(runs["free_t1"], "apd_upper")
     own = _followed(sampler, (clip, None))
     assert own.actions.shape == (40, 10) and np.allclose(own.actions.sum(1), 1.0, atol=1e-4)

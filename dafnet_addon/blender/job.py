@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import bpy
 
 from .. import generate_steps, load_weights
+from ..core.cleanup import CleanUp
 from ..core.errors import InputError
 from ..core.progress import drained, within
 from ..core.take import Take
@@ -66,6 +67,7 @@ def steps(
         generate_steps(
             read.scene, read.controls, weights,
             seed=settings.seed, lower_seed=settings.lower_seed, temperature=settings.temperature,
+            clean_up=CleanUp(settings.plant_feet, settings.reach_targets),
         ),
         _READ, _GENERATED,
     )

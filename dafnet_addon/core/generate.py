@@ -5,6 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
+from .cleanup import CleanUp, cleaned
 from .conditions import PREROLL, Shot, shot_steps
 from .errors import InputError, WeightsError
 from .kinematics import blend_switches, fit, forward_kinematics, global_from_local, local_from_global
@@ -20,12 +21,15 @@ from .resampling import (
 from .root import RootPath, to_root, to_world
 from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix
 from .sampler import Sampler
+from .skeleton import END_EFFECTORS, MODEL_ORDER
 from .solids import Scene
 from .take import Controls, Take
 from .weights import Weights
 
-__all__ = ["generate", "generate_steps"]
+__all__ = ["RAW", "generate", "generate_steps", "noise_of", "targets_of"]
 
+RAW = CleanUp()
+"""The model's own motion."""
 _UPPER_SIZE = 42
 _HOTTEST = 10.0
 _CONDITIONED, _SAMPLED = 0.1, 0.97
@@ -60,12 +64,26 @@ def _rotation(controls: Controls, name: str, target: np.ndarray) -> np.ndarray |
     return matrix_from_quaternion(resample_rotations(quaternions, times, target))
 
 
-def _onto_bones(poses: np.ndarray, shot: Shot, controls: Controls, switches: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Local quaternions (N, 22, 4) and pelvis (N, 3), canonical metres, of poses (N, 66), eased over mode switches."""
+def targets_of(shot: Shot) -> dict[str, np.ndarray]:
+    """What the model was told of head and wrists: world positions (N, 3), canonical metres, NaN where free."""
+    places = to_world(shot.path, shot.conditions.observation[PREROLL:].reshape(-1, 22, 3))
+    given = shot.conditions.given[PREROLL:]
+    slots = {name: MODEL_ORDER.index(j) for name, j in END_EFFECTORS.items()}
+    return {name: np.where(given[:, slot, None] > 0, places[:, slot], np.nan) for name, slot in slots.items()}
+
+
+def _onto_bones(
+    poses: np.ndarray, shot: Shot, controls: Controls, switches: np.ndarray, clean_up: CleanUp
+) -> tuple[np.ndarray, np.ndarray]:
+    """Local quaternions (N, 22, 4) and pelvis (N, 3), canonical metres, of poses (N, 66): cleaned, eased over mode switches."""
     joints = to_world(shot.path, poses.reshape(-1, 22, 3))
     target = frame_times(len(joints), MODEL_FPS)
-    turned = (_rotation(controls, name, target) for name in ("head_rotation", "hand_left_rotation", "hand_right_rotation"))
+    names = ("head_rotation", "hand_left_rotation", "hand_right_rotation")
+    turned = [_rotation(controls, name, target) for name in names]
     pelvis, frames = fit(joints, 1.0, *turned)
+    if clean_up.feet or clean_up.reach:
+        joints = cleaned(forward_kinematics(frames, pelvis), targets_of(shot), clean_up, shot.path.position[:, 2])
+        pelvis, frames = fit(joints, 1.0, *turned)
     local = continuous_signs(quaternion_from_matrix(local_from_global(frames)))
     return blend_switches(local, pelvis, shot.path, switches) if len(switches) else (local, pelvis)
 
@@ -73,12 +91,14 @@ def _onto_bones(poses: np.ndarray, shot: Shot, controls: Controls, switches: np.
 def generate_steps(
     scene: Scene, controls: Controls, weights: Weights, *, seed: int = 0, lower_seed: int | None = None,
     temperature: float = 0.0, resume: Take | None = None, resume_frame: int = 0, device: str | None = None,
+    clean_up: CleanUp = RAW,
 ) -> Generator[float, None, Take]:
     """Generate one take; yields progress in [0, 1] and returns the ``Take``.
 
     ``temperature`` scales the take's noise; 0 is the pose at z = 0. ``lower_seed``: another seed for the legs. ``resume``: a
     take whose motion before ``resume_frame`` (a frame of the controls) is kept, and gone on from. ``device``: None runs on
-    NumPy, else on that torch device. Raises InputError for what cannot be used, WeightsError for weights that do not fit.
+    NumPy, else on that torch device. ``clean_up``: what is done to the joints after the model; nothing by default. Raises
+    InputError for what cannot be used, WeightsError for weights that do not fit.
     """
     if not 0 <= temperature <= _HOTTEST:
         raise InputError(f"The temperature is {temperature}; give 0 or a small positive number such as 0.8.")
@@ -98,7 +118,7 @@ def generate_steps(
 
     poses, actions = made[:, 0], actions[PREROLL:, 0]
     switches = np.flatnonzero(shot.modes[1:] != shot.modes[:-1]) + 1
-    local, pelvis = _onto_bones(poses[PREROLL:], shot, controls, switches)
+    local, pelvis = _onto_bones(poses[PREROLL:], shot, controls, switches, clean_up)
     # From 30 frames a second to the controls' own rate, and to the character's own size.
     source, target = frame_times(len(shot.path), MODEL_FPS), frame_times(len(controls), controls.fps)
     rotations = resample_rotations(local, source, target)
@@ -119,9 +139,10 @@ def generate_steps(
 def generate(
     scene: Scene, controls: Controls, weights: Weights, *, seed: int = 0, lower_seed: int | None = None,
     temperature: float = 0.0, resume: Take | None = None, resume_frame: int = 0, device: str | None = None,
+    clean_up: CleanUp = RAW,
 ) -> Take:
     """Drain ``generate_steps``, whose arguments these are, and return its take."""
     return drained(generate_steps(
         scene, controls, weights, seed=seed, lower_seed=lower_seed, temperature=temperature, resume=resume,
-        resume_frame=resume_frame, device=device,
+        resume_frame=resume_frame, device=device, clean_up=clean_up,
     ))

@@ -82,7 +82,7 @@ def two_bone(
     if not clear.all():
         bend = np.where(clear, bend, _across(_last_clear(bend, clear) if fallback is None else fallback, along))
         least = np.argmin(np.abs(along), axis=-1)
-        bend = np.where(np.linalg.norm(bend, axis=-1, keepdims=True) > 0, bend, _across(np.eye(3)[least], along))
+        bend = np.where(np.linalg.norm(bend, axis=-1, keepdims=True) > 1e-8, bend, _across(np.eye(3)[least], along))
     bend = normalised(bend)
     cosine = np.clip((length1**2 + distance**2 - length2**2) / (2.0 * length1 * distance), -1.0, 1.0)
     middle = root + length1 * (cosine * along + np.sqrt(1.0 - cosine**2) * bend)

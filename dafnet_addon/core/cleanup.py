@@ -1,0 +1,250 @@
+"""After the model: planted feet stay where they are, and head and hands reach their targets exactly.
+
+All is done on joint positions of a body with constant bones, 30 frames a second, and leaves them constant; the take's own poses
+are untouched, so that the strengths can be changed without sampling again. Corrections begin and end softly: what is added to a
+joint is held or faded where nothing asks for it. Feet first, since they may lower the pelvis; targets after them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import InputError
+from .kinematics import two_bone
+from .rotations import normalised
+from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, TOE_HEIGHT, joint
+
+__all__ = ["CleanUp", "cleaned", "planted", "standing_still", "reaching"]
+
+_TOES, _ANKLES = [joint("left_foot"), joint("right_foot")], [joint("left_ankle"), joint("right_ankle")]
+_KNEES, _HIPS = [joint("left_knee"), joint("right_knee")], [joint("left_hip"), joint("right_hip")]
+_THIGH, _SHIN = (float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("knee", "ankle"))
+_ARMS = {f"hand_{side}": [joint(f"{side}_{n}") for n in ("shoulder", "elbow", "wrist")] for side in ("left", "right")}
+_UPPER_ARM, _FOREARM = (float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("elbow", "wrist"))
+
+_LOW, _SLOW = 0.035, 0.45  # metres over a planted toe base; metres a second that a foot slides and is still meant to stand
+_PLANTS, _MENDS = 4, 3  # frames: the shortest stand; the longest gap in one
+_SLIPS = 0.12  # metres from its place at which a foot is let go
+_FADE = 10  # frames in which what is added dies away
+_STRAIGHT = 0.999  # of a leg's or arm's length, which is how far they reach
+
+_FARTHEST_HEAD, _FARTHEST_LEAN = 0.20, 0.25  # metres that the trunk is bent by for a target, at most
+_SOFT = 0.15  # share of that in which it stops
+_SUPPLE = {joint(n): share for n, share in (
+    ("spine1", 0.4), ("spine2", 0.4), ("spine3", 0.4), ("neck", 1.0), ("left_collar", 0.3), ("right_collar", 0.3),
+    ("left_shoulder", 1.0), ("right_shoulder", 1.0), ("left_elbow", 1.0), ("right_elbow", 1.0),
+)}
+"""How willingly joints turn for a target."""
+_DAMPING, _ROUNDS, _STEP = 0.03, 15, 0.10  # metres; rounds of least squares; metres in one of them
+
+
+@dataclass(frozen=True)
+class CleanUp:
+    """Strengths from 0 (off) to 1 of what is done after the model: ``feet`` stand still where they are planted, head and hands
+    ``reach`` their targets.
+    """
+
+    feet: float = 0.0
+    reach: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not all(0.0 <= strength <= 1.0 for strength in (self.feet, self.reach)):
+            raise InputError(f"The clean-up's strengths are {self.feet} and {self.reach}; give numbers from 0 to 1.")
+
+
+def _below() -> np.ndarray:
+    """(22, 22): whether a joint hangs from another, or is it."""
+    out = np.eye(22, dtype=bool)
+    for j in range(1, 22):
+        out[j] |= out[PARENTS[j]]
+    return out
+
+
+_HANGS = _below()
+
+
+def _runs(flags: np.ndarray) -> np.ndarray:
+    """(N, 2) start and end (exclusive) of the runs of True."""
+    return np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]]))).reshape(-1, 2)
+
+
+def _ease(x: np.ndarray) -> np.ndarray:
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * (3.0 - 2.0 * x)
+
+
+def _between(offset: np.ndarray, asked: np.ndarray) -> np.ndarray:
+    """Offsets (T, 3) where they are ``asked`` (T,), led over to the next ones or faded out elsewhere."""
+    out = np.where(asked[:, None], offset, 0.0)
+    for start, end in _runs(~asked):
+        before = out[start - 1] if start else np.zeros(3)
+        after = out[end] if end < len(out) else np.zeros(3)
+        t = np.arange(1, end - start + 1, dtype=float)
+        rest = end - start + 1
+        fade = min(_FADE, rest)
+        out[start:end] = (1 - _ease(t / fade))[:, None] * before + _ease((t - rest + fade) / fade)[:, None] * after
+    return out
+
+
+def standing_still(joints: np.ndarray, floor: np.ndarray | float = 0.0) -> list[tuple[int, int, int]]:
+    """Stands of both feet: (foot, start, end exclusive), foot 0 is the left one, of joints (T, 22, 3).
+
+    A foot stands while its toe base is low over the ``floor``, a height or one for each frame, and not fast; it is let go, and
+    stands anew, where it has slipped too far for that.
+    """
+    stands = []
+    for foot, toe in enumerate(_TOES):
+        place = joints[:, toe]
+        speed = np.linalg.norm(np.gradient(place, axis=0), axis=-1) * 30.0 if len(joints) > 1 else np.zeros(len(joints))
+        on = (place[:, 2] - floor < TOE_HEIGHT + _LOW) & (speed < _SLOW)
+        for start, end in _runs(~on):
+            if start > 0 and end < len(on) and end - start <= _MENDS:
+                on[start:end] = (place[start:end, 2] - np.broadcast_to(floor, len(on))[start:end] < TOE_HEIGHT + _LOW).all()
+        for start, end in _runs(on):
+            while end - start >= _PLANTS:
+                away = np.linalg.norm(place[start:end, :2] - place[start, :2], axis=-1) > _SLIPS
+                stop = start + int(np.argmax(away)) if away.any() else end
+                if stop - start >= _PLANTS:
+                    stands.append((foot, int(start), int(stop)))
+                start = stop + _PLANTS
+    return stands
+
+
+def planted(joints: np.ndarray, floor: np.ndarray | float = 0.0, strength: float = 1.0) -> np.ndarray:
+    """Joints (T, 22, 3) with every standing foot held at one place, legs and, where they do not reach, the pelvis following.
+
+    Metres, world, 30 frames a second; ``floor``: its height, one or one for each frame.
+    """
+    out = joints.copy()
+    heights = np.broadcast_to(np.asarray(floor, float), len(joints))
+    stands = standing_still(joints, floor)
+    moved = np.zeros((len(joints), 2, 3))
+    held = np.zeros((len(joints), 2), dtype=bool)
+    for foot, start, end in stands:
+        toe = joints[start:end, _TOES[foot]]
+        # Where it is slowest it is nearest to where it should stand.
+        speed = np.linalg.norm(np.gradient(toe[:, :2], axis=0), axis=-1)
+        place = np.average(toe, axis=0, weights=1.0 / (speed + 1e-3) ** 2)
+        place[2] = np.median(heights[start:end]) + TOE_HEIGHT
+        moved[start:end, foot] = strength * (place - toe)
+        held[start:end, foot] = True
+    for foot in (0, 1):
+        moved[:, foot] = _between(moved[:, foot], held[:, foot])
+    ankles = joints[:, _ANKLES] + moved
+    down = _lowered(joints[:, _HIPS], ankles, held)
+    rest = [j for j in range(22) if j not in {*_KNEES, *_ANKLES, *_TOES}]
+    out[:, rest, 2] -= down[:, None]
+    hips, poles = out[:, _HIPS], joints[:, _KNEES] + moved / 2
+    out[:, _KNEES], out[:, _ANKLES] = two_bone(hips, ankles, poles, _THIGH, _SHIN)
+    out[:, _TOES] = out[:, _ANKLES] + joints[:, _TOES] - joints[:, _ANKLES]
+    return out
+
+
+def _lowered(hips: np.ndarray, ankles: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """How far down (T,) the pelvis has to go for standing legs (T, 2) to reach their ankles (T, 2, 3), smooth in time."""
+    reach = _STRAIGHT * (_THIGH + _SHIN)
+    across = np.linalg.norm((hips - ankles)[..., :2], axis=-1)
+    highest = np.sqrt(np.maximum(reach**2 - across**2, 0.0))
+    need = np.where(held & (across < reach), hips[..., 2] - ankles[..., 2] - highest, 0.0).max(1).clip(0.0, 0.15)
+    if not need.any():
+        return need
+    # The least smooth curve that is nowhere under the need: its running maximum, averaged over no more than it looks ahead.
+    ahead = np.lib.stride_tricks.sliding_window_view(np.pad(need, 5, mode="edge"), 11).max(1)
+    kernel = np.hanning(13)[1:-1]
+    wide = np.pad(ahead, 5, mode="edge")
+    return np.convolve(wide, kernel / kernel.sum(), mode="valid")
+
+
+def _rotations(vectors: np.ndarray) -> np.ndarray:
+    """Rotation matrices (T, 3, 3) of rotation vectors (T, 3) (Rodrigues)."""
+    angle = np.linalg.norm(vectors, axis=-1)
+    axis = normalised(vectors)
+    k = np.zeros((len(vectors), 3, 3))
+    k[:, 0, 1], k[:, 0, 2], k[:, 1, 2] = -axis[:, 2], axis[:, 1], -axis[:, 0]
+    k -= np.swapaxes(k, 1, 2)
+    return np.eye(3) + np.sin(angle)[:, None, None] * k + (1.0 - np.cos(angle))[:, None, None] * (k @ k)
+
+
+def _limited(vectors: np.ndarray, most: float) -> np.ndarray:
+    return vectors * np.minimum(1.0, most / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9))
+
+
+def _softly_limited(vectors: np.ndarray, most: float) -> np.ndarray:
+    """Vectors whose lengths near ``most`` as they grow, without a kink."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    bend = _SOFT * most
+    over = np.maximum(length - (most - bend), 0.0)
+    return vectors * (np.where(over > 0.0, most - bend * np.exp(-over / bend), length) / np.maximum(length, 1e-9))
+
+
+def _wished(joints: np.ndarray, targets: dict[str, np.ndarray], strength: float) -> dict[str, np.ndarray]:
+    """Where each effector with targets should be in all frames (T, 3): on them, and softly led to and from them."""
+    out = {}
+    for name, target in targets.items():
+        asked = np.isfinite(target).all(-1)
+        if asked.any():
+            place = joints[:, END_EFFECTORS[name]]
+            offset = np.where(asked[:, None], target - place, 0.0)
+            out[name] = place + strength * _between(offset, asked)
+    return out
+
+
+def reaching(joints: np.ndarray, targets: dict[str, np.ndarray], strength: float = 1.0) -> np.ndarray:
+    """Joints (T, 22, 3) whose head and wrists are at their ``targets``: (T, 3) by the names of ``END_EFFECTORS``, NaN if free.
+
+    Damped least squares over spine, neck, collars and arms: a straight arm is shortened by the trunk rather than by a sudden
+    elbow. A target that is out of reach is approached as near as arms and a modest lean allow.
+    """
+    wished = _wished(joints, targets, strength)
+    if not wished:
+        return joints
+    out, goals = joints.copy(), {}
+    for name, goal in wished.items():
+        if name == "head":
+            base, most = joints[:, END_EFFECTORS[name]], _FARTHEST_HEAD
+        else:
+            base, most = joints[:, _ARMS[name][0]], _UPPER_ARM + _FOREARM + _FARTHEST_LEAN
+        goals[END_EFFECTORS[name]] = base + _softly_limited(goal - base, most)
+    for _ in range(_ROUNDS):
+        wants = [(j, goal - out[:, j]) for j, goal in goals.items()]
+        if max(float(np.abs(want).max()) for _, want in wants) < 1e-4:
+            break
+        _bend(out, wants)
+    for name, (shoulder, elbow, wrist) in _ARMS.items():
+        if name in wished:
+            out[:, elbow], out[:, wrist] = two_bone(out[:, shoulder], goals[wrist], out[:, elbow], _UPPER_ARM, _FOREARM)
+    return out
+
+
+def _bend(joints: np.ndarray, wants: list[tuple[int, np.ndarray]]) -> None:
+    """Turn the trunk's joints so that joints move as wanted: (joint, displacement (T, 3)); one damped least-squares step."""
+    moves = np.concatenate([_limited(want, _STEP) for _, want in wants], axis=1)
+    turning = [at for at in _SUPPLE if any(_HANGS[j, at] and j != at for j, _ in wants)]
+    columns = []
+    for at in turning:
+        rows = []
+        for j, _ in wants:
+            lever = joints[:, j] - joints[:, at] if _HANGS[j, at] and j != at else np.zeros((len(joints), 3))
+            skew = np.zeros((len(joints), 3, 3))
+            skew[:, 0, 1], skew[:, 0, 2], skew[:, 1, 2] = lever[:, 2], -lever[:, 1], lever[:, 0]
+            rows.append(_SUPPLE[at] * (skew - np.swapaxes(skew, 1, 2)))
+        columns.append(np.concatenate(rows, axis=1))
+    jacobian = np.concatenate(columns, axis=2)
+    square = jacobian @ np.swapaxes(jacobian, 1, 2) + _DAMPING**2 * np.eye(moves.shape[1])
+    turns = np.einsum("tmn,tm->tn", jacobian, np.linalg.solve(square, moves[..., None])[..., 0])
+    for k, at in enumerate(turning):
+        turn = _rotations(_SUPPLE[at] * turns[:, 3 * k : 3 * k + 3])
+        moving = [j for j in range(22) if _HANGS[j, at] and j != at]
+        arms = joints[:, moving] - joints[:, at, None]
+        joints[:, moving] = joints[:, at, None] + np.einsum("tij,tbj->tbi", turn, arms)
+
+
+def cleaned(
+    joints: np.ndarray, targets: dict[str, np.ndarray], settings: CleanUp, floor: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Joints (T, 22, 3) after all that ``settings`` ask for; canonical metres, world, 30 frames a second, constant bones."""
+    if settings.feet > 0.0:
+        joints = planted(joints, floor, settings.feet)
+    if settings.reach > 0.0:
+        joints = reaching(joints, targets, settings.reach)
+    return joints

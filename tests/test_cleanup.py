@@ -1,0 +1,125 @@
+"""The clean-up: planted feet stay, targets are met, bones keep their lengths, and where nothing is asked nothing changes."""
+
+import numpy as np
+import pytest
+
+from dafnet_addon import Box, CleanUp, Controls, InputError, Scene, generate, load_weights
+from dafnet_addon.core.cleanup import cleaned, planted, reaching, standing_still
+from dafnet_addon.core.metrics import foot_sliding, jerk
+from dafnet_addon.core.paths import Stop, route
+from dafnet_addon.core.skeleton import END_EFFECTORS, JOINTS, OFFSETS, PARENTS, REST, TOE_HEIGHT, joint
+
+BONES = np.linalg.norm(OFFSETS[1:], axis=1)
+TOES = [joint("left_foot"), joint("right_foot")]
+BOTH = CleanUp(1.0, 1.0)
+
+
+def _lengths(joints: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(joints[:, 1:] - joints[:, list(PARENTS[1:])], axis=-1)
+
+
+def _hanging() -> np.ndarray:
+    """The rest pose with bent knees and arms, hands before the body."""
+    pose = REST.copy()
+    for side, sign in (("left_", -1.0), ("right_", 1.0)):
+        pose[joint(side + "elbow")] = pose[joint(side + "shoulder")] + np.array([sign * 0.05, -0.05, -0.25014])
+        pose[joint(side + "wrist")] = pose[joint(side + "elbow")] + np.array([0.0, 0.2, -0.15])
+    return pose
+
+
+def _sliding(frames: int = 60) -> np.ndarray:
+    """A body that stands, carried along by 6 mm a frame for a second, its right foot in the air meanwhile."""
+    joints = np.repeat(_hanging()[None], frames, axis=0)
+    joints[..., 2] -= 0.02
+    joints[:, :, 0] += np.clip(np.arange(frames) - 15, 0, 20)[:, None] * 0.005
+    joints[15:36, [joint("right_ankle"), joint("right_foot")], 2] += 0.1 * np.sin(np.linspace(0, np.pi, 21))[:, None]
+    return joints
+
+
+def test_feet_that_stand_stay_and_those_in_the_air_do_not():
+    joints = _sliding()
+    stands = standing_still(joints)
+    assert {foot for foot, _, _ in stands} == {0, 1} and any(end - start > 50 for foot, start, end in stands if foot == 0)
+    out = planted(joints)
+    for foot, start, end in stands:
+        toe = out[start:end, TOES[foot]]
+        assert np.abs(np.diff(toe, axis=0)).max() < 1e-6 and np.allclose(toe[:, 2], TOE_HEIGHT)
+    assert np.ptp(out[:, TOES[1], 2]) > 0.06, "the foot in the air keeps its step"
+    assert foot_sliding(out, 30.0)[stands[0][1] : stands[0][2]].sum() <= foot_sliding(joints, 30.0).sum()
+    assert np.abs(_lengths(out) - BONES).max() < 1e-3
+
+
+def test_the_pelvis_comes_down_where_legs_are_too_short():
+    joints = np.repeat(REST[None], 40, axis=0)
+    # Straight legs, and a foot that is led 12 cm out while the other stands: only a lower pelvis lets both reach.
+    joints[:, [joint("left_ankle"), joint("left_foot")]] += np.linspace(0, 0.1, 40)[:, None, None] * (-1.0, 0.0, 0.0)
+    out = planted(joints)
+    assert (out[:, 0, 2] <= joints[:, 0, 2] + 1e-9).all() and np.abs(np.diff(out[:, 0, 2], 2)).max() < 2e-3
+    for foot, start, end in standing_still(joints):
+        assert np.abs(np.diff(out[start:end, TOES[foot]], axis=0)).max() < 1e-3
+
+
+def test_heights_follow_the_floor():
+    joints = _sliding() + np.array([0.0, 0.0, 3.0])
+    assert not standing_still(joints)
+    assert np.allclose(planted(joints, 3.0), planted(_sliding()) + np.array([0.0, 0.0, 3.0]))
+
+
+@pytest.mark.parametrize("name", list(END_EFFECTORS))
+def test_targets_within_reach_are_met_and_bones_keep_their_length(name):
+    frames = 40
+    joints = np.repeat(_hanging()[None], frames, axis=0)
+    place = joints[:, END_EFFECTORS[name]] + np.array([0.03, 0.06, 0.0 if name == "head" else 0.12])
+    if name == "head":
+        place[:, 2] -= 0.03
+    target = np.where((np.arange(frames) >= 15)[:, None], place, np.nan)
+    out = reaching(joints, {name: target})
+    assert np.linalg.norm(out[15:, END_EFFECTORS[name]] - place[15:], axis=-1).max() < 1e-3
+    assert np.abs(_lengths(out) - BONES).max() < 1e-3
+    assert np.abs(out[:4] - joints[:4]).max() < 1e-3, "long before the target nothing moves"
+    assert np.linalg.norm(np.diff(out, axis=0), axis=-1).max() < 0.05, "it is led there, not thrown"
+    legs = [j for j, name in enumerate(JOINTS) if name.split("_")[-1] in ("pelvis", "hip", "knee", "ankle", "foot")]
+    assert np.array_equal(out[:, legs], joints[:, legs])
+
+
+def test_targets_out_of_reach_are_approached_without_folding_the_body():
+    joints = np.repeat(_hanging()[None], 30, axis=0)
+    far = joints[:, joint("right_shoulder")] + np.array([0.0, 3.0, 0.0])
+    out = reaching(joints, {"hand_right": far})
+    assert 0.4 < out[0, joint("right_wrist"), 1] - joints[0, joint("right_shoulder"), 1] < 0.9
+    assert np.linalg.norm(out[:, joint("neck")] - joints[:, joint("neck")], axis=-1).max() < 0.35
+    assert np.abs(_lengths(out) - BONES).max() < 1e-3
+
+
+def test_nothing_is_done_where_nothing_is_asked():
+    joints = _sliding()
+    free = dict.fromkeys(END_EFFECTORS, np.full((len(joints), 3), np.nan))
+    assert reaching(joints, free) is joints and cleaned(joints, free, CleanUp()) is joints
+    half = planted(joints, strength=0.5)
+    whole = planted(joints)
+    moved = (whole - joints)[:, TOES[0], 0]
+    assert np.allclose((half - joints)[:, TOES[0], 0], moved / 2, atol=2e-3)
+    for strengths in ((-0.1, 0.0), (0.0, 1.5), (float("nan"), 0.0)):
+        with pytest.raises(InputError, match="from 0 to 1"):
+            CleanUp(*strengths)
+
+
+@pytest.mark.parametrize("fps", [24.0, 30.0, 60.0])
+def test_takes_are_cleaned_at_any_rate(fps):
+    weights = load_weights()
+    seat = Box(center=np.array([0.0, 0.0, 0.225]), half_size=np.array([0.22, 0.22, 0.225]))
+    path = route(Stop((2.0, 0.9), np.pi / 2), Stop((0.0, 0.0), 0.0, seconds=2.0, seated=True)).path
+    times = np.arange(0.0, (len(path) - 1) / 30.0, 1.0 / fps)
+    root = path.matrices()[np.round(times * 30).astype(int)]
+    target = np.tile(path.position[-1] + np.array([0.25, 0.35, 1.0]), (len(times), 1))
+    begin = len(times) - int(1.2 * fps)
+    target[:begin] = np.nan
+    controls = Controls(fps, root, mode="EE", hand_right=target)
+    raw, clean = (generate(Scene([seat]), controls, weights, clean_up=c) for c in (CleanUp(), BOTH))
+    last = slice(begin + 2, len(times) - 1)
+    before, after = (np.linalg.norm(t.joints[last, 21] - target[last], axis=-1).mean() for t in (raw, clean))
+    assert after < 0.002 + 0.1 * before
+    assert foot_sliding(clean.joints, fps).mean() <= foot_sliding(raw.joints, fps).mean()
+    assert np.abs(_lengths(clean.joints) - BONES).max() < 1e-5
+    assert jerk(clean.joints, fps) < 2.5 * jerk(raw.joints, fps) + 60.0
+    assert np.array_equal(raw.poses, clean.poses), "the take's own poses are untouched"
