@@ -10,7 +10,9 @@ from dafnet_addon.core.rotations import yaw_matrix
 from dafnet_addon.core.skeleton import LOWER, OFFSETS, PARENTS, REST, joint
 from dafnet_addon.data import compose
 from dafnet_addon.data.canonical import pose_legs
-from dafnet_addon.data.compose import composed, entrance, handed, joined, lent
+from dafnet_addon.data.compose import composed
+from dafnet_addon.data.joins import handed, joined, lent
+from dafnet_addon.data.pieces import entrance
 from dafnet_addon.data.uses import stroking, working
 from dafnet_addon.data.windows import Motion, motion_of
 

@@ -43,6 +43,7 @@ _ON_THE_FLOOR = 0.22  # a pelvis that rests lower than this sits on the floor
 _HALF_DOWN = 0.80
 _NEAR_BY = 0.8
 _LIKELY = {"desk": 0.95, "board": 0.8, "shelf": 0.6, "spare desk": 0.35}
+_STANDS_BEFORE = 0.2  # metres a second: a slower body may have a desk before it, too
 _SOFT = 0.4  # of the seats that may be
 
 
@@ -345,7 +346,7 @@ def _shelf_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.nda
 
 
 def _spare_desk(rng: np.random.Generator, rest: Rest, points: np.ndarray) -> np.ndarray | None:
-    """A desk before a seat whose sitter leaves it alone, drawn up until it would touch the body on its way to the seat."""
+    """A desk before a body that rests and leaves it alone, drawn up until it would touch the body on its way there."""
     top, x, depth, thick = rng.uniform(0.6, 0.85), rng.uniform(0.3, 0.8), rng.uniform(0.4, 0.8), rng.uniform(0.02, 0.06)
     style = ("legs", "panels", "wall", "column")[rng.integers(4)]
     rows = [box((0, depth / 2, top - thick / 2), (2 * x, depth, thick)), *_carrier(rng, top, thick, x, 0, depth, (style,))]
@@ -358,6 +359,17 @@ def _spare_desk(rng: np.random.Generator, rest: Rest, points: np.ndarray) -> np.
         if _clearance(candidate, points) >= gap:
             return candidate
     return None
+
+
+def _standing_place(path: RootPath) -> Rest | None:
+    """Where a body is slowest, if it is slow there."""
+    if len(path) < 2:
+        return None
+    speed = np.linalg.norm(np.gradient(path.position, axis=0), axis=-1) * 30.0
+    slowest = int(np.argmin(speed))
+    if speed[slowest] > _STANDS_BEFORE:
+        return None
+    return Rest(slowest, slowest + 1, path.position[slowest], float(path.yaw[slowest]))
 
 
 def _desk_alone(rng: np.random.Generator) -> np.ndarray:
@@ -434,7 +446,7 @@ def fitted(
     """What a motion uses, one word each, with the boxes fitted to it or None where none could be had; and what is missing.
 
     Hands may as well work in the air: now and then theirs is not tried, and not in the list. A "spare desk" stands before some
-    of the seats, and nobody uses it.
+    who sit or stand, and nobody uses it: a desk alone is no reason to sit down.
     """
     beds, rests = lying(joints), resting(joints, path)
     if _cut_off(joints, beds, rests):
@@ -457,8 +469,10 @@ def fitted(
                 pieces.append((kind, _FITS[kind](rng, use, points)))
                 if pieces[-1][1] is not None:
                     break
-        if places and rng.random() < _LIKELY["spare desk"] and all(kind != "desk" or rows is None for kind, rows in pieces):
-            pieces.append(("spare desk", _spare_desk(rng, places[0], points)))
+        place = places[0] if places else _standing_place(path)
+        bare = all(kind not in ("desk", "bed") or rows is None for kind, rows in pieces)
+        if place is not None and bare and rng.random() < _LIKELY["spare desk"]:
+            pieces.append(("spare desk", _spare_desk(rng, place, points)))
     return pieces, missing
 
 

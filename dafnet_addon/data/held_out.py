@@ -17,8 +17,8 @@ from ..core.root import RootPath, raw_root_from_joints
 from ..core.rotations import yaw_matrix
 from ..core.solids import Box, Scene
 from .canonical import calibrate, canonical
-from .compose import joined
 from .furniture import Rest
+from .joins import joined
 from .mocap import Clip, read_clips
 from .prepare import load_motions
 from .windows import Motion, mirrored, motion_of

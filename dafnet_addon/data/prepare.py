@@ -42,10 +42,10 @@ legs, at a desk, at a board, lying down on a bed or getting up. Captured: around
 standing.
 """
 _COMPOSITION = (
-    "walks joined to sit-downs and, after stand-ups, walked away; captured gestures, greetings and reaching over seated legs, the "
-    "trunk leant; hands led along desks, counters and boards by inverse kinematics; sitting on the floor and lying there raised "
-    "onto beds, the turn onto the bed made; seats moved to other heights; mirrored, reversed, re-timed; roughened root paths; "
-    "arms lent to the UI-PRMD bodies; all furniture"
+    "walks joined to sit-downs and, after stand-ups, walked away; captured gestures, greetings and reaching over seated legs, "
+    "the trunk leant; hands led along desks, counters and boards by inverse kinematics; sitting on the floor and lying there "
+    "raised onto beds, the turn onto the bed made; seats moved to other heights; mirrored, reversed, re-timed; roughened root "
+    "paths; arms lent to the UI-PRMD bodies; all furniture"
 )
 """What in the training motion nobody ever did in one piece; said on the weights' card."""
 
