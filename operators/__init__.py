@@ -2,7 +2,8 @@
 
 from .add_character import DAFNET_OT_add_character
 from .generate import DAFNET_OT_generate
+from .walk_to import DAFNET_OT_walk_to
 
 __all__ = ["CLASSES"]
 
-CLASSES = (DAFNET_OT_add_character, DAFNET_OT_generate)
+CLASSES = (DAFNET_OT_add_character, DAFNET_OT_generate, DAFNET_OT_walk_to)

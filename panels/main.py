@@ -2,10 +2,11 @@
 
 import bpy
 
-from ..dafnet_addon.blender.armature import character_of
+from ..dafnet_addon.blender.armature import character_of, sent
 from ..dafnet_addon.blender.compat import action_curves
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.generate import DAFNET_OT_generate
+from ..operators.walk_to import DAFNET_OT_walk_to
 
 __all__ = ["DAFNET_PT_character"]
 
@@ -24,6 +25,11 @@ class DAFNET_PT_character(bpy.types.Panel):
         layout = self.layout
         character = character_of(context)
         if character is None:
+            directed, goal = sent(context)
+            if directed is not None and goal is not None:
+                layout.label(text=f"{directed.name}: {goal.name}", icon="ARMATURE_DATA")
+                layout.operator(DAFNET_OT_walk_to.bl_idname, text=f"Sit on {goal.name}", icon="TRACKING_FORWARDS").goal = "SEAT"
+                return
             layout.label(text="No character is selected", icon="INFO")
             layout.operator(DAFNET_OT_add_character.bl_idname, icon="ARMATURE_DATA")
             return
@@ -38,6 +44,9 @@ class DAFNET_PT_character(bpy.types.Panel):
         column = layout.column()
         column.prop(settings, "furniture")
         column.prop(settings, "root", icon="EMPTY_ARROWS")
+        row = column.row(align=True)
+        row.operator(DAFNET_OT_walk_to.bl_idname, text="Sit on Selected", icon="TRACKING_FORWARDS").goal = "SEAT"
+        row.operator(DAFNET_OT_walk_to.bl_idname, text="Walk to Cursor", icon="CURSOR").goal = "CURSOR"
         if settings.mode == "EE" or animated:
             column = layout.column()
             column.prop(settings, "head")

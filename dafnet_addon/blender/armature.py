@@ -12,7 +12,7 @@ from ..core.errors import InputError
 from ..core.skeleton import JOINTS, OFFSETS, PARENTS, REST, STATURE, joint
 from .mannequin import FACING, add_body
 
-__all__ = ["create_character", "character_of", "character_scale", "metres_per_unit", "missing_bones"]
+__all__ = ["create_character", "character_of", "character_scale", "metres_per_unit", "missing_bones", "sent"]
 
 _CHAIN = {  # the joint at which each bone's tail lies
     "pelvis": "spine1", "spine1": "spine2", "spine2": "spine3", "spine3": "neck", "neck": "head",
@@ -48,6 +48,21 @@ def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
         if candidate.type == "ARMATURE" and active in (own.root, own.head, own.hand_left, own.hand_right):
             return candidate
     return None
+
+
+def sent(context: bpy.types.Context) -> tuple[bpy.types.Object | None, bpy.types.Object | None]:
+    """The character to direct, and the mesh that it is to go to: from what is active and selected.
+
+    The character is the active one, else a selected one, else the only one of the scene. The mesh is the active or the only
+    selected object that is no part of a character.
+    """
+    characters = [o for o in context.scene.objects if o.type == "ARMATURE" and not missing_bones(o)]
+    chosen = [character_of(context), *(o for o in context.selected_objects if o in characters)]
+    character = next((o for o in chosen if o is not None), characters[0] if len(characters) == 1 else None)
+    meshes = [o for o in context.selected_objects if o.type == "MESH" and o.parent not in characters]
+    active = context.object
+    goal = active if active in meshes else meshes[0] if len(meshes) == 1 else None
+    return character, goal
 
 
 def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:

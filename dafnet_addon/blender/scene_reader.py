@@ -26,7 +26,7 @@ from .compat import action_curves
 from .mannequin import FACING
 from .properties import Settings, find_collection, find_object, find_scene
 
-__all__ = ["ReadScene", "read_steps", "read_scene"]
+__all__ = ["ReadScene", "furniture_now", "read_steps", "read_scene"]
 
 _BATCH = 16
 _TURNED = np.radians(0.1)
@@ -212,6 +212,26 @@ def _geometry(evaluated: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     finally:
         evaluated.to_mesh_clear()
     return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3)
+
+
+def furniture_now(context: bpy.types.Context, settings: Settings) -> dict[str, list[Mesh]]:
+    """The furniture's meshes in the current frame by the names of the objects that they belong to; world, metres.
+
+    ``InputError`` where there is none to be seen, as for ``read_steps``.
+    """
+    scene = find_scene(settings)
+    armature = find_object(settings, settings.armature, "character")
+    if settings.furniture is None:
+        return {}
+    names = (settings.root, settings.head, settings.hand_left, settings.hand_right)
+    own = {armature, *armature.children_recursive, *(o for o in scene.objects if o.name_full in names)}
+    depsgraph = context.evaluated_depsgraph_get()
+    pieces = _Furniture(find_collection(settings.furniture), armature, own).pieces(depsgraph)
+    _follow(depsgraph, pieces)
+    found: dict[str, list[Mesh]] = defaultdict(list)
+    for piece in pieces:
+        found[piece.name].append(_solid(piece, metres_per_unit(scene)))
+    return dict(found)
 
 
 class _Furniture:

@@ -1,0 +1,137 @@
+"""Keys on a character's root: a walk round the furniture to a seat, or to a place to stand."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..core.distance import scaled
+from ..core.errors import InputError
+from ..core.paths import Route, Stop
+from ..core.solids import Mesh, Scene
+from ..director.seats import on_a_seat, seat_of
+from ..director.walks import walk_to
+from .armature import character_scale, metres_per_unit
+from .compat import action_curves
+from .properties import Settings, find_object, settings_of
+from .scene_reader import furniture_now
+
+__all__ = ["Walk", "walk"]
+
+_KEYS_A_SECOND = 10
+_BEFORE = 0.2  # seconds of rest before the first step
+_MOVES = ("location", "rotation_euler")
+
+
+@dataclass(frozen=True)
+class Walk:
+    """Frames ``first`` to ``last`` of the new keys; whether the scene's end had to be moved for them."""
+
+    first: int
+    last: int
+    extended: bool
+
+
+def _root_of(settings: Settings) -> bpy.types.Object:
+    """The root, whose keys are to be written: its own place must be its place in the world."""
+    if settings.root is None:
+        raise InputError(f"The character '{settings.armature}' has no root; choose its root object in the DAFNet panel.")
+    root = find_object(settings, settings.root, "root")
+    if root.parent or any(not c.mute for c in root.constraints):
+        raise InputError(f"The root '{root.name}' follows something; clear its parent and constraints to key it.")
+    if root.animation_data and any(driver.data_path in _MOVES for driver in root.animation_data.drivers):
+        raise InputError(f"The root '{root.name}' has drivers; remove them to key it.")
+    if root.library or len(root.rotation_mode) != 3 or root.rotation_mode[2] != "Z":
+        raise InputError(f"The root '{root.name}' is linked or not in rotation mode XYZ; make it local and set that mode.")
+    return root
+
+
+def walk(
+    context: bpy.types.Context, armature: bpy.types.Object, seat: bpy.types.Object | None, seconds: float = 3.0,
+    speed: float = 1.1,
+) -> Walk:
+    """Let the character walk to ``seat`` and sit there for some ``seconds``, or, for None, to the 3D cursor and stand.
+
+    Goes on from the root's last key, else from the current frame, where nothing before is changed. The seat has to be in the
+    character's furniture collection; where it has none, the seat's own becomes that. ``InputError``: there is nothing to sit
+    on, no way, or the root cannot be keyed.
+    """
+    scene, own = context.scene, armature.dafnet
+    if seat is not None and own.furniture is None:
+        own.furniture = _collection_of(seat, armature, scene)
+    settings = settings_of(armature, scene)
+    root = _root_of(settings)
+    keyed = [float(p.co[0]) for c in action_curves(root) if c.data_path in _MOVES for p in c.keyframe_points]
+    before, first = scene.frame_current, int(np.ceil(max(keyed))) if keyed else scene.frame_current
+    try:
+        scene.frame_set(first)
+        unit = metres_per_unit(scene)
+        size = character_scale(armature, unit)
+        found = furniture_now(context, settings)
+        place, yaw = np.array(root.location, float) * unit / size, float(root.rotation_euler[2])
+        goal = np.array(scene.cursor.location, float) * unit / size
+    finally:
+        scene.frame_set(before)
+    route = _route(found, seat, place, yaw, goal, seconds, speed, scene.render.fps / scene.render.fps_base, size)
+    last = first + len(route.path) - 1
+    _write(root, route, first, size / unit, _KEYS_A_SECOND / (scene.render.fps / scene.render.fps_base))
+    end = scene.frame_end if own.use_scene_range else own.frame_end
+    if last > end:
+        if own.use_scene_range:
+            scene.frame_end = last
+        else:
+            own.frame_end = last
+    return Walk(first, last, last > end)
+
+
+def _collection_of(
+    seat: bpy.types.Object, armature: bpy.types.Object, scene: bpy.types.Scene
+) -> bpy.types.Collection:
+    """The collection that a seat lies in, as the furniture of a character that has none yet."""
+    for collection in seat.users_collection:
+        if collection != scene.collection and armature.name not in collection.all_objects:
+            return collection
+    raise InputError(f"'{seat.name}' lies in no collection of its own; put the furniture into one and choose it.")
+
+
+def _route(
+    found: dict[str, list[Mesh]], seat: bpy.types.Object | None, place: np.ndarray, yaw: float, goal: np.ndarray,
+    seconds: float, speed: float, fps: float, size: float,
+) -> Route:
+    """The walk in metres of the canonical body, from the root's ``place`` (3,) to the seat or to ``goal`` (3,)."""
+    floor = float(place[2])
+
+    def canonical(meshes: list[Mesh]) -> Scene:
+        return scaled(Scene(tuple(meshes)), 1.0 / size)
+
+    everything = canonical([mesh for meshes in found.values() for mesh in meshes])
+    start = Stop((float(place[0]), float(place[1])), yaw, _BEFORE, seated=on_a_seat(everything.solids, place[:2], floor))
+    if seat is None:
+        away = goal[:2] - place[:2]
+        end = Stop((float(goal[0]), float(goal[1])), float(np.arctan2(-away[0], away[1])), seconds)
+    else:
+        names = [name for name in (seat.name, *(child.name for child in seat.children_recursive)) if name in found]
+        if not names:
+            raise InputError(f"'{seat.name}' is not in the character's furniture collection; move it there.")
+        solids = canonical([mesh for name in names for mesh in found[name]]).solids
+        spot = seat_of(solids, place[:2], floor, seat.name)
+        end = Stop((float(spot.position[0]), float(spot.position[1])), spot.yaw, seconds, seated=True)
+    return walk_to(everything.solids, start, end, speed, fps, floor)
+
+
+def _write(root: bpy.types.Object, route: Route, first: int, scale: float, share: float) -> None:
+    """Key location and heading at about ten frames a second, and where the root comes to rest."""
+    frames = set(range(0, len(route.path), max(1, round(1.0 / share))))
+    frames |= {len(route.path) - 1, *(k for rest in route.rests for k in (rest.first, rest.last))}
+    for k in sorted(frames):
+        root.location = route.path.position[k] * scale
+        root.rotation_euler = (0.0, 0.0, float(route.path.yaw[k]))
+        for path in _MOVES:
+            root.keyframe_insert(path, frame=first + k)
+    for curve in action_curves(root):
+        if curve.data_path in _MOVES:
+            for point in curve.keyframe_points:
+                if point.co[0] >= first:
+                    point.interpolation = "BEZIER"
+                    point.handle_left_type = point.handle_right_type = "AUTO_CLAMPED"
+            curve.update()

@@ -1,0 +1,134 @@
+"""Where, and which way round, one sits on a piece of furniture, found on its mesh."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.errors import InputError
+from ..core.solids import Box, Mesh
+from .surfaces import HeightField, height_field, surface_points
+
+__all__ = ["SeatPlace", "on_a_seat", "seat_of"]
+
+_CELL = 0.03
+_LOWEST, _HIGHEST, _OVERHEAD = 0.22, 0.85, 1.5  # metres over the floor: of seats; what is higher is no part of one
+_FLAT, _BACK = 0.05, 0.15  # metres over the seat: of what still is seat; of a back or an arm
+_LEAST = 0.035  # square metres
+_ONE_SIDED = 0.10  # metres between the middles of seat and of what stands up around it, where that is a back
+_BEFORE_BACK, _FROM_EDGE = 0.20, 0.22  # metres between the pelvis and the back; and the front edge, where there is no back
+_SNAP = np.radians(30.0)
+_UNDER = 0.08  # metres around a root, in which its seat is looked for
+_HALF_WIDTH = 0.28  # metres that a body needs to each side
+
+
+@dataclass(frozen=True)
+class SeatPlace:
+    """``position`` (2,) of the resting pelvis and ``yaw`` that it faces (``core.root``); ``height`` of the seat's top over the
+    world's zero, metres; whether there is a ``back``.
+    """
+
+    position: np.ndarray
+    yaw: float
+    height: float
+    back: bool
+
+
+def _hull(points: np.ndarray) -> np.ndarray:
+    """Convex hull (N, 2) of points, counter-clockwise (Andrew's monotone chain)."""
+    ordered = np.unique(points, axis=0).tolist()
+
+    def half(chain: list[list[float]]) -> list[list[float]]:
+        out: list[list[float]] = []
+        for p in chain:
+            while len(out) > 1 and (
+                (out[-1][0] - out[-2][0]) * (p[1] - out[-2][1]) - (out[-1][1] - out[-2][1]) * (p[0] - out[-2][0]) <= 0
+            ):
+                out.pop()
+            out.append(p)
+        return out[:-1]
+
+    return np.array(half(ordered) + half(ordered[::-1])) if len(ordered) > 2 else np.array(ordered)
+
+
+def _axes(cells: np.ndarray) -> np.ndarray:
+    """The two directions (2, 2) of the smallest rectangle around points (N, 2), the longer side first."""
+    hull = _hull(cells)
+    best, found = np.inf, np.eye(2)
+    edges = np.roll(hull, -1, axis=0) - hull
+    for angle in np.unique(np.round(np.arctan2(edges[:, 1], edges[:, 0]) % (np.pi / 2), 3)):
+        u = np.array([np.cos(angle), np.sin(angle)])
+        v = np.array([-u[1], u[0]])
+        a, b = np.ptp(hull @ u), np.ptp(hull @ v)
+        if a * b < best - 1e-9:
+            best, found = a * b, np.stack([u, v] if a >= b else [v, u])
+    return found
+
+
+def _largest(field: HeightField, floor: float) -> tuple[float, np.ndarray] | None:
+    """Height and cells (N, 2) of the level that most of the furniture's top lies at, among heights to sit at."""
+    over = field.top - floor
+    heights = over[(over > _LOWEST) & (over < _HIGHEST)]
+    if not len(heights):
+        return None
+    # The level with most cells within its reach; of equals the lower one, a seat rather than its arms.
+    levels = np.arange(_LOWEST, _HIGHEST, 0.01)
+    count = (np.abs(heights[:, None] - levels) < _FLAT).sum(0)
+    level = float(np.median(heights[np.abs(heights - levels[np.argmax(count)]) < _FLAT]))
+    cells = np.argwhere(np.abs(over - level) < _FLAT)
+    return (level, cells) if len(cells) * field.cell**2 >= _LEAST else None
+
+
+def on_a_seat(solids: Sequence[Box | Mesh], position: np.ndarray, floor: float = 0.0) -> bool:
+    """Whether a root that rests at ``position`` (2,) has a seat under it: something between 22 and 85 cm over ``floor``."""
+    points = surface_points(solids, _CELL)
+    height = points[np.linalg.norm(points[:, :2] - position, axis=-1) < _UNDER, 2] - floor
+    return bool(((height > _LOWEST) & (height < _HIGHEST)).any())
+
+
+def seat_of(
+    solids: Sequence[Box | Mesh], towards: np.ndarray, floor: float = 0.0, name: str = "furniture",
+    near: np.ndarray | None = None,
+) -> SeatPlace:
+    """Where one sits on one piece of furniture, made of ``solids``; world, metres, people of 1.75 m.
+
+    With a back on one side one sits before it and looks away from it; without, one looks along the seat's shorter side, to
+    where ``towards`` (2,) lies. On a wide seat one sits in the middle, or beside ``near`` (2,) where given. Raises InputError
+    where there is nothing to sit on: a level surface between 22 and 85 cm over ``floor``.
+    """
+    points = surface_points(solids, 0.6 * _CELL)
+    points = points[(points[:, 2] < floor + _OVERHEAD) & (points[:, 2] > floor + 0.02)]
+    found = None
+    if len(points):
+        field = height_field(points, points[:, :2].min(0), points[:, :2].max(0), _CELL)
+        found = _largest(field, floor)
+    if found is None:
+        raise InputError(f"'{name}' has no level surface between 22 and 85 cm over the floor to sit on; choose a seat.")
+    level, cells = found
+    places = field.middles(cells)
+    middle = places.mean(0)
+    longer, shorter = _axes(places)
+    up = field.middles(np.argwhere(field.top - floor > level + _BACK))
+    side = up.mean(0) - middle if len(up) else np.zeros(2)
+    back = bool(np.linalg.norm(side) > _ONE_SIDED)
+    if back:
+        forward = -side / np.linalg.norm(side)
+        ways = np.stack([longer, -longer, shorter, -shorter])
+    else:
+        forward = towards - middle
+        forward = forward / max(float(np.linalg.norm(forward)), 1e-9)
+        square = np.ptp(places @ longer) < 1.3 * np.ptp(places @ shorter)
+        ways = np.stack([longer, -longer, shorter, -shorter] if square else [shorter, -shorter])
+    along = ways @ forward
+    if not back or along.max() > np.cos(_SNAP):
+        forward = ways[np.argmax(along)]
+    across = np.array([forward[1], -forward[0]])
+    depth, width = places @ forward, places @ across
+    low, high = float(depth.min()), float(depth.max())
+    at = low + _BEFORE_BACK if back else max(0.5 * (low + high), high - _FROM_EDGE)
+    aside = 0.5 * float(width.min() + width.max())
+    room = 0.5 * float(np.ptp(width)) - _HALF_WIDTH
+    if near is not None and room > 0.0:
+        aside = float(np.clip(near @ across, aside - room, aside + room))
+    position = min(at, high) * forward + aside * across
+    return SeatPlace(position, float(np.arctan2(-forward[0], forward[1])), floor + level, back)

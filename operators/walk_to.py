@@ -1,0 +1,53 @@
+"""Send the character to a seat or to the 3D cursor."""
+
+import bpy
+from bpy.props import EnumProperty, FloatProperty
+
+from ..dafnet_addon.blender.armature import sent
+from ..dafnet_addon.blender.walking import walk
+from .generate import DAFNET_OT_generate
+from .reporting import reported
+
+__all__ = ["DAFNET_OT_walk_to"]
+
+
+class DAFNET_OT_walk_to(bpy.types.Operator):
+    """Key the character's root on from its last key: it walks round the furniture and sits down, or stands at the 3D cursor"""
+
+    bl_idname = "dafnet.walk_to"
+    bl_label = "Walk To"
+    bl_options = {"REGISTER", "UNDO"}
+
+    goal: EnumProperty(
+        name="To", default="SEAT",
+        items=[
+            ("SEAT", "Sit on Selected", "Walk to the selected piece of furniture and sit down on it"),
+            ("CURSOR", "Walk to Cursor", "Walk to the 3D cursor and stand there"),
+        ],
+    )
+    seconds: FloatProperty(name="Stay", default=3.0, min=0.0, max=600.0, subtype="TIME_ABSOLUTE", description="Seconds of rest")
+    speed: FloatProperty(
+        name="Speed", default=1.1, min=0.4, max=3.0, description="Of walking, in metres a second for a body of 1.75 m",
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a character to send, and none is being generated."""
+        if DAFNET_OT_generate.progress is not None:
+            cls.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
+            return False
+        cls.poll_message_set("Add a character, or select one beside its goal")
+        return context.mode == "OBJECT" and sent(context)[0] is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Key the walk."""
+        character, seat = sent(context)
+        if self.goal == "SEAT" and seat is None:
+            self.report({"ERROR"}, "Select the one object to sit on, with the character or alone.")
+            return {"CANCELLED"}
+        with reported(self):
+            made = walk(context, character, seat if self.goal == "SEAT" else None, self.seconds, self.speed)
+            ended = ", the range now ends there" if made.extended else ""
+            self.report({"INFO"}, f"Keyed the root from frame {made.first} to {made.last}{ended}.")
+            return {"FINISHED"}
+        return {"CANCELLED"}

@@ -1,0 +1,131 @@
+"""The director: seats found on meshes and scans, ways round furniture, and that who is sent to a seat sits on it."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dafnet_addon import Box, Controls, InputError, Mesh, Scene, generate, load_weights
+from dafnet_addon.core.paths import Stop
+from dafnet_addon.core.rotations import rotate, yaw_matrix
+from dafnet_addon.core.skeleton import SEAT_TO_PELVIS
+from dafnet_addon.director.seats import on_a_seat, seat_of
+from dafnet_addon.director.surfaces import height_field, surface_points
+from dafnet_addon.director.walks import walk_to, way_round
+
+SCANS = Path(__file__).resolve().parents[2] / "shared" / "data" / "furniture"
+
+
+def _box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Box:
+    a, b = np.array(low), np.array(high)
+    return Box((a + b) / 2, (b - a) / 2)
+
+
+def _turned(boxes: list[Box], angle: float, place: tuple[float, float]) -> list[Box]:
+    turn = yaw_matrix(np.array(angle))
+    return [Box(rotate(turn, b.center) + np.array([*place, 0.0]), b.half_size, turn) for b in boxes]
+
+
+def _chair(height: float = 0.45, arms: bool = False) -> list[Box]:
+    """A chair that looks along +y: its seat, its back at y = -0.22, perhaps arms."""
+    boxes = [_box((-0.22, -0.22, height - 0.05), (0.22, 0.22, height))]
+    boxes.append(_box((-0.22, -0.26, height), (0.22, -0.22, height + 0.4)))
+    if arms:
+        boxes += [_box((x, -0.22, height), (x + 0.05, 0.15, height + 0.2)) for x in (-0.27, 0.22)]
+    return boxes
+
+
+def test_surface_points_are_dense_and_on_the_surface():
+    block = _box((0.0, 0.0, 0.0), (0.5, 0.3, 0.4))
+    points = surface_points([block], 0.05)
+    assert ((points >= -1e-9) & (points <= np.array([0.5, 0.3, 0.4]) + 1e-9)).all()
+    top = points[points[:, 2] > 0.399, :2]
+    grid = np.stack(np.meshgrid(np.linspace(0, 0.5, 20), np.linspace(0, 0.3, 20)), -1).reshape(-1, 2)
+    assert np.linalg.norm(grid[:, None] - top, axis=-1).min(1).max() < 0.05
+    assert surface_points([], 0.05).shape == (0, 3)
+    field = height_field(points, np.zeros(2), np.array([1.0, 1.0]), 0.05)
+    assert np.isclose(field.top[2, 2], 0.4) and np.isneginf(field.top[-1, -1])
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.6, np.pi / 2, -2.5])
+@pytest.mark.parametrize("arms", [False, True])
+def test_one_sits_before_a_back_and_looks_away_from_it(angle, arms):
+    found = seat_of(_turned(_chair(0.43, arms), angle, (2.0, -1.0)), towards=np.zeros(2))
+    assert found.back and abs(found.height - 0.43) < 0.01
+    assert abs(np.angle(np.exp(1j * (found.yaw - angle)))) < 0.05
+    local = rotate(yaw_matrix(np.array(-angle)), np.array([*(found.position - [2.0, -1.0]), 0.0]))
+    assert abs(local[0]) < 0.04 and -0.08 < local[1] < 0.05
+
+
+def test_stools_and_benches_are_sat_on_from_where_one_comes():
+    stool = [_box((-0.2, -0.2, 0.55), (0.2, 0.2, 0.6))]
+    for towards, yaw in (((3.0, 0.3), -np.pi / 2), ((0.2, 3.0), 0.0)):
+        found = seat_of(stool, np.array(towards))
+        assert not found.back and abs(found.yaw - yaw) < 0.05 and np.linalg.norm(found.position) < 0.05
+    bench = [_box((-1.0, -0.25, 0.35), (1.0, 0.25, 0.4))]
+    found = seat_of(bench, np.array([5.0, 2.0]))
+    assert abs(found.yaw) < 0.05 and abs(found.position[0]) < 0.05, "one looks across a bench, not along it"
+    beside = seat_of(bench, np.array([5.0, 2.0]), near=np.array([0.9, 0.0]))
+    assert 0.6 < beside.position[0] < 0.75
+    bed = [_box((-1.0, -0.8, 0.2), (1.0, 0.8, 0.5))]
+    assert seat_of(bed, np.array([0.0, 4.0])).position[1] > 0.5, "on a bed's edge"
+
+
+def test_who_rests_over_a_seat_sits():
+    chair = _chair()
+    assert on_a_seat(chair, np.array([0.0, 0.0])) and not on_a_seat(chair, np.array([0.0, 0.6]))
+    assert not on_a_seat([_box((-1, -1, 0.9), (1, 1, 1.0))], np.zeros(2)) and not on_a_seat([], np.zeros(2))
+
+
+def test_what_nobody_can_sit_on_is_refused():
+    shelf = [_box((-0.4, -0.15, 0.0), (0.4, 0.15, 1.2))]
+    with pytest.raises(InputError, match="'Shelf' has no level surface"):
+        seat_of(shelf, np.zeros(2), name="Shelf")
+    with pytest.raises(InputError, match="no level surface"):
+        seat_of([_box((-0.2, -0.2, -0.1), (0.2, 0.2, 0.0))], np.zeros(2))
+
+
+@pytest.mark.parametrize(("scan", "height"), [("sofa_03", 0.50), ("painted_wooden_stool", 0.58)])
+def test_seats_of_real_furniture(scan, height):
+    trimesh = pytest.importorskip("trimesh")
+    file = SCANS / f"{scan}.glb"
+    if not file.exists():
+        pytest.skip(f"needs the scan {file}")
+    mesh = trimesh.load(file, force="mesh")
+    up = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+    found = seat_of([Mesh(mesh.vertices, mesh.faces, up, scan)], np.array([0.0, -3.0]))
+    assert abs(found.height - height) < 0.08
+    assert np.linalg.norm(found.position - (up[:3, :3] @ mesh.bounds.mean(0))[:2]) < 0.45
+    if scan == "sofa_03":
+        assert found.back and np.cos(found.yaw - np.pi) > 0.95, "the scan's front is its +z, our -y"
+
+
+def test_ways_go_round_furniture():
+    wall = surface_points([_box((-0.1, -1.5, 0.0), (0.1, 1.5, 1.0))], 0.05)
+    start, goal = np.array([-1.5, 0.0]), np.array([1.5, 0.0])
+    via = way_round(wall, start, goal)
+    points = np.array([start, *via, goal])
+    dense = np.concatenate([a + np.linspace(0, 1, 50)[:, None] * (b - a) for a, b in pairwise(points)])
+    away = np.linalg.norm(np.maximum(np.abs(dense) - [0.1, 1.5], 0.0), axis=1)
+    assert away.min() > 0.2 and np.linalg.norm(np.diff(points, axis=0), axis=1).sum() < 5.2
+    assert way_round(np.zeros((0, 3)), start, goal) == []
+    rug, lamp = (surface_points([_box((-1, -1, z), (1, 1, z + 0.02))], 0.05) for z in (0.0, 2.0))
+    assert way_round(np.concatenate([rug, lamp]), start, goal) == []
+    ring = [_box((-3, y, 0), (3, y + 0.1, 1)) for y in (-3.0, 3.0)] + [_box((x, -3, 0), (x + 0.1, 3, 1)) for x in (-3.0, 3.0)]
+    with pytest.raises(InputError, match="no way"):
+        way_round(surface_points(ring, 0.05), np.zeros(2), np.array([5.0, 0.0]))
+    with pytest.raises(InputError, match="already"):
+        walk_to([], Stop((0.0, 0.0), 0.0), Stop((0.1, 0.0), 0.0))
+
+
+def test_who_is_sent_to_a_chair_behind_a_table_sits_on_it():
+    chair = _turned(_chair(), np.pi, (0.0, 0.0))
+    table = [_box((-0.8, 1.4, 0.70), (0.8, 2.0, 0.75)), *(_box((x, 1.5, 0), (x + 0.05, 1.9, 0.7)) for x in (-0.7, 0.65))]
+    found = seat_of(chair, towards=np.array([0.0, 4.0]))
+    way = walk_to([*chair, *table], Stop((0.0, 4.0), np.pi, 0.5), Stop(tuple(found.position), found.yaw, 3.0, seated=True))
+    assert np.abs(np.diff(way.path.position, axis=0)).max() < 0.08
+    inside = (np.abs(way.path.position[:, 0]) < 0.8) & (np.abs(way.path.position[:, 1] - 1.7) < 0.3)
+    assert not inside.any()
+    take = generate(Scene([*chair, *table]), Controls(30.0, way.path.matrices()), load_weights())
+    assert abs(take.joints[-20, 0, 2] - found.height - SEAT_TO_PELVIS) < 0.08
