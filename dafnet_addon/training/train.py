@@ -15,6 +15,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import nn
@@ -99,7 +100,9 @@ class Run:
                 module.mixed = config.mixed
         self.network: nn.Module = self.gmvae if part == "predictor" else getattr(self.flow, part)
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=config.peak)
-        self.step, self.seconds, self.adopted = 0, 0.0, False
+        self.step, self.seconds = 0, 0.0
+        self.adopted = ""
+        """How the weights that the run began with were trained, in their own words; nothing where it began anew."""
 
     def adopt(self, weights: Weights) -> None:
         """Begin with what these weights have learnt. Raises WeightsError where their sizes are others."""
@@ -107,7 +110,7 @@ class Run:
             adopt_predictor(self.gmvae.predictor, weights)
         else:
             adopt_part(getattr(self.flow, self.part), self.part, weights, self.model)
-        self.adopted = True
+        self.adopted = weights.metadata.get("training", "not said")
 
     @property
     def budget(self) -> float:
@@ -348,7 +351,9 @@ def trained(folder: Path) -> tuple[TwoPartFlow, ActionPredictor, Statistics]:
 def account(folder: Path, dataset: Path) -> dict[str, str]:
     """What a weights file says of its making, as metadata: licence, data, and training."""
     runs = {part: Run.load(part, folder) for part in ("predictor", "upper", "lower")}
-    training = {part: {"steps": run.step, "minutes": round(run.seconds / 60, 1)} for part, run in runs.items()}
+    training: dict[str, Any] = {part: {"steps": run.step, "minutes": round(run.seconds / 60, 1)} for part, run in runs.items()}
+    if begun_with := runs["upper"].adopted:
+        training["begun_with"] = begun_with
     return {
         "licence": "CC-BY-4.0; provenance in LICENSE-WEIGHTS.md",
         "data": (dataset / "dataset.json").read_text(),
