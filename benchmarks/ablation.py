@@ -1,10 +1,11 @@
 """What each addition to the paper's model gives: narrow models, trained alike but for one thing, measured on held-out clips.
 
-    python benchmarks/ablation.py DATASET FOLDER -o RUNS --minutes 5
+    python benchmarks/ablation.py DATASET FOLDER -o RUNS --minutes 5 [--from WEIGHTS]
 
 ``DATASET`` is made by ``dafnet prepare``, ``FOLDER`` holds its motion files. Every variant gets the same minutes, seeds and
 predictor; what is finished is kept. Writes ``ablation.md`` and ``ablation.json`` into ``RUNS``. Equal minutes, not equal steps:
-what makes a step dearer has to earn it.
+what makes a step dearer has to earn it. With ``--from`` all begin with what those weights have learnt, and the variants that
+need other sizes are left out.
 """
 
 import argparse
@@ -19,7 +20,7 @@ from typing import Any
 
 import torch
 
-from dafnet_addon.core.weights import load_weights
+from dafnet_addon.core.weights import Weights, load_weights
 from dafnet_addon.data.held_out import HeldClip, held_out
 from dafnet_addon.model.config import SMALL, ModelConfig
 from dafnet_addon.training.batches import Pool
@@ -36,6 +37,7 @@ VARIANTS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "sensor dropout in all windows, as in the paper": ({}, {"dropout_windows": 1.0}),
     "an environment encoder for each step": ({"shared_encoder": False}, {}),
     "without the mask": ({"mask": False}, {}),
+    "without either": ({"ahead": 0}, {"free_run": 0.0}),
     "the paper's: none of these": (
         {"ahead": 0, "shared_encoder": False, "mask": False}, {"free_run": 0.0, "dropout_windows": 1.0},
     ),
@@ -46,8 +48,10 @@ FIGURES = (
 )
 
 
-def _train(part: str, dataset: Path, folder: Path, model: ModelConfig, training: TrainingConfig) -> None:
-    train_part(part, dataset, folder, model, training, threads=1)
+def _train(
+    part: str, dataset: Path, folder: Path, model: ModelConfig, training: TrainingConfig, begin_with: Weights | None
+) -> None:
+    train_part(part, dataset, folder, model, training, threads=1, begin_with=begin_with)
 
 
 def _likelihood(folder: Path, dataset: Path) -> float:
@@ -64,17 +68,18 @@ def _likelihood(folder: Path, dataset: Path) -> float:
 
 
 def variant(
-    name: str, dataset: Path, out: Path, minutes: float, predictor: Path, clips: list[HeldClip]
+    name: str, dataset: Path, out: Path, minutes: float, predictor: Path, clips: list[HeldClip], begin_with: Weights | None
 ) -> dict[str, Any]:
     """Train (or go on with) one variant, and measure it."""
     changed, trained_as = VARIANTS[name]
-    model, training = replace(MODEL, **changed), replace(TRAINING, minutes_flow=minutes, **trained_as)
+    base = MODEL if begin_with is None else ModelConfig(**{**begin_with.config["model"], "ahead": MODEL.ahead})
+    model, training = replace(base, **changed), replace(TRAINING, minutes_flow=minutes, **trained_as)
     folder = out / name.replace(" ", "_").replace(":", "").replace(",", "")
     folder.mkdir(parents=True, exist_ok=True)
     if not (folder / "predictor.pt").exists():
         shutil.copy(predictor, folder / "predictor.pt")
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        for job in [pool.submit(_train, part, dataset, folder, model, training) for part in ("upper", "lower")]:
+        for job in [pool.submit(_train, p, dataset, folder, model, training, begin_with) for p in ("upper", "lower")]:
             job.result()
     file = folder / "weights.safetensors"
     export(file, *trained(folder), {})
@@ -103,14 +108,20 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--minutes", type=float, default=5.0)
     parser.add_argument("--every", type=int, default=3, help="measure on every N-th captured clip of an unseen body")
+    parser.add_argument("--from", dest="begin_with", type=Path, metavar="WEIGHTS")
     options = parser.parse_args()
+    begin_with = load_weights(options.begin_with) if options.begin_with else None
     torch.set_num_threads(max(1, (os.cpu_count() or 2)))
     clips = captured(held_out(options.folder))[:: options.every]
     first = options.output / "predictor"
-    train_part("predictor", options.dataset, first, MODEL, replace(TRAINING, minutes_predictor=2.0))
+    if not (first / "predictor.pt").exists():
+        train_part("predictor", options.dataset, first, MODEL, replace(TRAINING, minutes_predictor=2.0))
     results: dict[str, dict[str, Any]] = {}
-    for name in VARIANTS:
-        results[name] = variant(name, options.dataset, options.output, options.minutes, first / "predictor.pt", clips)
+    for name, (changed, _) in VARIANTS.items():
+        if begin_with is not None and changed.keys() & {"shared_encoder", "mask"}:
+            continue
+        predictor = first / "predictor.pt"
+        results[name] = variant(name, options.dataset, options.output, options.minutes, predictor, clips, begin_with)
         (options.output / "ablation.json").write_text(json.dumps(results, indent=1))
         (options.output / "ablation.md").write_text(table(results) + "\n")
     print(table(results))

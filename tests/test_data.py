@@ -143,6 +143,25 @@ def test_real_windows_are_in_the_roots_frame(real_clips):
     assert np.abs(pelvis[..., :2]).max() < 0.35 and np.abs(np.median(pelvis[..., :2])) < 0.05
 
 
+def test_a_seat_that_is_used_later_is_there_before():
+    down = _sit_down()
+    joints = np.concatenate([np.repeat(down[:1], 60, axis=0), down])
+    motion = motion_of("a", "b", "c", "sit-stand", joints)
+    rng, seen, standing = np.random.default_rng(0), 0, 0
+    for _ in range(40):
+        window = draw(rng, motion, 40)
+        if window is None:
+            continue
+        pelvis = window.poses.reshape(80, 22, 3)[:, 0, 2]
+        if pelvis.min() < 0.9:
+            continue  # sits in it, or was turned round in time
+        standing += 1
+        x, y, yaw = window.root[0]
+        place = np.array([x + 0.42 * np.sin(yaw), y - 0.42 * np.cos(yaw)])  # where it will sit
+        seen += bool((np.linalg.norm(window.boxes[:, :2] - place, axis=1) < 0.3).any())
+    assert standing > 5 and seen == standing
+
+
 def test_the_split_is_by_body():
     if not MOCAP.is_dir():
         pytest.skip(f"needs the motion capture at {MOCAP}")

@@ -40,6 +40,7 @@ _BUSY = {"standing_gesture", "social_gesture", "greeting", "documents", "work_st
 _HIGHEST_BED = 0.62
 _CARRIES, _WRIST_LIES = 0.02, 0.09  # metres over a bed: of a body, against the bare floor; and of a wrist whose hand lies on it
 _TURNING = 66  # frames of getting onto a bed
+_WAITS = 90  # frames
 _IDLES = 45  # pieces of standing that are used, of many that are alike
 _BOARD = np.array([0.0, 0.6])  # from the root that stands before it; or a counter
 _LEANS = (-0.3, -0.15, 0.0, 0.0, 0.15, 0.3)  # radians; back is positive
@@ -61,6 +62,16 @@ def _to_and_from_seats(motions: list[Motion], sits: list[Piece], to: Pool, away:
             whole = joined(up, walk)
             focus = np.arange(max(0, len(up) - 60), len(whole) - 40, 5)
             yield from made("leave", sit.name, sit.subject, "sit-stand", whole, focus)
+
+
+def _waiting(sits: list[Piece]) -> Iterator[Composed]:
+    """Standing still before a seat for a while, then sitting down ("wait"), and the same reversed."""
+    for sit in sits:
+        stands = np.repeat(sit.joints[:1], _WAITS, axis=0)
+        whole = np.concatenate([stands, sit.joints])
+        focus = np.arange(0, _WAITS, 5)
+        yield from made("wait", sit.name, sit.subject, "sit-stand", whole, focus)
+        yield from made("wait", sit.name + " reversed", sit.subject, "sit-stand", whole[::-1], len(whole) - 1 - focus[::-1])
 
 
 def _at_top(
@@ -206,6 +217,6 @@ def composed(motions: list[Motion]) -> list[Composed]:
     # Many of those with borrowed arms, and all of them begin in front of the seat.
     sits = [s for s in sits if not s.borrowed] + [s for s in sits if s.borrowed][::9]
     return [
-        *_to_and_from_seats(motions, sits, to, away), *_while_seated(motions, sits), *_while_standing(motions, to, away),
-        *_lying(motions, sits),
+        *_to_and_from_seats(motions, sits, to, away), *_waiting(sits), *_while_seated(motions, sits),
+        *_while_standing(motions, to, away), *_lying(motions, sits),
     ]

@@ -34,12 +34,12 @@ _STAND = {"standing", "standing_idle", "standing_gesture", "social_gesture", "gr
 _SIT = {"sit-stand", "sit_down", "stand_up", "seated", "seated_chair", "seated_table"}
 _AVOID = ("jump", "uneven", "hop", "march", "kick", "flip", "squat", "balance", "crouch", "swing legs", "lie")
 _SHARES = {
-    "approach": 0.17, "leave": 0.08, "descend": 0.16, "sit": 0.07, "work": 0.07, "desk": 0.06, "counter": 0.03, "write": 0.04,
-    "lie": 0.04, "walk": 0.18, "stand": 0.10,
+    "approach": 0.15, "leave": 0.07, "wait": 0.07, "descend": 0.14, "sit": 0.07, "work": 0.07, "desk": 0.06, "counter": 0.03,
+    "write": 0.04, "lie": 0.04, "walk": 0.16, "stand": 0.10,
 }
-"""Shares of windows. Composed: walking up to a seat and sitting down, standing up and walking off, hands at work over seated
-legs, at a desk, at a board, lying down on a bed or getting up. Captured: around a sit-down or stand-up, seated, walking,
-standing.
+"""Shares of windows. Composed: walking up to a seat and sitting down, standing up and walking off, standing before a seat,
+hands at work over seated legs, at a desk, a counter or a board, lying down on a bed or getting up. Captured: around a sit-down
+or stand-up, seated, walking, standing.
 """
 _COMPOSITION = (
     "walks joined to sit-downs and, after stand-ups, walked away; captured gestures, greetings and reaching over seated legs, "

@@ -22,6 +22,7 @@ COMPOSED = "composed"
 """Source of motions that nobody did in one piece."""
 _FRAMES = HISTORY + LENGTH
 _MARGIN = 32  # the root is smoothed over 24 frames and known 30 ahead
+_AROUND = 100  # frames before and after that, in which the body shows what furniture there is
 _HOLD = 45
 _LOWEST, _HIGHEST = 0.40, 0.86  # resting pelvis, metres: seats of 0.28 to 0.74
 _LOWERED = 0.3  # metres; from a high stool further down, every wave of the pelvis would grow
@@ -101,6 +102,15 @@ def _animated_by_hand(rng: np.random.Generator, path: RootPath) -> RootPath:
     return path
 
 
+def _farthest(valid: np.ndarray, frame: int, step: int) -> int:
+    """The last valid frame within ``_AROUND`` of a valid one, in the direction of ``step``."""
+    for _ in range(_AROUND):
+        if not (0 <= frame + step < len(valid) and valid[frame + step]):
+            break
+        frame += step
+    return frame
+
+
 def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> Window | None:
     """One augmented, furnished window, around frame ``focus`` where given; None where this draw cannot be used."""
     total = len(motion.joints)
@@ -115,6 +125,8 @@ def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> 
     low, high = max(0, start - _MARGIN), min(total, start + span + _MARGIN)
     if not motion.valid[low:high].all():
         return None
+    # What is used a few seconds earlier or later is there meanwhile.
+    low, high = _farthest(motion.valid, low, -1), _farthest(motion.valid, high - 1, 1) + 1
     joints = motion.joints[low:high]
     rests = [r for r in motion.rests if r.start < high and r.end > low]
     if rests:
@@ -123,9 +135,10 @@ def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> 
         joints = at_seat_height(joints, height, float(np.clip(wanted, max(_LOWEST, height - _LOWERED), _HIGHEST)))
     if speed != 1.0:
         joints = _retimed(joints, speed)
+    first = min(round((start - low) / speed), len(joints) - _FRAMES)
     seated = bool(rests)
     if rng.random() < (0.4 if seated else 0.08):
-        joints = joints[::-1]
+        joints, first = joints[::-1], len(joints) - _FRAMES - first
     if rng.random() < 0.5:
         joints = mirrored(joints)
     path = root_from_joints(joints)
@@ -134,8 +147,7 @@ def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> 
         return None
     if rng.random() < 0.5:
         path = _animated_by_hand(rng, path)
-    first = round((start - low) / speed)
-    cut = slice(min(first, len(joints) - _FRAMES), min(first, len(joints) - _FRAMES) + _FRAMES)
+    cut = slice(first, first + _FRAMES)
     poses = to_root(path, joints)[cut].reshape(_FRAMES, -1)
     recent = RootPath(path.position[cut][HISTORY:], path.yaw[cut][HISTORY:])
     root = np.concatenate([recent.position[:, :2], recent.yaw[:, None]], axis=1)

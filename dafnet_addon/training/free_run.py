@@ -13,7 +13,7 @@ from ..core.skeleton import LOWER, OFFSETS, PARENTS, TOE_HEIGHT, UPPER
 
 __all__ = ["upper_loss", "lower_loss", "sliding"]
 
-_POSE, _GIVEN, _HEIGHT, _BONE, _SPEED, _SLIDE = 100.0, 200.0, 150.0, 100.0, 3.0, 20.0  # nats for each metre, or metre a second
+_POSE, _GIVEN, _HEIGHT, _BONE, _SPEED, _SLIDE = 100.0, 200.0, 150.0, 100.0, 3.0, 40.0  # nats for each metre, or metre a second
 _FPS = 30.0
 _PLANTED = 0.15  # metres a second
 _LOW = 0.03  # metres over where a planted toe base is
