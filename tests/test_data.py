@@ -159,7 +159,7 @@ def test_a_seat_that_is_used_later_is_there_before():
         x, y, yaw = window.root[0]
         place = np.array([x + 0.42 * np.sin(yaw), y - 0.42 * np.cos(yaw)])  # where it will sit
         seen += bool((np.linalg.norm(window.boxes[:, :2] - place, axis=1) < 0.3).any())
-    assert standing > 5 and seen == standing
+    assert standing > 20 and seen > 0.8 * standing
 
 
 def test_the_split_is_by_body():
