@@ -237,3 +237,10 @@ def test_targets_far_away_are_reached_for(weights):
 def test_a_crowded_room_is_told(weights):
     block = Box(center=np.array([0.0, 1.0, 1.0]), half_size=np.array([3.0, 3.0, 1.0]))
     _warned(Scene((block,)), _walk(), weights, "more than the sensor can tell")
+
+
+@pytest.mark.parametrize(("behind", "stands"), [(0.45, True), (0.0, False)])
+def test_who_starts_beside_a_seat_stands_and_who_starts_over_it_sits(weights, behind: float, stands: bool):
+    seat = Box(center=np.array([0.0, -behind, 0.225]), half_size=np.array([0.22, 0.22, 0.225]))
+    take = generate(Scene([seat]), Controls(30.0, np.tile(np.eye(4), (45, 1, 1))), weights)
+    assert (take.joints[0, 0, 2] > 0.86) == stands

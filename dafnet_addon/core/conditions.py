@@ -12,11 +12,12 @@ from .resampling import MODEL_FPS, covering_frames, frame_times, resample_neares
 from .root import RootPath, ahead, root_from_matrices, smoothed, to_root, velocities
 from .rotations import normalised
 from .sampler import Conditions
+from .sensor import SPHERES
 from .skeleton import END_EFFECTORS, MODEL_ORDER, UPPER
 from .solids import Box, Mesh, Scene
 from .take import MODES, Controls
 
-__all__ = ["Shot", "shot_steps", "PREROLL"]
+__all__ = ["Shot", "over_a_seat", "shot_steps", "PREROLL"]
 
 PREROLL = 70
 """Frames for which the root stands still before the first one, so that the model's memory has settled."""
@@ -26,6 +27,9 @@ _TILT, _SPRINT = np.radians(5.0), 10.5  # radians; metres a second
 _REACH_FROM, _REACH = np.array([0.0, 0.0, 1.0]), 1.25  # a sphere that holds every head and wrist of the training poses
 _STILL, _CROWDED = 0.02, 0.35
 _TRUNK = (0.95, 1.15, 1.35)
+_AROUND = 6  # spheres of the sensor's innermost ring
+_UNDER = (np.hypot(SPHERES[:, 0], SPHERES[:, 1]) < 0.2) & (SPHERES[:, 2] > 0.2) & (SPHERES[:, 2] < 0.9)
+_SOLID = 0.3
 
 
 @dataclass(frozen=True)
@@ -164,6 +168,12 @@ def _look_around(scene: Scene, path: RootPath, occupied: np.ndarray, warnings: l
         )
 
 
+def over_a_seat(occupancy: np.ndarray) -> bool:
+    """Whether a root that sees this (2640,) is over a seat or bed, not beside one: at a seat's height all around is solid."""
+    around = occupancy[_UNDER].reshape(-1, _AROUND)
+    return bool(((around > _SOLID).sum(axis=1) >= _AROUND - 1).any())
+
+
 def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]:
     """Everything that the model is told; yields progress in [0, 1], solid by solid. Raises InputError for bad controls."""
     _check(controls)
@@ -189,9 +199,11 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     def rolled(values: np.ndarray, before: np.ndarray) -> np.ndarray:
         return np.concatenate([np.repeat(before, PREROLL, axis=0), values])
 
+    # Before the first frame nothing but a seat under the root is there, so that who starts beside furniture starts standing.
+    before = occupied[:1] if over_a_seat(occupied[0]) else np.zeros_like(occupied[:1])
     whole = RootPath(rolled(path.position, path.position[:1]), rolled(path.yaw, path.yaw[:1]))
     conditions = Conditions(
-        velocities(whole), ahead(whole), rolled(occupied, occupied[:1]),
+        velocities(whole), ahead(whole), rolled(occupied, before),
         rolled(observation, observation[:1]), rolled(given, given[:1]),
     )
     return Shot(conditions, path, modes, tuple(warnings))
