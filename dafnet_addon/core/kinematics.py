@@ -17,7 +17,7 @@ from .rotations import (
     slerp,
     transpose,
 )
-from .skeleton import OFFSETS, PARENTS, joint
+from .skeleton import OFFSETS, PARENTS, UPPER, joint
 
 __all__ = ["forward_kinematics", "global_from_local", "local_from_global", "two_bone", "fit", "blend_switches"]
 
@@ -27,6 +27,8 @@ _PARENT, _FIRST, _MIDDLE, _END = [13, 14, 0, 0], [16, 17, 1, 2], [18, 19, 4, 5],
 _AXIS = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 0, -1], [0, 0, -1]])
 _BEND = np.array([[0.0, -1, 0], [0, -1, 0], [0, 1, 0], [0, 1, 0]])
 
+_ABOVE = list(UPPER[1:])
+_SETTLES = 4  # frames
 _CLEAR_BEND = 0.25  # a limb bent by this (radians) shows its plane about as clearly as its neighbours in time tell it
 _CARRY, _PULL = 4.0, 0.05  # weights of the neighbouring frames and of the parent's reference, against 1 at a clear bend
 
@@ -236,11 +238,16 @@ def blend_switches(
     with that difference added to it, which then fades by slerp over ``length`` frames with smoothstep((k + 1) / (length
     + 1)) at frame s + k. So the body keeps moving through the switch, where blending from a frozen pose would halt its
     stride. The pelvis' rotation and offset are eased in the frames of the root ``path``, which itself stays as it is.
+
+    The model takes some frames to follow new targets: in them the upper body already has the pose that it comes to, so that
+    all of the difference is eased.
     """
     local = matrix_from_quaternion(rotations)
     local[:, 0] = transpose(path.rotation) @ local[:, 0]
     offset = to_root(path, pelvis)
     for s in sorted({int(s) for s in switches if 0 < s < len(local)}):
+        settled = min(s + _SETTLES, len(local) - 1)
+        local[s:settled, _ABOVE] = local[settled, _ABOVE]
         stop = min(s + length, len(local))
         x = (np.arange(stop - s) + 1.0) / (length + 1.0)
         ease = x * x * (3.0 - 2.0 * x)
