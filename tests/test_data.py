@@ -176,6 +176,7 @@ def test_the_split_is_by_body():
 def test_a_dataset_is_made_and_gone_on_with(tmp_path):
     if not MOCAP.is_dir():
         pytest.skip(f"needs the motion capture at {MOCAP}")
+    pytest.importorskip("matplotlib", reason="previews are drawn with it")
     from dafnet_addon.data.prepare import load_pool, prepare
 
     folder, out = tmp_path / "mocap", tmp_path / "dataset"
@@ -199,6 +200,7 @@ def test_a_dataset_of_raw_files_needs_a_licence_and_a_held_out_body(tmp_path):
     raw = MOCAP / "raw_samples"
     if not raw.is_dir():
         pytest.skip(f"needs the motion capture at {raw}")
+    pytest.importorskip("matplotlib", reason="previews are drawn with it")
     from dafnet_addon.data.prepare import prepare
 
     folder, out = tmp_path / "mocap", tmp_path / "dataset"
