@@ -11,7 +11,7 @@ import numpy as np
 
 from .errors import InputError
 from .kinematics import two_bone
-from .rotations import normalised
+from .rotations import matrix_from_vector
 from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, TOE_HEIGHT, joint
 
 __all__ = ["CleanUp", "cleaned", "planted", "standing_still", "reaching"]
@@ -155,16 +155,6 @@ def _lowered(hips: np.ndarray, ankles: np.ndarray, held: np.ndarray) -> np.ndarr
     return np.convolve(wide, kernel / kernel.sum(), mode="valid")
 
 
-def _rotations(vectors: np.ndarray) -> np.ndarray:
-    """Rotation matrices (T, 3, 3) of rotation vectors (T, 3) (Rodrigues)."""
-    angle = np.linalg.norm(vectors, axis=-1)
-    axis = normalised(vectors)
-    k = np.zeros((len(vectors), 3, 3))
-    k[:, 0, 1], k[:, 0, 2], k[:, 1, 2] = -axis[:, 2], axis[:, 1], -axis[:, 0]
-    k -= np.swapaxes(k, 1, 2)
-    return np.eye(3) + np.sin(angle)[:, None, None] * k + (1.0 - np.cos(angle))[:, None, None] * (k @ k)
-
-
 def _limited(vectors: np.ndarray, most: float) -> np.ndarray:
     return vectors * np.minimum(1.0, most / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9))
 
@@ -233,7 +223,7 @@ def _bend(joints: np.ndarray, wants: list[tuple[int, np.ndarray]]) -> None:
     square = jacobian @ np.swapaxes(jacobian, 1, 2) + _DAMPING**2 * np.eye(moves.shape[1])
     turns = np.einsum("tmn,tm->tn", jacobian, np.linalg.solve(square, moves[..., None])[..., 0])
     for k, at in enumerate(turning):
-        turn = _rotations(_SUPPLE[at] * turns[:, 3 * k : 3 * k + 3])
+        turn = matrix_from_vector(_SUPPLE[at] * turns[:, 3 * k : 3 * k + 3])
         moving = [j for j in range(22) if _HANGS[j, at] and j != at]
         arms = joints[:, moving] - joints[:, at, None]
         joints[:, moving] = joints[:, at, None] + np.einsum("tij,tbj->tbi", turn, arms)

@@ -4,7 +4,7 @@ import numpy as np
 
 __all__ = [
     "normalised", "frame_from", "rotation_between", "rotate", "transpose", "yaw_matrix", "quaternion_from_matrix",
-    "matrix_from_quaternion", "continuous_signs", "slerp",
+    "matrix_from_quaternion", "matrix_from_vector", "continuous_signs", "slerp",
 ]
 
 
@@ -83,6 +83,15 @@ def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
         np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
         np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
     ], axis=-2)
+
+
+def matrix_from_vector(vectors: np.ndarray) -> np.ndarray:
+    """Rotations (…, 3, 3) of axis-angle vectors (…, 3), by Rodrigues' formula."""
+    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(normalised(vectors), -1, 0)
+    zero = np.zeros_like(x)
+    k = np.stack([np.stack(row, -1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))], -2)
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
 
 
 def continuous_signs(q: np.ndarray) -> np.ndarray:

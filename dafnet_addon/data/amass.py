@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.rotations import normalised
+from ..core.rotations import matrix_from_vector
 from ..core.skeleton import JOINTS, PARENTS, REST
 from .recording import Recording, posed
 
@@ -23,15 +23,6 @@ _REST = REST[:, [0, 2, 1]] * (-1, 1, 1) - (0, REST[0, 2], 0)  # SMPL at rest: x 
 def is_amass(names: list[str]) -> bool:
     """Whether an archive of these arrays is a motion as AMASS stores them."""
     return {"poses", "trans"} <= set(names)
-
-
-def _rotations(vectors: np.ndarray) -> np.ndarray:
-    """Rotations (…, 3, 3) of axis-angle vectors (…, 3), by Rodrigues' formula."""
-    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
-    x, y, z = np.moveaxis(normalised(vectors), -1, 0)
-    zero = np.zeros_like(x)
-    k = np.stack([np.stack(row, -1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))], -2)
-    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
 
 
 def read_amass(file: Path) -> Recording:
@@ -52,5 +43,5 @@ def read_amass(file: Path) -> Recording:
     offsets = np.repeat((_REST - _REST[list(PARENTS)])[None], len(poses), axis=0)
     # SMPL's own pelvis lies a constant below ``trans``; the floor is found later, so that the constant does not matter.
     offsets[:, 0] = way
-    local = _rotations(poses[:, :66].reshape(-1, 22, 3))
+    local = matrix_from_vector(poses[:, :66].reshape(-1, 22, 3))
     return Recording(JOINTS, PARENTS, posed(PARENTS, offsets, local), REST, rate)
