@@ -226,7 +226,8 @@ def _train(options: argparse.Namespace) -> None:
     from .core.weights import load_weights
     from .training import ranks
     from .training.export import export
-    from .training.train import account, read_config, train, trained
+    from .training.spread import take_spread
+    from .training.train import account, dataset_pool, read_config, train, trained
 
     model, config = read_config(options.config)
     if options.minutes is not None:
@@ -236,9 +237,10 @@ def _train(options: argparse.Namespace) -> None:
         train(options.dataset, options.output, model, config, bar, options.device, begin_with)
     if ranks.rank():
         return
-    file = options.output / "dafnet.safetensors"
+    file = options.output / f"{model.system}.safetensors"
     flow, predictor, statistics = trained(options.output)
-    export(file, flow, predictor, statistics, account(options.output, options.dataset))
+    spread = take_spread(flow, predictor, dataset_pool(options.dataset), statistics)
+    export(file, flow, predictor, statistics, account(options.output, options.dataset), spread)
     print(json.dumps({"weights": str(file)}) if options.json else f"Written to {file}")
 
 

@@ -56,7 +56,7 @@ def test_only_the_blender_side_imports_bpy(file: Path) -> None:
 
 @pytest.mark.parametrize(
     "file",
-    [f for f in sources("dafnet_addon", "operators", "panels") if f.parent.name not in ("model", "training")],
+    [f for f in sources("dafnet_addon", "operators", "panels") if f.parent.name not in ("model", "training", "baselines")],
     ids=lambda file: file.relative_to(ROOT).as_posix(),
 )
 def test_what_runs_inside_blender_needs_no_torch(file: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dafnet_addon.core.errors import InputError
-from dafnet_addon.core.generate import generate, noise_of
+from dafnet_addon.core.generate import generate
 from dafnet_addon.core.metrics import action_information, mutual_information
 from dafnet_addon.core.root import raw_root_from_joints
 from dafnet_addon.core.sampler import Sampler
@@ -150,8 +150,9 @@ def test_rows_keep_kinds_of_clips_apart():
 
 def test_takes_made_together_are_those_that_generate_makes():
     weights, clip = load_weights(), _clip(40)
-    noise = np.concatenate([noise_of(0, None, 0.0), noise_of(3, None, 1.0), noise_of(3, 5, 1.0)])
-    takes = e.made(Sampler(weights), e.shot_of(clip, "FREE"), noise)
+    sampler = Sampler(weights)
+    noise = np.concatenate([sampler.noise(0, temperature=0.0), sampler.noise(3), sampler.noise(3, 5)])
+    takes = e.made(sampler, e.shot_of(clip, "FREE"), noise)
     controls = Controls(fps=30.0, root=clip.path.matrices())
     for take, (seed, lower, temperature) in zip(takes, ((0, None, 0.0), (3, None, 1.0), (3, 5, 1.0)), strict=True):
         alone = generate(clip.scene, controls, weights, seed=seed, lower_seed=lower, temperature=temperature)

@@ -80,6 +80,57 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     assert np.abs(log_det - (det_upper + det_lower).numpy()).max() < 1e-8
 
 
+@pytest.mark.parametrize("system", ["ap-p", "moglow"])
+def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: Path):
+    torch = pytest.importorskip("torch")
+    from dafnet_addon.baselines.flows import MoGlowSampler, WholeBodySampler, WholeFlow
+    from dafnet_addon.core.weights import FORMAT, Weights
+    from dafnet_addon.model.config import ModelConfig
+    from dafnet_addon.model.predictor import ActionPredictor
+    from dafnet_addon.training.batches import Statistics, past_of
+    from dafnet_addon.training.export import tensors_of
+
+    torch.manual_seed(3)
+    config = ModelConfig(
+        system=system, predictor_code=8, predictor_width=16, width=12, code=8, mask=True, steps_whole=4,
+        shared_encoder=system == "moglow",
+    )
+    flow = WholeFlow(config).double()
+    predictor = ActionPredictor(config).double() if config.predicts else None
+    with torch.no_grad():
+        for p in [*flow.parameters(), *(predictor.parameters() if predictor else ())]:
+            p += 0.05 * torch.randn_like(p)
+    rng = np.random.default_rng(0)
+    statistics = Statistics(
+        rng.normal(size=66), rng.uniform(0.1, 0.3, 66), rng.normal(size=3) * 0.01, np.full(3, 0.02), np.zeros(18), np.ones(18)
+    )
+    tensors = tensors_of(flow, predictor, statistics)
+    description = {"model": config.as_dict(), "fps": 30, "offsets": OFFSETS.tolist()}
+    conditions, z = _conditions(30), rng.normal(size=(2, 66))
+    sampler = {"ap-p": WholeBodySampler, "moglow": MoGlowSampler}[system](
+        Weights(tensors, description, {"format": FORMAT}, tmp_path), dtype="float64"
+    )
+    made, actions = drained(sampler.run(conditions, z))
+    assert actions.shape == (30, 2, 10 if system == "ap-p" else 0)
+
+    # The same, by the model's own forward: poses must go back to the noise that they were made from.
+    poses = torch.from_numpy((model_order(made).transpose(1, 0, 2) - tensors["pose_mean"]) / tensors["pose_std"])
+    velocity = torch.from_numpy((conditions.velocity - tensors["velocity_mean"]) / tensors["velocity_std"])
+    velocity = torch.cat([velocity[:1].repeat(10, 1), velocity]).repeat(2, 1, 1)
+    past = past_of(torch.cat([torch.zeros(2, 10, 66, dtype=torch.float64), poses], 1), velocity, 10)
+    occupancy = torch.from_numpy(conditions.occupancy).repeat(2, 1, 1)
+    given = torch.from_numpy(conditions.given).repeat(2, 1, 1)
+    scaled = (conditions.observation - tensors["pose_mean"]) / tensors["pose_std"] * np.repeat(conditions.given, 3, -1)
+    observation = torch.from_numpy(scaled).repeat(2, 1, 1)
+    with torch.no_grad():
+        told = past if predictor is None else torch.cat([predictor(past, occupancy), velocity[:, 10:]], -1)
+        noise, log_det, _ = flow.whole(poses, flow.condition(told, observation, given), occupancy)
+    assert np.abs(noise.numpy() - z[:, None]).max() < 1e-8
+    sampler.start(conditions, takes=2)
+    taken = [sampler.absorb(t, sampler.standardised(made[t])) for t in range(30)]
+    assert np.abs(np.stack([d for _, _, d in taken], axis=1) - log_det.numpy()).max() < 1e-8
+
+
 @pytest.fixture(scope="module")
 def weights():
     return load_weights()

@@ -12,8 +12,11 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
+from dafnet_addon.baselines.flows import sampler_of  # noqa: E402
 from dafnet_addon.core.errors import InputError, WeightsError  # noqa: E402
+from dafnet_addon.core.progress import drained  # noqa: E402
 from dafnet_addon.core.root import RootPath  # noqa: E402
+from dafnet_addon.core.sampler import Conditions, Sampler  # noqa: E402
 from dafnet_addon.core.skeleton import MODEL_ORDER  # noqa: E402
 from dafnet_addon.core.weights import load_weights  # noqa: E402
 from dafnet_addon.data import boxes as boxes_module  # noqa: E402
@@ -27,6 +30,7 @@ from dafnet_addon.training.export import (  # noqa: E402
     export,
     tensors_of,
 )
+from dafnet_addon.training.spread import noise_along, take_spread  # noqa: E402
 from dafnet_addon.training.train import Run, TrainingConfig, read_config, train_part, trained  # noqa: E402
 
 TINY = ModelConfig(
@@ -322,3 +326,54 @@ def test_two_processes_train_one_model(dataset, tmp_path):
     assert len(lines) == len({(line["part"], line["step"]) for line in lines}), "one process keeps the run"
     assert {line["part"] for line in lines} == {"predictor", "upper", "lower"}
     assert load_weights(tmp_path / "run" / "dafnet.safetensors").config["model"]["width"] == 16
+
+
+@pytest.mark.parametrize("system", ["ap-p", "moglow"])
+def test_baselines_learn_and_their_weights_run(system: str, dataset: Path, tmp_path: Path):
+    model = replace(TINY, system=system, steps_whole=2)
+    folder = tmp_path / "run"
+    if model.predicts:
+        _until("predictor", dataset, folder, steps=2, model=model)
+    fresh = Run("whole", tmp_path / "fresh", model, _config(10), _pool(dataset).statistics())
+    before = _loss_at(fresh, dataset)
+    assert _loss_at(_until("whole", dataset, folder, steps=40, model=model), dataset) < before - 5.0
+    flow, predictor, statistics = trained(folder)
+    assert (predictor is None) == (system == "moglow")
+    spread = take_spread(flow, predictor, _pool(dataset), statistics, windows=300)
+    export(tmp_path / "w.safetensors", flow, predictor, statistics, {}, spread)
+    weights = load_weights(tmp_path / "w.safetensors")
+    sampler = sampler_of(weights)
+    nothing = {"velocity": 3, "ahead": 18, "occupancy": 2640, "observation": 66, "given": 22}
+    conditions = Conditions(**{name: np.zeros((20, size)) for name, size in nothing.items()})
+    made, _ = drained(sampler.run(conditions, sampler.noise(1)))
+    assert made.shape == (20, 1, 66) and np.isfinite(made).all()
+    with pytest.raises(WeightsError, match=f"'{system}'.*dafnet evaluate"):
+        Sampler(weights)
+
+
+def test_a_budget_in_steps_is_spent_by_steps(dataset: Path, tmp_path: Path):
+    model = replace(TINY, system="moglow", steps_whole=1)
+    run = train_part("whole", dataset, tmp_path, model, replace(_config(50), steps_flow=7))
+    assert run.step == 7 and Run.load("whole", tmp_path).step == 7
+
+
+def test_takes_are_drawn_from_what_lasts_of_the_noise_along_captured_motion(dataset: Path, tmp_path: Path):
+    run = Run("upper", tmp_path, TINY, _config(1), _pool(dataset).statistics())
+    pool, predictor = _pool(dataset), run.gmvae.predictor
+    spread = take_spread(run.flow, predictor, pool, run.statistics, windows=400)
+    batch = pool.batch(torch.arange(12), run.statistics, TINY)
+    for part, noise in noise_along(run.flow, predictor, batch).items():
+        lasting = noise[:, 20:].mean(1)
+        # The windows of the set, all drawn about as often: their second moment.
+        expected = (lasting.T @ lasting / 12).numpy()
+        assert np.abs(spread[part] @ spread[part].T - expected).max() < 0.25 * np.abs(expected).max()
+        assert (np.triu(spread[part], 1) == 0).all()
+    for part in ("predictor", "upper", "lower"):
+        _until(part, dataset, tmp_path / "run", steps=2)
+    flow, trained_predictor, statistics = trained(tmp_path / "run")
+    export(tmp_path / "w.safetensors", flow, trained_predictor, statistics, {}, {"lower": 3.0 * np.eye(24, dtype=np.float32)})
+    sampler = Sampler(load_weights(tmp_path / "w.safetensors"))
+    plain = np.random.default_rng([5, 0]).standard_normal(42)
+    assert np.allclose(sampler.noise(5)[0, :42], plain), "N(0, I) where the weights say nothing"
+    assert np.allclose(sampler.noise(5)[0, 42:], 3.0 * np.random.default_rng([5, 1]).standard_normal(24))
+    assert (sampler.noise(5, temperature=0.0) == 0).all()

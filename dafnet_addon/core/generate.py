@@ -26,21 +26,13 @@ from .solids import Scene
 from .take import Controls, Take
 from .weights import Weights
 
-__all__ = ["RAW", "generate", "generate_steps", "noise_of", "targets_of"]
+__all__ = ["RAW", "generate", "generate_steps", "targets_of"]
 
 RAW = CleanUp()
 """The model's own motion."""
-_UPPER_SIZE = 42
 _HOTTEST = 10.0
 _CONDITIONED, _SAMPLED = 0.1, 0.97
 """Progress when the conditions are known and when the poses are made."""
-
-
-def noise_of(seed: int, lower_seed: int | None, temperature: float) -> np.ndarray:
-    """The take's noise vector (1, 66), upper part first; each part has a seed of its own, so legs vary under one trunk."""
-    upper = np.random.default_rng([abs(seed), 0]).standard_normal(_UPPER_SIZE)
-    lower = np.random.default_rng([abs(seed if lower_seed is None else lower_seed), 1]).standard_normal(66 - _UPPER_SIZE)
-    return temperature * np.concatenate([upper, lower])[None]
 
 
 def _kept(resume: Take, frame: int, path: RootPath) -> np.ndarray:
@@ -95,10 +87,10 @@ def generate_steps(
 ) -> Generator[float, None, Take]:
     """Generate one take; yields progress in [0, 1] and returns the ``Take``.
 
-    ``temperature`` scales the take's noise; 0 is the pose at z = 0. ``lower_seed``: another seed for the legs. ``resume``: a
-    take whose motion before ``resume_frame`` (a frame of the controls) is kept, and gone on from. ``device``: None runs on
-    NumPy, else on that torch device. ``clean_up``: what is done to the joints after the model; nothing by default. Raises
-    InputError for what cannot be used, WeightsError for weights that do not fit.
+    ``temperature`` scales the take's noise; 0 is the pose at z = 0, 1 the spread of captured takes. ``lower_seed``: another
+    seed for the legs. ``resume``: a take whose motion before ``resume_frame`` (a frame of the controls) is kept, and gone on
+    from. ``device``: None runs on NumPy, else on that torch device. ``clean_up``: what is done to the joints after the model;
+    nothing by default. Raises InputError for what cannot be used, WeightsError for weights that do not fit.
     """
     if not 0 <= temperature <= _HOTTEST:
         raise InputError(f"The temperature is {temperature}; give 0 or a small positive number such as 0.8.")
@@ -107,7 +99,7 @@ def generate_steps(
     shot = yield from within(shot_steps(scene, controls), 0.0, _CONDITIONED)
     conditioned = perf_counter()
     sampler = Sampler(weights, device)
-    z = noise_of(seed, lower_seed, temperature)
+    z = sampler.noise(seed, lower_seed, temperature)
     kept = None
     if resume is not None and resume_frame > 0:
         kept = _kept(resume, resume_frame, shot.path)[:, None]

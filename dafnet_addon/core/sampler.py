@@ -25,9 +25,7 @@ _UPPER_SIZE, _LOWER_SIZE = 3 * len(UPPER), 3 * len(LOWER)
 _POSE_SIZE = _UPPER_SIZE + _LOWER_SIZE
 _ORDER = np.array([3 * j + k for j in MODEL_ORDER for k in range(3)])
 _INVERSE = np.argsort(_ORDER)
-_SIZES = (
-    "actions", "history", "predictor_code", "predictor_width", "steps_upper", "steps_lower", "width", "layers", "code",
-)
+_SIZES = ("actions", "history", "predictor_code", "predictor_width", "width", "layers", "code")
 _PASSING = 10  # frames in which a resumed take's noise becomes its own
 
 
@@ -64,13 +62,15 @@ def _unusable(weights: Weights, what: str) -> WeightsError:
     return WeightsError(f"The weights '{weights.path}' cannot be used: {what}; choose another file.")
 
 
-def _sizes(weights: Weights) -> dict[str, int]:
-    """The model's sizes by name, checked: positive, finite, of this skeleton and frame rate."""
+def _sizes(weights: Weights, systems: tuple[str, ...], names: tuple[str, ...]) -> dict[str, int]:
+    """The model's sizes by name, checked: positive, finite, of these systems, this skeleton and frame rate."""
     config: dict[str, Any] = weights.config
     model, fps, offsets = config.get("model"), config.get("fps"), config.get("offsets", [])
-    if not isinstance(model, dict) or not {"mask", "shared_encoder", *_SIZES} <= model.keys():
+    if not isinstance(model, dict) or not {"mask", "shared_encoder", *names} <= model.keys():
         raise _unusable(weights, "they do not say how their model is built")
-    sizes = {name: model[name] for name in _SIZES}
+    if model.get("system", "dafnet") not in systems:
+        raise _unusable(weights, f"they are of the system '{model['system']}', which only 'dafnet evaluate' runs")
+    sizes = {name: model[name] for name in names}
     if not all(isinstance(size, int) and 0 < size <= 65536 for size in sizes.values()):
         raise _unusable(weights, "a size of their model is no number from 1 to 65536")
     temperature = model.get("action_temperature")
@@ -136,8 +136,9 @@ class _Step:
 
 @dataclass
 class _Part:
-    """One part's flow steps, and its environment encoders: one for all steps, or one each."""
+    """One part's place in a pose, its flow steps, and its environment encoders: one for all steps, or one each."""
 
+    columns: slice
     encoders: list[tuple[tuple[Array, Array], tuple[Array, Array]]]
     steps: list[_Step]
 
@@ -150,6 +151,10 @@ class Sampler:
     wrong shape, or has a matrix that cannot be inverted.
     """
 
+    systems: tuple[str, ...] = ("dafnet",)
+    parts = {"upper": slice(0, _UPPER_SIZE), "lower": slice(_UPPER_SIZE, _POSE_SIZE)}
+    """The parts in the order of sampling, and their places in a pose."""
+
     def __init__(self, weights: Weights, device: str | None = None, dtype: str = "float32") -> None:
         self.weights, self.config = weights, weights.config.get("model", {})
         self.device, self.dtype = device, dtype
@@ -159,7 +164,7 @@ class Sampler:
             import torch
 
             self.xp = torch
-        c = _sizes(weights)
+        c = _sizes(weights, self.systems, (*_SIZES, *(f"steps_{name}" for name in self.parts)))
         self.mask, shared = bool(self.config["mask"]), bool(self.config["shared_encoder"])
         self.action_temperature = float(self.config["action_temperature"])
         self.actions, self.history, self.width = c["actions"], c["history"], c["width"]
@@ -175,6 +180,16 @@ class Sampler:
         if min(self.pose_std.min(), self.velocity_std.min(), self.ahead_std.min(initial=1.0)) < 1e-6:
             raise _unusable(weights, "its deviations are not positive")
 
+        self._spread = np.eye(_POSE_SIZE)
+        for name, columns in self.parts.items():
+            if f"{name}.spread" in weights.tensors:
+                size = columns.stop - columns.start
+                self._spread[columns, columns] = array(f"{name}.spread", size, size)
+        self._read_told(array, c)
+        self._parts = [self._part(array, name, columns, shared, c) for name, columns in self.parts.items()]
+
+    def _read_told(self, array: Any, c: dict[str, int]) -> None:
+        """What turns the scene feature s into what each coupling's net is told of it: here, the action predictor."""
         poses = self.history * _POSE_SIZE
         scene = poses + 3 * (self.history + 1)
         width, code = c["predictor_width"], c["predictor_code"]
@@ -184,9 +199,8 @@ class Sampler:
         self._predictor_known = self._to(first[:, poses:].T), self._to(array("predictor.layers.0.bias", width))
         self._predictor_second = self._linear(array, "predictor.layers.2", width, width)
         self._predictor_out = self._linear(array, "predictor.layers.4", width, self.actions)
-
-        self._upper = self._part(array, "upper", _UPPER_SIZE, c["steps_upper"], shared, c)
-        self._lower = self._part(array, "lower", _LOWER_SIZE, c["steps_lower"], shared, c)
+        self.fresh, self.moving = self.actions, 3 + self.ahead
+        """Numbers that the nets are told at each frame anew, and that they are told of the root's way."""
 
     def _to(self, a: np.ndarray) -> Array:
         if self.device is None:
@@ -199,19 +213,20 @@ class Sampler:
     def _linear(self, array: Any, name: str, inputs: int, outputs: int) -> tuple[Array, Array]:
         return self._to(array(f"{name}.weight", outputs, inputs).T), self._to(array(f"{name}.bias", outputs))
 
-    def _part(self, array: Any, part: str, size: int, steps: int, shared: bool, c: dict[str, int]) -> _Part:
+    def _part(self, array: Any, part: str, columns: slice, shared: bool, c: dict[str, int]) -> _Part:
+        steps = c[f"steps_{part}"]
         encoders = [
             (self._linear(array, f"{part}.encoders.{e}.first", 2640, c["code"]),
              self._linear(array, f"{part}.encoders.{e}.second", c["code"], c["code"]))
             for e in range(1 if shared else steps)
         ]
-        return _Part(encoders, [self._step(array, f"{part}.{k}", size, c) for k in range(steps)])
+        return _Part(columns, encoders, [self._step(array, f"{part}.{k}", columns, c) for k in range(steps)])
 
-    def _step(self, array: Any, name: str, size: int, c: dict[str, int]) -> _Step:
+    def _step(self, array: Any, name: str, columns: slice, c: dict[str, int]) -> _Step:
+        size = columns.stop - columns.start
         half, width = size // 2, c["width"]
         observed = _POSE_SIZE + (22 if self.mask else 0)
-        moving = 3 + c["ahead"]
-        condition = self.actions + moving + c["code"] + observed
+        condition = self.fresh + self.moving + c["code"] + observed
         bias, log_scale = array(f"{name}.bias", size), array(f"{name}.log_scale", size)
         weight = array(f"{name}.weight", size, size)
         if np.abs(log_scale).max() > 30 or np.linalg.cond(weight) > 1e8:
@@ -226,11 +241,9 @@ class Sampler:
             total = array(f"{name}.lstm.bias_ih_l{i}", 4 * width) + array(f"{name}.lstm.bias_hh_l{i}", 4 * width)
             if i == 0:
                 # Rows of the input: half a pose, actions, velocity and way ahead, observation (upper part first), mask, code.
-                fresh = [np.arange(half + self.actions)]
-                start = half + self.actions + moving
-                if size == _LOWER_SIZE:
-                    # The upper slots of the observation are the upper body just made: known only now.
-                    fresh.append(np.arange(start, start + _UPPER_SIZE))
+                start = half + self.fresh + self.moving
+                # The observation's slots of the parts made before are those parts: known only now.
+                fresh = [np.arange(half + self.fresh), np.arange(start, start + columns.start)]
                 rows = np.concatenate(fresh)
                 known = np.setdiff1d(np.arange(inputs), rows)
                 static = self._to(np.concatenate([into[known], total[None]]))
@@ -244,6 +257,14 @@ class Sampler:
             self._to(inverse.T / exponent), self._to(-bias), float(log_scale.sum() + np.linalg.slogdet(weight)[1]), half,
         )
 
+    def noise(self, seed: int, lower_seed: int | None = None, temperature: float = 1.0) -> np.ndarray:
+        """A take's noise vector (1, 66), upper part first, held constant; each part has a seed of its own, so legs vary under
+        one trunk. At temperature 1 takes differ as captured ones do, where the weights say how far those do.
+        """
+        seeds = (seed, 0, _UPPER_SIZE), (seed if lower_seed is None else lower_seed, 1, _LOWER_SIZE)
+        drawn = [np.random.default_rng([abs(s), part]).standard_normal(size) for s, part, size in seeds]
+        return temperature * (self._spread @ np.concatenate(drawn))[None]
+
     def standardised(self, poses: np.ndarray) -> np.ndarray:
         """Poses (…, 66) in SMPL order, metres, as the model holds them."""
         return (model_order(poses) - self.pose_mean) / self.pose_std
@@ -255,22 +276,18 @@ class Sampler:
         before = np.repeat(velocity[:1], self.history, axis=0)
         padded = np.concatenate([before, velocity])
         window = np.concatenate([padded[k : k + frames] for k in range(self.history + 1)], axis=1)
-        matrix, bias = self._predictor_environment
         occupancy = self._to(conditions.occupancy)
-        known, known_bias = self._predictor_known
-        self._predictor_ahead = xp.concatenate([self._to(window), occupancy @ matrix + bias], axis=-1) @ known + known_bias
+        way = (conditions.ahead[:, : self.ahead] - self.ahead_mean) / self.ahead_std
+        moving = self._told_ahead(window, np.concatenate([velocity, way], axis=1), occupancy)
 
         given = np.repeat(conditions.given, 3, axis=-1)
         observation = np.where(given > 0, (conditions.observation - self.pose_mean) / self.pose_std, 0.0)
-        mask = [conditions.given] if self.mask else []
-        joints = len(UPPER)
-        lower_mask = [np.concatenate([np.ones((frames, joints)), m[:, joints:]], axis=1) for m in mask]
-        seen_upper = self._to(np.concatenate([observation, *mask], axis=1))
-        seen_lower = self._to(np.concatenate([observation[:, _UPPER_SIZE:], *lower_mask], axis=1))
-        way = (conditions.ahead[:, : self.ahead] - self.ahead_mean) / self.ahead_std
-        moving, one = self._to(np.concatenate([velocity, way], axis=1)), self._to(np.ones((frames, 1)))
+        one = self._to(np.ones((frames, 1)))
         empty = self._to(np.zeros((takes, self.width)))
-        for part, seen in ((self._upper, seen_upper), (self._lower, seen_lower)):
+        for part in self._parts:
+            made = part.columns.start  # of the pose, by the parts before: given, and told at each frame
+            mask = [np.ones((frames, made // 3)), conditions.given[:, made // 3 :]] if self.mask else []
+            seen = self._to(np.concatenate([observation[:, made:], *mask], axis=1))
             codes = []
             for first, second in part.encoders:
                 hidden = occupancy @ first[0] + first[1]
@@ -281,7 +298,18 @@ class Sampler:
                 step.coupling.state = [(empty, empty) for _ in step.coupling.layers]
         self._past = self._to(np.zeros((takes, self.history * _POSE_SIZE)))
 
-    def _act(self, frame: int) -> Array:
+    def _told_ahead(self, window: np.ndarray, moving: np.ndarray, occupancy: Array) -> Array:
+        """What the nets are told of the root's way (T, n), all frames at once; brings in what ``_told`` needs.
+
+        ``window`` (T, 33): velocities up to now; ``moving`` (T, 3 [+ 18]): the last of them, and the way ahead.
+        """
+        matrix, bias = self._predictor_environment
+        known, known_bias = self._predictor_known
+        seen = self.xp.concatenate([self._to(window), occupancy @ matrix + bias], axis=-1)
+        self._predictor_ahead = seen @ known + known_bias
+        return self._to(moving)
+
+    def _told(self, frame: int) -> Array:
         """Action probabilities π (B, K) of a frame from the poses just made (paper, section 4.2)."""
         xp = self.xp
         x = self._past @ self._predictor_past + self._predictor_ahead[frame]
@@ -293,41 +321,44 @@ class Sampler:
     def _remember(self, pose: Array) -> None:
         self._past = self.xp.concatenate([self._past[:, _POSE_SIZE:], pose], axis=-1)
 
-    def frame(self, index: int, z_upper: Array, z_lower: Array) -> tuple[Array, Array]:
-        """Standardised pose (B, 66) and action probabilities (B, K) of the next frame: noise to pose, upper then lower."""
-        xp = self.xp
-        actions = self._act(index)
-        parts: list[Array] = []
-        for part, z in ((self._upper, z_upper), (self._lower, z_lower)):
-            for step in reversed(part.steps):
-                passed = z[:, : step.half]
-                shift, scale = step.coupling(index, xp.concatenate([passed, actions, *parts], axis=-1))
-                changed = z[:, step.half :] / scale - shift
-                z = xp.concatenate([passed, changed], axis=-1) @ step.inverse + step.inverse_offset
-            parts.append(z)
-        pose = xp.concatenate(parts, axis=-1)
-        self._remember(pose)
-        return pose, actions
-
-    def absorb(self, index: int, pose: Array, actions: Array | None = None) -> tuple[Array, Array, Array]:
-        """Noise (B, 66), action probabilities (B, K) and log-determinant (B,) of a kept frame: pose to noise.
-
-        This rebuilds the memory to go on from. ``actions`` stand in for the predictor's.
+    def frame(self, index: int, noise: Array) -> tuple[Array, Array]:
+        """Standardised pose (B, 66) of the next frame, part after part, from ``noise`` (B, 66); and what the nets were told,
+        action probabilities (B, K).
         """
         xp = self.xp
-        actions = self._act(index) if actions is None else actions
+        told = self._told(index)
+        made: list[Array] = []
+        for part in self._parts:
+            z = noise[:, part.columns]
+            for step in reversed(part.steps):
+                passed = z[:, : step.half]
+                shift, scale = step.coupling(index, xp.concatenate([passed, told, *made], axis=-1))
+                changed = z[:, step.half :] / scale - shift
+                z = xp.concatenate([passed, changed], axis=-1) @ step.inverse + step.inverse_offset
+            made.append(z)
+        pose = xp.concatenate(made, axis=-1)
+        self._remember(pose)
+        return pose, told
+
+    def absorb(self, index: int, pose: Array, told: Array | None = None) -> tuple[Array, Array, Array]:
+        """Noise (B, 66), action probabilities (B, K) and log-determinant (B,) of a kept frame: pose to noise.
+
+        This rebuilds the memory to go on from. ``told`` stand in for the predictor's probabilities.
+        """
+        xp = self.xp
+        told = self._told(index) if told is None else told
         noise, log_det = [], 0.0 * pose.sum(-1)
-        upper = pose[:, :_UPPER_SIZE]
-        for part, x, extra in ((self._upper, upper, []), (self._lower, pose[:, _UPPER_SIZE:], [upper])):
+        for part in self._parts:
+            x, before = pose[:, part.columns], pose[:, : part.columns.start]
             for step in part.steps:
                 x = x @ step.matrix + step.offset
                 passed = x[:, : step.half]
-                shift, scale = step.coupling(index, xp.concatenate([passed, actions, *extra], axis=-1))
+                shift, scale = step.coupling(index, xp.concatenate([passed, told, before], axis=-1))
                 x = xp.concatenate([passed, (x[:, step.half :] + shift) * scale], axis=-1)
                 log_det = log_det + xp.log(scale).sum(-1) + step.log_det
             noise.append(x)
         self._remember(pose)
-        return xp.concatenate(noise, axis=-1), actions, log_det
+        return xp.concatenate(noise, axis=-1), told, log_det
 
     def run(
         self, conditions: Conditions, z: np.ndarray, kept: np.ndarray | None = None
@@ -347,13 +378,13 @@ class Sampler:
             with one_thread():  # frame by frame: whoever drains this generator has the threads back in between
                 if t < first:
                     pose = known[t]
-                    last, action, _ = self.absorb(t, pose)
+                    last, told, _ = self.absorb(t, pose)
                 else:
                     share = min(1.0, (t - first + 1) / _PASSING)
                     now = last + (noise - last) * (share * share * (3.0 - 2.0 * share))
-                    pose, action = self.frame(t, now[:, :_UPPER_SIZE], now[:, _UPPER_SIZE:])
+                    pose, told = self.frame(t, now)
             poses.append(pose)
-            actions.append(action)
+            actions.append(told[:, : self.actions])
             yield (t + 1) / len(conditions)
         stacked = self._from(self.xp.stack(poses)).astype(np.float64)
         made = smpl_order(stacked * self.pose_std + self.pose_mean)

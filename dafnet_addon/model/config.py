@@ -11,20 +11,24 @@ POSE_SIZE, UPPER_SIZE, LOWER_SIZE, VELOCITY_SIZE, SENSOR_SIZE = 66, 42, 24, 3, 2
 class ModelConfig:
     """Sizes and switches.
 
-    ``actions``: K of the action predictor. ``predictor_code``, ``predictor_width``: its environment code and its layers.
-    ``latent``: the GMVAE's. ``steps_upper``, ``steps_lower``: flow steps of each part. ``width``, ``layers``: the coupling's
-    LSTM. ``code``: the flow's environment code. ``shared_encoder``: one environment encoder for all couplings of a part
-    (else one each). ``mask``: 22 values beside the observation say which joints are given. ``action_temperature``: softmax
-    temperature after training (paper, section 4.2). ``history``: past frames that the predictor sees.
-    ``ahead``: numbers that tell the flow where the root will be (``core.root.ahead``), or 0 as in the paper.
+    ``system``: "dafnet", the two-part flow; or what the paper compares it with, "ap-p" or "moglow" (``baselines.flows``), one
+    flow of ``steps_whole`` steps for the whole body. ``actions``: K of the action predictor. ``predictor_code``,
+    ``predictor_width``: its environment code and its layers. ``latent``: the GMVAE's. ``steps_upper``, ``steps_lower``: flow
+    steps of each part. ``width``, ``layers``: the coupling's LSTM. ``code``: the flow's environment code. ``shared_encoder``:
+    one environment encoder for all couplings of a part (else one each). ``mask``: 22 values beside the observation say which
+    joints are given. ``action_temperature``: softmax temperature after training (paper, section 4.2). ``history``: past frames
+    that the predictor (and MoGlow) sees. ``ahead``: numbers that tell the flow where the root will be (``core.root.ahead``),
+    or 0 as in the paper.
     """
 
+    system: str = "dafnet"
     actions: int = 10
     predictor_code: int = 512
     predictor_width: int = 512
     latent: int = 66
     steps_upper: int = 3
     steps_lower: int = 3
+    steps_whole: int = 6
     width: int = 512
     layers: int = 2
     code: int = 512
@@ -35,9 +39,20 @@ class ModelConfig:
     ahead: int = 0
 
     @property
+    def parts(self) -> tuple[str, ...]:
+        """The flow's parts, in the order of sampling."""
+        return ("upper", "lower") if self.system == "dafnet" else ("whole",)
+
+    @property
+    def predicts(self) -> bool:
+        """Whether the flow is told of actions by the predictor; MoGlow is told of past poses instead."""
+        return self.system != "moglow"
+
+    @property
     def condition_size(self) -> int:
-        """Action probabilities, root velocity (and way ahead), environment code, observation (and its mask)."""
-        return self.actions + VELOCITY_SIZE + self.ahead + self.code + POSE_SIZE + (22 if self.mask else 0)
+        """Action probabilities and root velocity (and way ahead), or all of s; environment code; observation (and its mask)."""
+        told = self.actions + VELOCITY_SIZE + self.ahead if self.predicts else self.scene_size
+        return told + self.code + POSE_SIZE + (22 if self.mask else 0)
 
     @property
     def scene_size(self) -> int:

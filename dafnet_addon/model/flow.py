@@ -237,6 +237,10 @@ class TwoPartFlow(nn.Module):
         self.upper = PartFlow(UPPER_SIZE, config.steps_upper, config)
         self.lower = PartFlow(LOWER_SIZE, config.steps_lower, config)
 
+    def parts(self) -> dict[str, PartFlow]:
+        """The flows by name, in the order of sampling."""
+        return {"upper": self.upper, "lower": self.lower}
+
     def upper_condition(self, base: Tensor, observation: Tensor, given: Tensor) -> Tensor:
         """What the upper part is told beside the environment (B, T, K + 3 + 66 [+ 22])."""
         return torch.cat([base, observation, given] if self.config.mask else [base, observation], dim=-1)

@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from ..baselines.flows import sampler_of
 from ..core.cleanup import CleanUp, cleaned
 from ..core.conditions import PREROLL, Shot, shot_steps
-from ..core.generate import noise_of, targets_of
+from ..core.generate import targets_of
 from ..core.kinematics import fit, forward_kinematics
 from ..core.metrics import (
     BAD_COLLISION_JOINTS,
@@ -149,14 +150,14 @@ def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
     return Figures(sums, seats)
 
 
-def _noise(seed: int, seeds: int, mode: str) -> tuple[np.ndarray, dict[str, list[int]]]:
+def _noise(sampler: Sampler, seed: int, seeds: int, mode: str) -> tuple[np.ndarray, dict[str, list[int]]]:
     """Noise vectors (S, 66), and which of them each run is of: calm; lively; in FREE one upper body over different legs."""
     lively = list(range(1, 1 + seeds))
-    noise = [noise_of(seed, None, 0.0), *(noise_of(seed + s, None, 1.0) for s in range(seeds))]
+    noise = [sampler.noise(seed, temperature=0.0), *(sampler.noise(seed + s) for s in range(seeds))]
     runs = {f"{mode.lower()}_t0": [0], f"{mode.lower()}_t1": lively}
     if mode == "FREE":
         runs["legs"] = [1, *range(1 + seeds, 2 * seeds)]
-        noise += [noise_of(seed, seed + s, 1.0) for s in range(1, seeds)]
+        noise += [sampler.noise(seed, seed + s) for s in range(1, seeds)]
     return np.concatenate(noise), runs
 
 
@@ -170,7 +171,7 @@ def beside(sampler: Sampler, clip: HeldClip, seed: int = 0, seeds: int = SEEDS) 
     shots["FULL"] = replace(shots["EE"], conditions=replace(full, occupancy=known.occupancy))
     runs = {"ground_truth": figures(clip, clip.joints[None])}
     for mode in MODES:
-        noise, takes_of = _noise(seed, seeds, mode)
+        noise, takes_of = _noise(sampler, seed, seeds, mode)
         takes = made(sampler, shots[mode], noise)
         runs |= {run: figures(clip, takes[chosen], mode) for run, chosen in takes_of.items()}
         calm = f"{mode.lower()}_t0"
@@ -183,7 +184,7 @@ _sampler: Sampler | None = None
 
 def _start(weights: Weights) -> None:
     global _sampler
-    _sampler = Sampler(weights)
+    _sampler = sampler_of(weights)
 
 
 def _call(task: Callable[..., Any], item: Any) -> Any:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from ..baselines.flows import WholeFlow
 from ..core.errors import WeightsError
 from ..core.skeleton import JOINTS, OFFSETS
 from ..core.weights import FORMAT, Weights, quantised, read_safetensors, write_safetensors
@@ -19,13 +20,14 @@ from .batches import NOISE, Statistics
 __all__ = ["tensors_of", "adopt_predictor", "adopt_part", "adopted_statistics", "export", "annotate"]
 
 
-def tensors_of(flow: TwoPartFlow, predictor: ActionPredictor, statistics: Statistics) -> dict[str, np.ndarray]:
+def tensors_of(
+    flow: TwoPartFlow | WholeFlow, predictor: ActionPredictor | None, statistics: Statistics
+) -> dict[str, np.ndarray]:
     """Every array that the sampler needs, by the names that it knows them by."""
     out: dict[str, np.ndarray] = {name: value.astype(np.float32) for name, value in asdict(statistics).items()}
-    for name, tensor in predictor.state_dict().items():
+    for name, tensor in predictor.state_dict().items() if predictor is not None else ():
         out[f"predictor.{name}"] = tensor.numpy()
-    for part_name in ("upper", "lower"):
-        part: PartFlow = getattr(flow, part_name)
+    for part_name, part in flow.parts().items():
         for name, tensor in part.encoders.state_dict().items():
             out[f"{part_name}.encoders.{name}"] = tensor.numpy()
         for k, (norm, linear, coupling) in enumerate(part.steps()):
@@ -85,9 +87,11 @@ def adopted_statistics(weights: Weights, found: Statistics) -> Statistics:
 
 
 def export(
-    file: Path, flow: TwoPartFlow, predictor: ActionPredictor, statistics: Statistics, words: Mapping[str, str]
+    file: Path, flow: TwoPartFlow | WholeFlow, predictor: ActionPredictor | None, statistics: Statistics,
+    words: Mapping[str, str], spread: Mapping[str, np.ndarray] | None = None,
 ) -> None:
-    """Write the weights file; ``words`` are its metadata (licence, provenance, metrics), texts or JSON texts.
+    """Write the weights file; ``words`` are its metadata (licence, provenance, metrics), texts or JSON texts; ``spread`` (see
+    ``take_spread``) what its takes' noise is drawn from, N(0, I) without it.
 
     Matrices of a thousand values or more are stored in 8 bits with a scale for each row, which changes no figure that was
     measured; what the flow inverts and what it standardises with stays single.
@@ -98,11 +102,12 @@ def export(
     }
     tensors = {}
     for name, array in tensors_of(flow, predictor, statistics).items():
-        inverted = name.count(".") == 2 and name.endswith(".weight") and name[:5] in ("upper", "lower")
+        inverted = name.count(".") == 2 and name.endswith(".weight") and name[:5] in ("upper", "lower", "whole")
         if array.ndim < 2 or array.size < 1000 or inverted:
             tensors[name] = array
         else:
             tensors[name], tensors[f"{name}.scale"] = quantised(array)
+    tensors |= {f"{part}.spread": matrix for part, matrix in (spread or {}).items()}
     write_safetensors(file, tensors, {"format": FORMAT, "config": json.dumps(description), **words})
 
 

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ..core.conditions import PREROLL, shot_steps
-from ..core.generate import noise_of
 from ..core.metrics import (
     BAD_COLLISION_JOINTS,
     Seat,
@@ -123,7 +122,7 @@ def _walk(sampler: Sampler, room: Room, seeds: int) -> np.ndarray:
     """Takes (1 + seeds, T, 22, 3) in a room: temperature 0 first, then 1."""
     controls = Controls(fps=30.0, root=room.walked.path.matrices())
     shot = drained(shot_steps(scene_of(room.boxes), controls))
-    return made(sampler, shot, np.concatenate([noise_of(0, None, 0.0), *(noise_of(s, None, 1.0) for s in range(seeds))]))
+    return made(sampler, shot, np.concatenate([sampler.noise(0, temperature=0.0), *(sampler.noise(s) for s in range(seeds))]))
 
 
 def _round(room: Room, takes: np.ndarray, first: int, last: int) -> Figures:
@@ -462,4 +461,4 @@ def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) ->
 
 
 def _calm(sampler: Sampler, clip: HeldClip) -> np.ndarray:
-    return made(sampler, shot_of(clip, "FREE"), noise_of(0, None, 0.0))[0]
+    return made(sampler, shot_of(clip, "FREE"), sampler.noise(0, temperature=0.0))[0]

@@ -20,6 +20,7 @@ from typing import Any
 import torch
 from torch import nn
 
+from ..baselines.flows import WholeFlow
 from ..core.errors import InputError
 from ..core.weights import Weights
 from ..model.config import LOWER_SIZE, PAPER, POSE_SIZE, SMALL, UPPER_SIZE, ModelConfig
@@ -30,23 +31,24 @@ from .batches import Batch, Pool, Statistics, observation_for
 from .export import adopt_part, adopt_predictor, adopted_statistics
 from .free_run import lower_loss, upper_loss
 
-__all__ = ["TrainingConfig", "read_config", "Run", "account", "train", "train_part", "trained"]
+__all__ = ["TrainingConfig", "read_config", "Run", "account", "dataset_pool", "train", "train_part", "trained"]
 
 
 @dataclass(frozen=True)
 class TrainingConfig:
-    """``minutes_predictor``, ``minutes_flow``: time budgets. Learning rates rise over ``warmup`` steps to ``peak`` and fall
-    along a cosine to ``final``. ``slot_dropout``: share of past-pose slots hidden from the predictor while it learns.
-    ``environment_dropout``: share of sensor values hidden from both, in a share ``dropout_windows`` of the windows (the paper
-    hides them in all; then only whole layers of spheres are told apart, and seats are met to 12 cm). ``clip_norm``: largest
-    gradient norm. ``free_run``: weight of the losses of motion that the flow makes by itself (see ``free_run``; 0 as in the
-    paper), which begins after ``captured`` frames of a window, in a share ``cold`` of the batches after the first, with an
-    empty memory, as a take begins; ``calm`` of the windows make it from z = 0. ``mixed``: LSTMs and environment encoders
-    compute in bfloat16.
+    """``minutes_predictor``, ``minutes_flow``: time budgets; ``steps_flow``, where not 0, is the flow's instead. Learning rates
+    rise over ``warmup`` steps to ``peak`` and fall along a cosine to ``final``. ``slot_dropout``: share of past-pose slots
+    hidden from the predictor while it learns, and of past poses hidden from MoGlow. ``environment_dropout``: share of sensor
+    values hidden from all, in a share ``dropout_windows`` of the windows (the paper hides them in all; then only whole layers
+    of spheres are told apart, and seats are met to 12 cm). ``clip_norm``: largest gradient norm. ``free_run``: weight of the
+    losses of motion that the flow makes by itself (see ``free_run``; 0 as in the paper), which begins after ``captured``
+    frames of a window, in a share ``cold`` of the batches after the first, with an empty memory, as a take begins; ``calm`` of
+    the windows make it from z = 0. ``mixed``: LSTMs and environment encoders compute in bfloat16.
     """
 
     minutes_predictor: float = 5.0
     minutes_flow: float = 60.0
+    steps_flow: int = 0
     batch: int = 50
     warmup: int = 150
     peak: float = 2e-3
@@ -81,7 +83,7 @@ def read_config(file: Path) -> tuple[ModelConfig, TrainingConfig]:
 
 
 class Run:
-    """One network in training: 'predictor' (within its GMVAE), or the flow's 'upper' or 'lower' part.
+    """One network in training: 'predictor' (within its GMVAE), the flow's 'upper' or 'lower' part, or a baseline's 'whole'.
 
     The likelihood is a sum of the two parts', and the lower is trained under the true upper body: given the predictor they
     have nothing in common, and are trained as two runs, side by side where there are two cores.
@@ -94,11 +96,12 @@ class Run:
         torch.manual_seed(config.seed)
         self.part, self.folder, self.model, self.config, self.statistics = part, folder, model, config, statistics
         self.device = torch.device(device)
-        self.gmvae, self.flow = GMVAE(model).to(self.device), TwoPartFlow(model).to(self.device)
+        self.gmvae = GMVAE(model).to(self.device)
+        self.flow: TwoPartFlow | WholeFlow = (TwoPartFlow if model.system == "dafnet" else WholeFlow)(model).to(self.device)
         for module in self.flow.modules():
             if isinstance(module, Coupling | EnvironmentEncoder):
                 module.mixed = config.mixed
-        self.network: nn.Module = self.gmvae if part == "predictor" else getattr(self.flow, part)
+        self.network: nn.Module = self.gmvae if part == "predictor" else self.flow.parts()[part]
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=config.peak)
         self.step, self.seconds = 0, 0.0
         self.adopted = ""
@@ -109,7 +112,7 @@ class Run:
         if self.part == "predictor":
             adopt_predictor(self.gmvae.predictor, weights)
         else:
-            adopt_part(getattr(self.flow, self.part), self.part, weights, self.model)
+            adopt_part(self.flow.parts()[self.part], self.part, weights, self.model)
         self.adopted = weights.metadata.get("training", "not said")
 
     @property
@@ -120,6 +123,8 @@ class Run:
     @property
     def share(self) -> float:
         """Share of the budget that is spent."""
+        if self.part != "predictor" and self.config.steps_flow:
+            return min(1.0, self.step / self.config.steps_flow)
         return min(1.0, self.seconds / max(self.budget, 1e-9))
 
     def save(self) -> None:
@@ -168,23 +173,36 @@ class Run:
             seen[:, :poses] *= torch.rand(len(past), poses, device=self.device) >= self.config.slot_dropout
             return self.gmvae.losses(past, seen, self.hidden(occupancy), gumbel_temperature(self.share)).total
         occupancy = self.hidden(batch.occupancy)
-        with torch.no_grad():
-            actions = self.gmvae.predictor(batch.past, occupancy)
         observation, given = observation_for(batch.upper)
-        base = torch.cat([actions, batch.root], dim=-1)
-        if self.part == "upper":
-            x, part, condition = batch.upper, self.flow.upper, self.flow.upper_condition(base, observation, given)
-        else:
-            x, part = batch.lower, self.flow.lower
-            condition = self.flow.lower_condition(base, observation, given, batch.upper)
+        x, condition = self._told(batch, occupancy, observation, given)
+        part = self.flow.parts()[self.part]
         if initialise or not self.config.free_run:
             return -part.log_likelihood(x, condition, occupancy, initialise).mean()
         kept = 1 if float(torch.rand(())) < self.config.cold else self.config.captured
         calm = torch.rand(len(x), device=self.device) < self.config.calm
         z = torch.randn(len(x), x.shape[-1], device=self.device) * ~calm[:, None]
         density, made = part.run_on(x, condition, occupancy, z, kept)
-        own = self._free_run(made, x[:, kept:], calm, batch, given, kept)
-        return -density.mean() + self.config.free_run * own
+        led = self._free_run(made, x[:, kept:], calm, batch, given, kept)
+        return -density.mean() + self.config.free_run * led
+
+    def _told(
+        self, batch: Batch, occupancy: torch.Tensor, observation: torch.Tensor, given: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """The part's poses (B, T, …), and what its flow is told of them beside the environment."""
+        if isinstance(self.flow, WholeFlow) and not self.model.predicts:
+            # MoGlow's data dropout: whole past poses are hidden, so that it heeds what it is told.
+            past = batch.past.clone()
+            poses = past[..., : self.model.history * POSE_SIZE].unflatten(-1, (-1, POSE_SIZE))
+            poses *= torch.rand(*poses.shape[:-1], 1, device=self.device) >= self.config.slot_dropout
+            return torch.cat([batch.upper, batch.lower], dim=-1), self.flow.condition(past, observation, given)
+        with torch.no_grad():
+            actions = self.gmvae.predictor(batch.past, occupancy)
+        base = torch.cat([actions, batch.root], dim=-1)
+        if isinstance(self.flow, WholeFlow):
+            return torch.cat([batch.upper, batch.lower], dim=-1), self.flow.condition(base, observation, given)
+        if self.part == "upper":
+            return batch.upper, self.flow.upper_condition(base, observation, given)
+        return batch.lower, self.flow.lower_condition(base, observation, given, batch.upper)
 
     def _free_run(
         self, made: torch.Tensor, true: torch.Tensor, calm: torch.Tensor, batch: Batch, given: torch.Tensor, kept: int
@@ -197,12 +215,16 @@ class Run:
             # An unlearnt flow's inverse may be anywhere; such poses teach nothing.
             return (values.clamp(-20.0, 20.0) * std[which] + mean[which]).unflatten(-1, (-1, 3))
 
-        if self.part == "upper":
-            upper = slice(0, UPPER_SIZE)
-            return upper_loss(metres(made, upper), metres(true, upper), calm, given[:, kept:, :joints])
-        lower = slice(UPPER_SIZE, UPPER_SIZE + LOWER_SIZE)
-        pelvis = metres(batch.upper[:, kept:, :3], slice(0, 3))[..., 0, :]
-        return lower_loss(metres(made, lower), metres(true, lower), calm, pelvis, batch.step[:, kept:])
+        loss = made.new_zeros(())
+        upper, lower = slice(0, UPPER_SIZE), slice(UPPER_SIZE, UPPER_SIZE + LOWER_SIZE)
+        if self.part != "lower":
+            own = metres(made[..., upper], upper), metres(true[..., upper], upper)
+            loss = loss + upper_loss(*own, calm, given[:, kept:, :joints])
+        if self.part != "upper":
+            legs = (..., slice(-LOWER_SIZE, None))
+            pelvis = metres(batch.upper[:, kept:, :3], slice(0, 3))[..., 0, :]
+            loss = loss + lower_loss(metres(made[legs], lower), metres(true[legs], lower), calm, pelvis, batch.step[:, kept:])
+        return loss
 
     @torch.no_grad()
     def held_loss(self, held: Pool, windows: int = 50) -> float:
@@ -229,6 +251,14 @@ def _set_generators(states: dict[str, torch.Tensor], device: torch.device) -> No
         torch.cuda.set_rng_state(states["cuda"], device)
 
 
+def dataset_pool(dataset: Path, device: str = "cpu") -> Pool:
+    """The training windows of a dataset. Raises InputError where there are none."""
+    pool = Pool(lambda: sorted(Path(dataset).glob("pool-????.npz")), torch.device(device))
+    if not len(pool):
+        raise InputError(f"The dataset '{dataset}' holds no windows; make it with 'dafnet prepare'.")
+    return pool
+
+
 def train_part(
     part: str, dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig, threads: int | None = None,
     progress: Callable[[str, float, float], None] = lambda part, share, loss: None, device: str = "cpu",
@@ -245,16 +275,14 @@ def train_part(
         torch.set_num_threads(threads)
     device = ranks.device_of(device)
     torch.backends.cuda.matmul.allow_tf32 = True
-    pool = Pool(lambda: sorted(Path(dataset).glob("pool-????.npz")), torch.device(device))
-    if not len(pool):
-        raise InputError(f"The dataset '{dataset}' holds no windows; make it with 'dafnet prepare'.")
+    pool = dataset_pool(dataset, device)
     held = Pool(lambda: [Path(dataset) / "held.npz"], torch.device(device))
-    predictor = None if part == "predictor" else Run.load("predictor", folder, device=device)
+    predictor = None if part == "predictor" or not model.predicts else Run.load("predictor", folder, device=device)
     if (folder / f"{part}.pt").exists():
         run = Run.load(part, folder, config, device)
     else:
         # All parts are standardised alike, whatever shards there were when each began.
-        statistics = pool.statistics() if predictor is None else predictor.statistics
+        statistics = predictor.statistics if predictor is not None else pool.statistics()
         if begin_with is not None:
             statistics = adopted_statistics(begin_with, statistics)
         run = Run(part, folder, model, config, statistics, device)
@@ -269,8 +297,10 @@ def train_part(
         run.gmvae.requires_grad_(False)
     recent: list[torch.Tensor] = []
     writer = SummaryWriter(str(folder / "tensorboard" / part)) if ranks.rank() == 0 else None
+    # A processor's budget is its own time, so that whatever else it does takes nothing from the training.
+    clock = time.monotonic if run.device.type != "cpu" else lambda: time.process_time() / torch.get_num_threads()
     while run.share < 1.0:
-        begin = time.monotonic()
+        begin = clock()
         rows = torch.randint(len(pool), (config.batch,))
         for group in run.optimiser.param_groups:
             group["lr"] = run.rate()
@@ -286,7 +316,7 @@ def train_part(
         run.step += 1
         if run.step % config.save_every == 0:
             torch.stack(recent).mean().item()  # what a device still has to do is counted too
-        run.seconds = ranks.mean(run.seconds + time.monotonic() - begin, run.device)
+        run.seconds = ranks.mean(run.seconds + clock() - begin, run.device)
         if run.step % config.save_every == 0 or run.share >= 1.0:
             mean = ranks.mean(float(torch.stack(recent).mean()), run.device)
             if not math.isfinite(mean):
@@ -321,41 +351,52 @@ def train(
     whole = max(config.minutes_predictor + config.minutes_flow, 1e-9)
     first = config.minutes_predictor / whole
     report = lambda part, share, loss: progress(first * share)  # noqa: E731
-    train_part("predictor", dataset, folder, model, config, progress=report, device=device, begin_with=begin_with)
+    if model.predicts:
+        train_part("predictor", dataset, folder, model, config, progress=report, device=device, begin_with=begin_with)
     if ranks.joined():
-        for part in ("upper", "lower"):
+        for part in model.parts:
             train_part(part, dataset, folder, model, config, device=device, begin_with=begin_with)
         return
-    threads = max(1, (os.cpu_count() or 2) // 2)
-    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+    threads = max(1, (os.cpu_count() or 2) // len(model.parts))
+    with ProcessPoolExecutor(len(model.parts), mp_context=multiprocessing.get_context("spawn")) as pool:
         begin = time.monotonic()
         parts = [
             pool.submit(train_part, part, dataset, folder, model, config, threads, device=device, begin_with=begin_with)
-            for part in ("upper", "lower")
+            for part in model.parts
         ]
         while wait(parts, timeout=2.0).not_done:
-            spent = (time.monotonic() - begin) / max(60.0 * config.minutes_flow, 1e-9)
+            spent = 0.0 if config.steps_flow else (time.monotonic() - begin) / max(60.0 * config.minutes_flow, 1e-9)
             progress(first + (1.0 - first) * min(1.0, spent))
         for done in parts:
             done.result()
 
 
-def trained(folder: Path) -> tuple[TwoPartFlow, ActionPredictor, Statistics]:
-    """The flow, predictor and statistics of a run's latest checkpoints."""
-    runs = {part: Run.load(part, folder) for part in ("predictor", "upper", "lower")}
-    flow = runs["upper"].flow
-    flow.lower = runs["lower"].flow.lower
-    return flow, runs["predictor"].gmvae.predictor, runs["predictor"].statistics
+def trained(folder: Path) -> tuple[TwoPartFlow | WholeFlow, ActionPredictor | None, Statistics]:
+    """The flow, the predictor (of MoGlow none) and the statistics of a run's latest checkpoints."""
+    runs = _checkpoints(folder)
+    flow = next(run.flow for part, run in runs.items() if part != "predictor")
+    for part, run in runs.items():
+        if part != "predictor":
+            setattr(flow, part, run.network)
+    predictor = runs["predictor"].gmvae.predictor if "predictor" in runs else None
+    return flow, predictor, next(iter(runs.values())).statistics
+
+
+def _checkpoints(folder: Path) -> dict[str, Run]:
+    """The latest checkpoints of a run's folder, the predictor's first."""
+    parts = ("predictor", "upper", "lower", "whole")
+    return {part: Run.load(part, folder) for part in parts if (folder / f"{part}.pt").exists()}
 
 
 def account(folder: Path, dataset: Path) -> dict[str, str]:
     """What a weights file says of its making, as metadata: licence, data, and training."""
-    runs = {part: Run.load(part, folder) for part in ("predictor", "upper", "lower")}
+    runs = _checkpoints(folder)
     training: dict[str, Any] = {part: {"steps": run.step, "minutes": round(run.seconds / 60, 1)} for part, run in runs.items()}
-    if begun_with := runs["upper"].adopted:
-        training["begun_with"] = begun_with
+    last = list(runs.values())[-1]
+    if last.adopted:
+        training["begun_with"] = last.adopted
     return {
         "licence": "CC-BY-4.0; provenance in LICENSE-WEIGHTS.md",
         "data": (dataset / "dataset.json").read_text(),
-        "training": json.dumps({**training, "settings": asdict(runs["upper"].config)}),
+        "training": json.dumps({**training, "settings": asdict(last.config)}),
     }

@@ -1,0 +1,54 @@
+"""How real takes differ from one another in the flow's noise: what a take's one noise vector is drawn from.
+
+The flow's noise is standard normal frame by frame, but a take holds one vector for all its frames. Along captured motion most
+of the noise comes and goes within a second; what lasts is about half as large. A vector of unit deviation that lasts is a body
+that nobody moves like, so takes draw theirs from the spread of the noise's mean over a captured window: temperature 1 is then
+how far real takes differ. The paper's draw from N(0, I) is temperature 1 of weights that hold no spread.
+"""
+
+import numpy as np
+import torch
+
+from ..baselines.flows import WholeFlow
+from ..model.config import POSE_SIZE
+from ..model.flow import TwoPartFlow
+from ..model.predictor import ActionPredictor
+from .batches import Batch, Pool, Statistics
+
+__all__ = ["noise_along", "take_spread"]
+
+_SETTLED = 20  # frames in which the memory fills
+_AT_ONCE = 50
+
+
+@torch.no_grad()
+def noise_along(flow: TwoPartFlow | WholeFlow, predictor: ActionPredictor | None, batch: Batch) -> dict[str, torch.Tensor]:
+    """Noise of each part (B, T, …) along captured windows in FREE mode, the lower body under the captured upper one."""
+    observation = torch.zeros(*batch.upper.shape[:2], POSE_SIZE, device=batch.upper.device)
+    given = observation[..., :22]
+    told = batch.past
+    if predictor is not None:
+        told = torch.cat([predictor(batch.past, batch.occupancy), batch.root], dim=-1)
+    if isinstance(flow, WholeFlow):
+        pose = torch.cat([batch.upper, batch.lower], dim=-1)
+        return {"whole": flow.whole(pose, flow.condition(told, observation, given), batch.occupancy)[0]}
+    upper, lower, _, _ = flow(batch.upper, batch.lower, told, batch.occupancy, observation, given)
+    return {"upper": upper, "lower": lower}
+
+
+def take_spread(
+    flow: TwoPartFlow | WholeFlow, predictor: ActionPredictor | None, pool: Pool, statistics: Statistics, windows: int = 2000
+) -> dict[str, np.ndarray]:
+    """By part, the lower triangular matrix L (n, n) of which a take's noise is L e with e from N(0, I)."""
+    generator = torch.Generator().manual_seed(0)
+    rows = torch.randint(len(pool), (windows,), generator=generator)
+    means: dict[str, list[torch.Tensor]] = {}
+    for some in rows.split(_AT_ONCE):
+        batch = pool.batch(some, statistics, flow.config)
+        for part, noise in noise_along(flow, predictor, batch).items():
+            means.setdefault(part, []).append(noise[:, _SETTLED:].mean(1))
+    out = {}
+    for part, found in means.items():
+        mean = torch.cat(found).double()
+        out[part] = torch.linalg.cholesky(mean.T @ mean / len(mean)).float().cpu().numpy()
+    return out
