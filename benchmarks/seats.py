@@ -18,7 +18,7 @@ from dafnet_addon.core.weights import Weights
 Noise = Sequence[tuple[float, int]]
 
 HEIGHTS: list[float] = np.linspace(0.35, 0.65, 10).tolist()
-NOISE: Noise = [(0.0, 0)] + [(0.8, seed) for seed in range(1, 6)]
+NOISE: Noise = [(0.0, 0)] + [(1.0, seed) for seed in range(1, 6)]
 """Temperature and seed of every take of a situation."""
 TOLERANCE = 0.08
 _SEAT = Stop((0.0, 0.0), 0.0, 3.0, seated=True, name="seat")

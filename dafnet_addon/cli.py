@@ -66,7 +66,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
 
     def sampling(added: argparse.ArgumentParser, temperature: float | None) -> None:
         added.add_argument("--seed", type=int, default=None if temperature is None else 0, help="seed of the noise")
-        added.add_argument("--temperature", type=float, default=temperature, help="0 is the calm take, 0.8 lively ones")
+        added.add_argument("--temperature", type=float, default=temperature, help="0 is the calm take, 1 as lively as real")
         added.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
 
     demo = command("demo", _demo, "build the example room, generate, bake, render a preview and report")
@@ -108,11 +108,12 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     evaluate = command("evaluate", _evaluate, "measure weights on held-out clips, beside the clips themselves")
     evaluate.add_argument("folder", type=Path, metavar="FOLDER", help="holds the motion files")
     evaluate.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
+    evaluate.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="write evaluation.json, .md and .png there")
     evaluate.add_argument("--save", action="store_true", help="write the figures into the weights' metadata")
     evaluate.add_argument("--sheets", type=Path, metavar="FOLDER", help="also draw twenty clips, real beside generated")
 
-    bench = command("bench", _bench, "measure: 'seats' sits on ten heights from three sides")
-    bench.add_argument("name", choices=["seats"])
+    bench = command("bench", _bench, "measure: 'seats' sits on ten heights from three sides; 'speed' times every system")
+    bench.add_argument("name", choices=["seats", "speed"])
     bench.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
     return parser
 
@@ -249,6 +250,7 @@ def _evaluate(options: argparse.Namespace) -> None:
     from .core.weights import load_weights
     from .data.held_out import held_out
     from .training.export import annotate
+    from .training.plots import plot
     from .training.report import contact_sheets, report, text
 
     weights, clips = load_weights(options.weights), held_out(options.folder)
@@ -257,6 +259,11 @@ def _evaluate(options: argparse.Namespace) -> None:
     if options.save:
         rows = found["rows"]
         annotate(weights.path, {"ground_truth": json.dumps(rows["ground_truth"]), "held_out": json.dumps(rows)})
+    if options.output:
+        options.output.mkdir(parents=True, exist_ok=True)
+        (options.output / "evaluation.json").write_text(json.dumps(found, indent=2))
+        (options.output / "evaluation.md").write_text(text(found) + "\n")
+        plot(found, options.output / "evaluation.png")
     if options.sheets:
         contact_sheets(weights, clips, options.sheets)
     print(json.dumps(found, indent=2) if options.json else text(found))

@@ -110,7 +110,7 @@ def test_several_takes_are_kept_and_the_first_one_plays(
     assert addon("dafnet_addon.cli").main(arguments) == 0
     takes = json.loads(capfd.readouterr().out)["takes"]
     made = [(take["seed"], take["temperature"], take["frames"]) for take in takes]
-    assert made == [(5, 0.0, 7), (6, 0.8, 7), (7, 0.8, 7)]
+    assert made == [(5, 0.0, 7), (6, 1.0, 7), (7, 1.0, 7)]
     blender.ops.wm.open_mainfile(filepath=str(out))
     armature = next(ob for ob in blender.context.scene.objects if ob.type == "ARMATURE")
     assert armature.animation_data.action.name == takes[0]["action"]

@@ -20,7 +20,6 @@ from dafnet_addon.core.sampler import Conditions, Sampler  # noqa: E402
 from dafnet_addon.core.skeleton import MODEL_ORDER  # noqa: E402
 from dafnet_addon.core.weights import load_weights  # noqa: E402
 from dafnet_addon.data import boxes as boxes_module  # noqa: E402
-from dafnet_addon.data.prepare import POSE_UNIT  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training.batches import Pool, Statistics, observation_for, occupancy_of, past_of  # noqa: E402
 from dafnet_addon.training.export import (  # noqa: E402
@@ -36,27 +35,6 @@ from dafnet_addon.training.train import Run, TrainingConfig, read_config, train_
 TINY = ModelConfig(
     predictor_code=8, predictor_width=16, width=16, code=8, shared_encoder=True, mask=True, steps_upper=1, steps_lower=1
 )
-
-
-@pytest.fixture
-def dataset(tmp_path: Path) -> Path:
-    """A small set of swaying bodies, each window at a height of its own that the sensor shows."""
-    rng, windows = np.random.default_rng(0), 12
-    sway = np.sin(np.linspace(0, 6, 80))[None, :, None] * rng.uniform(0.05, 0.2, (windows, 1, 66))
-    poses = rng.uniform(-1.0, 1.0, size=66) + sway
-    rows = rng.uniform((-1, -1, 0.1, 0.1, 0.1, 0.1, -3), (1, 1, 0.6, 0.5, 0.5, 0.5, 3), (windows, boxes_module.MOST, 7))
-    rows[:, 3:] = boxes_module.ABSENT
-    pool = {
-        "poses": np.round(poses / POSE_UNIT).astype(np.int16), "velocity": rng.normal(scale=0.01, size=(windows, 80, 3)),
-        "ahead": rng.normal(size=(windows, 70, 18)), "root": rng.normal(scale=0.1, size=(windows, 70, 3)), "boxes": rows,
-    }
-    pool = {name: a if a.dtype == np.int16 else a.astype(np.float32) for name, a in pool.items()}
-    pool["kinds"] = np.array(["walk"] * windows)
-    folder = tmp_path / "dataset"
-    folder.mkdir()
-    np.savez(folder / "pool-0000.npz", **pool)
-    np.savez(folder / "held.npz", **{name: value[:4] for name, value in pool.items()})
-    return folder
 
 
 def _config(steps: int) -> TrainingConfig:
@@ -339,7 +317,7 @@ def test_baselines_learn_and_their_weights_run(system: str, dataset: Path, tmp_p
     assert _loss_at(_until("whole", dataset, folder, steps=40, model=model), dataset) < before - 5.0
     flow, predictor, statistics = trained(folder)
     assert (predictor is None) == (system == "moglow")
-    spread = take_spread(flow, predictor, _pool(dataset), statistics, windows=300)
+    spread = take_spread(flow, predictor, _pool(dataset), statistics)
     export(tmp_path / "w.safetensors", flow, predictor, statistics, {}, spread)
     weights = load_weights(tmp_path / "w.safetensors")
     sampler = sampler_of(weights)
@@ -360,13 +338,13 @@ def test_a_budget_in_steps_is_spent_by_steps(dataset: Path, tmp_path: Path):
 def test_takes_are_drawn_from_what_lasts_of_the_noise_along_captured_motion(dataset: Path, tmp_path: Path):
     run = Run("upper", tmp_path, TINY, _config(1), _pool(dataset).statistics())
     pool, predictor = _pool(dataset), run.gmvae.predictor
-    spread = take_spread(run.flow, predictor, pool, run.statistics, windows=400)
+    spread = take_spread(run.flow, predictor, pool, run.statistics)
     batch = pool.batch(torch.arange(12), run.statistics, TINY)
     for part, noise in noise_along(run.flow, predictor, batch).items():
         lasting = noise[:, 20:].mean(1)
-        # The windows of the set, all drawn about as often: their second moment.
         expected = (lasting.T @ lasting / 12).numpy()
-        assert np.abs(spread[part] @ spread[part].T - expected).max() < 0.25 * np.abs(expected).max()
+        # Poses are noisy by 3 mm, anew for each batch.
+        assert np.abs(spread[part] @ spread[part].T - expected).max() < 0.05 * np.abs(expected).max()
         assert (np.triu(spread[part], 1) == 0).all()
     for part in ("predictor", "upper", "lower"):
         _until(part, dataset, tmp_path / "run", steps=2)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["bake_takes"]
 
-_FURTHER_TAKES = 0.8  # temperature of every take but the first, where none is asked for
+_FURTHER_TAKES = 1.0  # temperature of every take but the first, where none is asked for
 
 
 def bake_takes(

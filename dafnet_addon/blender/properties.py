@@ -81,8 +81,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         name="Legs' Seed", default=0, min=0, options=set(), description="Seed of the legs alone",
     )
     temperature: FloatProperty(
-        name="Temperature", default=0.0, min=0.0, max=1.5, step=10, precision=2, options=set(),
-        description="How far takes differ: 0 gives the one calm take, 0.8 lively ones, above 1 strange ones",
+        name="Temperature", default=0.0, min=0.0, max=2.5, step=10, precision=2, options=set(),
+        description="How far takes differ: 0 gives the one calm take, 1 as far as real ones do, above 2 strange ones",
     )
     plant_feet: FloatProperty(
         name="Plant Feet", default=1.0, min=0.0, max=1.0, subtype="FACTOR", options=set(),

@@ -93,7 +93,7 @@ def generate_steps(
     nothing by default. Raises InputError for what cannot be used, WeightsError for weights that do not fit.
     """
     if not 0 <= temperature <= _HOTTEST:
-        raise InputError(f"The temperature is {temperature}; give 0 or a small positive number such as 0.8.")
+        raise InputError(f"The temperature is {temperature}; give 0 or a small positive number such as 1.")
     started = perf_counter()
     yield 0.0
     shot = yield from within(shot_steps(scene, controls), 0.0, _CONDITIONED)

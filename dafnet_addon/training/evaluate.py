@@ -161,21 +161,27 @@ def _noise(sampler: Sampler, seed: int, seeds: int, mode: str) -> tuple[np.ndarr
     return np.concatenate(noise), runs
 
 
-def beside(sampler: Sampler, clip: HeldClip, seed: int = 0, seeds: int = SEEDS) -> Measured:
-    """One clip made again in all modes, ``seeds`` times at temperature 1, and measured beside itself."""
+def beside(
+    sampler: Sampler, clip: HeldClip, seed: int = 0, seeds: int = SEEDS, modes: Sequence[str] = MODES, clean: bool = True
+) -> Measured:
+    """One clip made again in these modes, ``seeds`` times at temperature 1, and measured beside itself; calm takes also after
+    the clean-up where it is asked for.
+    """
     shots = {"EE": shot_of(clip, "EE")}
     known = shots["EE"].conditions
     nothing = replace(known, observation=np.zeros_like(known.observation), given=np.zeros_like(known.given))
     shots["FREE"] = replace(shots["EE"], conditions=nothing)
-    full = shot_of(clip, "FULL", Scene()).conditions
-    shots["FULL"] = replace(shots["EE"], conditions=replace(full, occupancy=known.occupancy))
+    if "FULL" in modes:
+        full = shot_of(clip, "FULL", Scene()).conditions
+        shots["FULL"] = replace(shots["EE"], conditions=replace(full, occupancy=known.occupancy))
     runs = {"ground_truth": figures(clip, clip.joints[None])}
-    for mode in MODES:
+    for mode in modes:
         noise, takes_of = _noise(sampler, seed, seeds, mode)
         takes = made(sampler, shots[mode], noise)
         runs |= {run: figures(clip, takes[chosen], mode) for run, chosen in takes_of.items()}
         calm = f"{mode.lower()}_t0"
-        runs[f"{calm}_clean"] = figures(clip, made_clean(takes[takes_of[calm]], shots[mode]), mode)
+        if clean:
+            runs[f"{calm}_clean"] = figures(clip, made_clean(takes[takes_of[calm]], shots[mode]), mode)
     return Measured(clip, runs)
 
 
@@ -198,6 +204,14 @@ def in_processes(
 ) -> Iterator[Any]:
     """``task`` of each item with a sampler of these weights, in as many processes as there are cores; in order."""
     processes = max(1, min(os.cpu_count() or 1, len(items)))
+    if processes == 1:
+        sampler = sampler_of(weights)
+        for done, item in enumerate(items):
+            with one_thread():
+                result = task(sampler, item)
+            progress((done + 1) / len(items))
+            yield result
+        return
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _start, (weights,)) as pool:
         for done, result in enumerate(pool.map(partial(_call, task), items)):
             progress((done + 1) / len(items))
@@ -206,10 +220,11 @@ def in_processes(
 
 def measured(
     weights: Weights, clips: Sequence[HeldClip], progress: Callable[[float], None] = lambda share: None, seed: int = 0,
-    seeds: int = SEEDS,
+    seeds: int = SEEDS, modes: Sequence[str] = MODES, clean: bool = True,
 ) -> list[Measured]:
-    """Every clip beside itself, in processes."""
-    return list(in_processes(weights, partial(beside, seed=seed, seeds=seeds), clips, progress))
+    """Every clip beside itself (see ``beside``), in processes."""
+    task = partial(beside, seed=seed, seeds=seeds, modes=modes, clean=clean)
+    return list(in_processes(weights, task, clips, progress))
 
 
 def _interval(totals: np.ndarray, weights: np.ndarray) -> list[float]:

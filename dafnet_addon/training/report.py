@@ -219,40 +219,52 @@ def _followed(sampler: Sampler, task: tuple[HeldClip, np.ndarray | None]) -> _Fo
     for t, pose in enumerate(poses[:, None]):
         other = None if actions is None or t < PREROLL else actions[t - PREROLL, None]
         noise, told, log_det = sampler.absorb(t, pose, other)
-        seen.append(told[0])
+        seen.append(told[0, : sampler.actions])
         nats.append(float(0.5 * (noise**2 + np.log(2.0 * np.pi)).sum() - log_det[0]) + metres)
     return _Followed(clip, np.array(seen[PREROLL:]), np.array(nats[PREROLL:]))
 
 
 def _actions(weights: Weights, clips: Sequence[HeldClip], progress: Callable[[float], None]) -> dict[str, Any]:
-    """What the action predictor says along real clips, and what its word is worth to the likelihood."""
+    """What the action predictor, if there is one, says along real clips, and what its word is worth to the likelihood."""
     first: list[_Followed] = list(in_processes(weights, _followed, [(c, None) for c in clips], lambda p: progress(p / 2)))
     actions = np.concatenate([each.actions for each in first])
+    activity = np.repeat([c.activity for c in clips], [len(c.joints) for c in clips])
+    present = [name for name in ACTIVITIES if (activity == name).any()]
+
+    def over(chosen: Sequence[str], values: Sequence[np.ndarray]) -> tuple[dict[str, Any], list[float]]:
+        """Row and clip means of nats (one array for each clip) in clips of these activities."""
+        of_them = [n for each, n in zip(first, values, strict=True) if each.clip.activity in chosen]
+        return row([Figures({"nats": (float(n.sum()), float(len(n)))}) for n in of_them]), [float(n.mean()) for n in of_them]
+
+    def plain(chosen: Sequence[str]) -> dict[str, Any]:
+        own, means = over(chosen, [each.nats for each in first])
+        return {
+            "clips": len(means), "nll": own["nats"], "nll_interval": own["intervals"]["nats"],
+            "nll_median_clip": round(float(np.median(means)), 3),
+        }
+
+    groups = {"all": present, **{name: [name] for name in present}}
+    counts = {"clips": len(clips), "frames": len(actions)}
+    if not actions.shape[1]:
+        return {**counts, "likelihood": {label: plain(chosen) for label, chosen in groups.items()}}
     mixed = actions[np.random.default_rng(0).permutation(len(actions))].astype(np.float32)
     cuts = np.cumsum([len(c.joints) for c in clips])[:-1]
     tasks = list(zip(clips, np.split(mixed, cuts), strict=True))
     second: list[_Followed] = list(in_processes(weights, _followed, tasks, lambda p: progress(0.5 + p / 2)))
     likeliest = actions.argmax(1)
     share = np.bincount(likeliest, minlength=actions.shape[1]) / len(likeliest)
-    activity = np.repeat([c.activity for c in clips], [len(c.joints) for c in clips])
 
     def nats(chosen: Sequence[str]) -> dict[str, Any]:
         """Of clips of these activities: mean and median clip, and what mixed actions add to the mean."""
-        pairs = [(a.nats, b.nats - a.nats) for a, b in zip(first, second, strict=True) if a.clip.activity in chosen]
-        own, rise = (
-            row([Figures({"nats": (float(n.sum()), float(len(n)))}) for n in each]) for each in zip(*pairs, strict=True)
-        )
+        rise, means = over(chosen, [b.nats - a.nats for a, b in zip(first, second, strict=True)])
         return {
-            "clips": len(pairs), "nll": own["nats"], "nll_interval": own["intervals"]["nats"],
-            "nll_median_clip": round(float(np.median([n.mean() for n, _ in pairs])), 3),
-            "shuffled_adds": rise["nats"], "shuffled_adds_interval": rise["intervals"]["nats"],
-            "shuffled_adds_median_clip": round(float(np.median([n.mean() for _, n in pairs])), 3),
-            "shuffled_worse_in_clips": round(float(np.mean([n.mean() > 0 for _, n in pairs])), 4),
+            **plain(chosen), "shuffled_adds": rise["nats"], "shuffled_adds_interval": rise["intervals"]["nats"],
+            "shuffled_adds_median_clip": round(float(np.median(means)), 3),
+            "shuffled_worse_in_clips": round(float(np.mean(np.array(means) > 0)), 4),
         }
 
-    present = [name for name in ACTIVITIES if (activity == name).any()]
     return {
-        "clips": len(clips), "frames": len(actions),
+        **counts,
         "information_nats": round(action_information(actions), 4),
         "likeliest_in_2_percent": int((share >= _LIKELY).sum()),
         "normalised_mutual_information": round(mutual_information(likeliest, activity), 4),
@@ -263,7 +275,7 @@ def _actions(weights: Weights, clips: Sequence[HeldClip], progress: Callable[[fl
                 for name in present
             },
         },
-        "likelihood": {"all": nats(present), **{name: nats([name]) for name in present}},
+        "likelihood": {label: nats(chosen) for label, chosen in groups.items()},
     }
 
 
@@ -386,6 +398,8 @@ def criteria(values: dict[str, Any]) -> list[Criterion]:
     for name in ("feet_off_floor", "legs_penetration_mean"):
         label = f"legs under one upper body: {name.replace('_', ' ')}"
         add(label, legs[name], max(2.0 * real[name], real[name] + 0.002), most=True, count=clips)
+    if "shares" not in told:
+        return found  # a system without an action predictor
     add("actions: information, nats", told["information_nats"], 1.0, count=clips)
     add("actions: likeliest in 2 % of frames", told["likeliest_in_2_percent"], 6.0, count=clips)
     add("actions: mutual information with activities", told["normalised_mutual_information"], 0.3, count=clips)
@@ -419,7 +433,7 @@ def text(values: dict[str, Any]) -> str:
     ]
     told = values["actions"]
     lines = [f"- {name.replace('_', ' ')}: {value}" for name, value in told.items() if not isinstance(value, dict)]
-    lines += [f"- likeliest action, {name}: {shares}" for name, shares in told["shares"].items()]
+    lines += [f"- likeliest action, {name}: {shares}" for name, shares in told.get("shares", {}).items()]
     parts += ["## Action predictor and likelihood (nats a frame, poses in metres, 3 mm of noise)", "\n".join(lines)]
     names = list(told["likelihood"]["all"])
     head = "| | " + " | ".join(name.replace("_", " ") for name in names) + " |\n" + "|---" * (len(names) + 1) + "|"

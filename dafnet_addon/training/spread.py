@@ -39,9 +39,8 @@ def noise_along(flow: TwoPartFlow | WholeFlow, predictor: ActionPredictor | None
 def take_spread(
     flow: TwoPartFlow | WholeFlow, predictor: ActionPredictor | None, pool: Pool, statistics: Statistics, windows: int = 2000
 ) -> dict[str, np.ndarray]:
-    """By part, the lower triangular matrix L (n, n) of which a take's noise is L e with e from N(0, I)."""
-    generator = torch.Generator().manual_seed(0)
-    rows = torch.randint(len(pool), (windows,), generator=generator)
+    """By part, the lower triangular matrix L (n, n) of which a take's noise is L e with e from N(0, I), of as many windows."""
+    rows = torch.randperm(len(pool), generator=torch.Generator().manual_seed(0))[:windows]
     means: dict[str, list[torch.Tensor]] = {}
     for some in rows.split(_AT_ONCE):
         batch = pool.batch(some, statistics, flow.config)
@@ -50,5 +49,7 @@ def take_spread(
     out = {}
     for part, found in means.items():
         mean = torch.cat(found).double()
-        out[part] = torch.linalg.cholesky(mean.T @ mean / len(mean)).float().cpu().numpy()
+        # A few windows do not span the space: what they leave out is given a hair's breadth.
+        moment = mean.T @ mean / len(mean) + 1e-6 * torch.eye(mean.shape[1], dtype=mean.dtype, device=mean.device)
+        out[part] = torch.linalg.cholesky(moment).float().cpu().numpy()
     return out

@@ -31,7 +31,7 @@ from .batches import Batch, Pool, Statistics, observation_for
 from .export import adopt_part, adopt_predictor, adopted_statistics
 from .free_run import lower_loss, upper_loss
 
-__all__ = ["TrainingConfig", "read_config", "Run", "account", "dataset_pool", "train", "train_part", "trained"]
+__all__ = ["TrainingConfig", "read_config", "Run", "account", "clock_of", "dataset_pool", "train", "train_part", "trained"]
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,15 @@ class TrainingConfig:
     mixed: bool = False
     save_every: int = 100
     seed: int = 0
+
+    def share(self, step: int, seconds: float) -> float:
+        """Share of the flow's budget that is spent."""
+        return min(1.0, step / self.steps_flow if self.steps_flow else seconds / max(60.0 * self.minutes_flow, 1e-9))
+
+    def rate(self, step: int, share: float) -> float:
+        """Learning rate of the step after ``step`` steps, ``share`` of the budget being spent."""
+        rate = self.final + 0.5 * (self.peak - self.final) * (1.0 + math.cos(math.pi * share))
+        return rate * min(1.0, (step + 1) / self.warmup)
 
 
 def read_config(file: Path) -> tuple[ModelConfig, TrainingConfig]:
@@ -116,16 +125,11 @@ class Run:
         self.adopted = weights.metadata.get("training", "not said")
 
     @property
-    def budget(self) -> float:
-        """Seconds that this part may take."""
-        return 60.0 * (self.config.minutes_predictor if self.part == "predictor" else self.config.minutes_flow)
-
-    @property
     def share(self) -> float:
         """Share of the budget that is spent."""
-        if self.part != "predictor" and self.config.steps_flow:
-            return min(1.0, self.step / self.config.steps_flow)
-        return min(1.0, self.seconds / max(self.budget, 1e-9))
+        if self.part == "predictor":
+            return min(1.0, self.seconds / max(60.0 * self.config.minutes_predictor, 1e-9))
+        return self.config.share(self.step, self.seconds)
 
     def save(self) -> None:
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -152,11 +156,6 @@ class Run:
         run.step, run.seconds, run.adopted = state["step"], state["seconds"], state["adopted"]
         _set_generators(state["generators"], run.device)
         return run
-
-    def rate(self) -> float:
-        c = self.config
-        rate = c.final + 0.5 * (c.peak - c.final) * (1.0 + math.cos(math.pi * self.share))
-        return rate * min(1.0, (self.step + 1) / c.warmup)
 
     def hidden(self, occupancy: torch.Tensor) -> torch.Tensor:
         """Occupancy (B, …, 2640) with a share of its values dropped (paper, Appendix A); nothing is rescaled."""
@@ -259,6 +258,11 @@ def dataset_pool(dataset: Path, device: str = "cpu") -> Pool:
     return pool
 
 
+def clock_of(device: torch.device) -> Callable[[], float]:
+    """Seconds that count: a processor's own, so that other work takes nothing from the training; else the clock's."""
+    return time.monotonic if device.type != "cpu" else lambda: time.process_time() / torch.get_num_threads()
+
+
 def train_part(
     part: str, dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig, threads: int | None = None,
     progress: Callable[[str, float, float], None] = lambda part, share, loss: None, device: str = "cpu",
@@ -297,13 +301,12 @@ def train_part(
         run.gmvae.requires_grad_(False)
     recent: list[torch.Tensor] = []
     writer = SummaryWriter(str(folder / "tensorboard" / part)) if ranks.rank() == 0 else None
-    # A processor's budget is its own time, so that whatever else it does takes nothing from the training.
-    clock = time.monotonic if run.device.type != "cpu" else lambda: time.process_time() / torch.get_num_threads()
+    clock = clock_of(run.device)
     while run.share < 1.0:
         begin = clock()
         rows = torch.randint(len(pool), (config.batch,))
         for group in run.optimiser.param_groups:
-            group["lr"] = run.rate()
+            group["lr"] = run.config.rate(run.step, run.share)
         loss = run.loss(pool.batch(rows, run.statistics, run.model), initialise=run.step == 0 and not run.adopted)
         run.optimiser.zero_grad()
         loss.backward()
