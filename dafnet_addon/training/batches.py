@@ -117,15 +117,17 @@ class Pool:
         poses, velocity, ahead = (np.concatenate([shard[name] for shard in shards]) for name in ("poses", "velocity", "ahead"))
         return Statistics.of(poses * np.float32(POSE_UNIT), velocity, ahead)
 
-    def _rows(self, rows: Tensor) -> dict[str, Tensor]:
+    def windows(self, rows: Tensor, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Fields of windows ``rows`` (whole numbers, on the CPU) as they are stored (see ``data.prepare.load_pool``)."""
         shards = list(self.shards.values())
         which = np.searchsorted(self.ends, rows.numpy(), side="right")
         first = np.concatenate([[0], self.ends])[which]
         places = list(zip(which, rows.numpy() - first, strict=True))
-        return {
-            name: torch.from_numpy(np.stack([shards[s][name][r] for s, r in places])).to(self.device)
-            for name in shards[0] if name != "kinds"
-        }
+        return {name: np.stack([shards[s][name][r] for s, r in places]) for name in names}
+
+    def _rows(self, rows: Tensor) -> dict[str, Tensor]:
+        names = [name for name in next(iter(self.shards.values())) if name != "kinds"]
+        return {name: torch.from_numpy(a).to(self.device) for name, a in self.windows(rows, names).items()}
 
     def batch(self, rows: Tensor, statistics: Statistics, config: ModelConfig) -> Batch:
         """Windows ``rows`` (whole numbers, on the CPU), poses with dequantisation noise."""
