@@ -115,6 +115,12 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     bench = command("bench", _bench, "measure: 'seats' sits on ten heights from three sides; 'speed' times every system")
     bench.add_argument("name", choices=["seats", "speed"])
     bench.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
+
+    figures = command("figures", _figures, "draw the paper's figures with these weights")
+    figures.add_argument("-o", "--output", type=Path, default=Path("out/figures"), metavar="FOLDER")
+    figures.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
+    figures.add_argument("--other", action="append", default=[], metavar="NAME=FILE", help="weights of another system")
+    figures.add_argument("--only", nargs="+", metavar="NUMBER", help="the paper's numbers of the figures; else all")
     return parser
 
 
@@ -275,6 +281,21 @@ def _bench(options: argparse.Namespace) -> None:
     with _Bar() as bar:
         report, summary = runpy.run_path(str(script))["measure"](options.weights, bar)
     print(json.dumps(report, indent=2) if options.json else summary)
+
+
+def _figures(options: argparse.Namespace) -> None:
+    _require_checkout("../benchmarks")
+    _require_bpy()
+    others = {}
+    for each in options.other:
+        name, _, file = each.partition("=")
+        if not file:
+            raise InputError(f"'{each}' names no weights; write it as NAME=FILE.")
+        others[name] = Path(file)
+    draw = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "figures.py"))["draw"]
+    with _only_our_output(), _Bar() as bar:
+        files = draw(options.output, options.weights, others, options.only, bar)
+    print(json.dumps([str(file) for file in files]) if options.json else "\n".join(str(file) for file in files))
 
 
 def _require_checkout(folder: str) -> None:

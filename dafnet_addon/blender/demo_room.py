@@ -24,7 +24,7 @@ from .preview import look_at, render_film, render_sheet, use_workbench
 from .properties import ensure_registered
 from .scene_reader import read_scene
 
-__all__ = ["FURNITURE", "Part", "Room", "build_room", "run_demo"]
+__all__ = ["FURNITURE", "Part", "Room", "add_piece", "build_room", "run_demo"]
 
 Triple = tuple[float, float, float]
 
@@ -152,10 +152,10 @@ def build_room(context: bpy.types.Context) -> Room:
     scene.render.fps, scene.render.fps_base = FPS, 1.0
     scene.frame_start, scene.frame_end = 1, len(walked.path)
     shell = _collection(scene, "Room")
-    _piece(shell, "Room", _SHELL, Place((0.0, 0.0), 0.0))
+    add_piece(shell, "Room", _SHELL, Place((0.0, 0.0), 0.0))
     furniture = _collection(scene, "Furniture")
     for name, parts in FURNITURE.items():
-        _piece(furniture, name, parts, PLACES[name])
+        add_piece(furniture, name, parts, PLACES[name])
     _camera_and_lights(scene, _collection(scene, "Camera and Lights"), walked)
 
     scene.cursor.location = (0.0, 0.0, 0.0)
@@ -216,7 +216,7 @@ def _collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
     return made
 
 
-def _piece(collection: bpy.types.Collection, name: str, parts: Iterable[Part], place: Place) -> bpy.types.Object:
+def add_piece(collection: bpy.types.Collection, name: str, parts: Iterable[Part], place: Place) -> bpy.types.Object:
     """One mesh object of all ``parts``, its origin on the floor at ``place``."""
     names: list[str] = []
     shape = bmesh.new()

@@ -1,0 +1,44 @@
+"""The paper's figures: one of them drawn small, and what it has to show."""
+
+import runpy
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from dafnet_addon.core.errors import InputError
+from dafnet_addon.core.skeleton import SEAT_TO_PELVIS
+from dafnet_addon.core.weights import load_weights
+
+Image = pytest.importorskip("PIL.Image")
+SCRIPT = Path(__file__).parents[1] / "benchmarks" / "figures.py"
+
+
+def test_figure_11_is_drawn_and_its_mannequins_end_at_different_heights(blender: ModuleType, tmp_path: Path) -> None:
+    figures = runpy.run_path(str(SCRIPT))
+    progress: list[float] = []
+    files = figures["draw"](tmp_path / "new", None, {}, ["11"], progress.append, scale=0.25)
+    assert [file.name for file in files] == ["figure_11.png"]
+    assert progress == sorted(progress) and progress[-1] == 1.0
+    with Image.open(files[0]) as picture:
+        assert picture.width == 400
+        pixels = np.asarray(picture.convert("RGB"), dtype=float)
+    heights = figures["HEIGHTS"]
+    columns = np.array_split(pixels[: picture.height * 3 // 4], len(heights), axis=1)
+    assert all(column.std(axis=(0, 1)).max() > 10.0 for column in columns), "there is somebody in every column"
+
+    chosen = heights[::2]
+    pelvis = np.array([motion.joints[-15, 0, 2] for motion in figures["seated_at"](load_weights(), chosen)])
+    assert (np.diff(pelvis) > 0.05).all(), "higher seats, higher pelvises"
+    assert np.abs(pelvis - chosen - SEAT_TO_PELVIS).max() < 0.08
+
+
+def test_unknown_figures_are_refused_and_comparisons_without_others_left_out(
+    blender: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    draw = runpy.run_path(str(SCRIPT))["draw"]
+    with pytest.raises(InputError, match="no figure 9"):
+        draw(tmp_path, None, {}, ["9"], lambda _: None)
+    assert draw(tmp_path, None, {}, ["15", "16"], lambda _: None) == []
+    assert capsys.readouterr().err.count("\n") == 1
