@@ -83,6 +83,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     bake.add_argument("--mode", choices=MODES, help="one mode for all frames")
     bake.add_argument("--frames", type=_frames, metavar="A:B", help="first and last frame")
     bake.add_argument("--plant-feet", type=float, metavar="SHARE", help="0 leaves feet as generated, 1 holds those that stand")
+    bake.add_argument("--rest-on-seats", type=float, metavar="SHARE", help="0 leaves who sinks into a seat there")
     bake.add_argument("--reach-targets", type=float, metavar="SHARE", help="0 leaves hands as generated, 1 is exact")
     bake.add_argument("--takes", type=int, default=1, metavar="N", help="how many takes; the first one plays")
     sampling(bake, None)
@@ -164,7 +165,7 @@ def _bake(options: argparse.Namespace) -> None:
         "root": options.root, "furniture": options.furniture, "head": options.head, "hand_left": options.hand_left,
         "hand_right": options.hand_right, "upper_body_source": options.upper_body, "mode": options.mode,
         "temperature": options.temperature, "seed": options.seed,
-        "plant_feet": options.plant_feet, "reach_targets": options.reach_targets,
+        "plant_feet": options.plant_feet, "rest_on_seats": options.rest_on_seats, "reach_targets": options.reach_targets,
     }
     if options.frames:
         changes["frame_start"], changes["frame_end"] = options.frames

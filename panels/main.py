@@ -72,6 +72,7 @@ class DAFNET_PT_character(bpy.types.Panel):
 
         column = layout.column()
         column.prop(settings, "plant_feet", slider=True)
+        column.prop(settings, "rest_on_seats", slider=True)
         if settings.mode == "EE" or animated:
             column.prop(settings, "reach_targets", slider=True)
 

@@ -5,7 +5,7 @@ import pytest
 
 from dafnet_addon.core.distance import BAND, prepared, scaled
 from dafnet_addon.core.errors import InputError
-from dafnet_addon.core.occupancy import distance, occupancy
+from dafnet_addon.core.occupancy import distance, occupancy, tops_under
 from dafnet_addon.core.root import RootPath, to_world
 from dafnet_addon.core.rotations import rotate, transpose, yaw_matrix
 from dafnet_addon.core.sensor import SPHERES, occupancy_of_distance
@@ -142,3 +142,26 @@ def test_far_points_are_free_however_small_the_world_was_made():
     assert (small[exact > 0.08] == BAND).mean() > 0.99
     near = exact < 0.07
     np.testing.assert_allclose(small[near], np.maximum(exact, -BAND / 2)[near], atol=0.013)
+
+
+def _resting(places):
+    return RootPath(np.array([[x, y, 0.0] for x, y in places], float), np.zeros(len(places)))
+
+
+def test_tops_are_those_of_seats_whatever_they_are_made_of():
+    slab = Box(np.array([0.0, 0.0, 0.445]), np.array([0.22, 0.22, 0.02]), name="slab")  # its top is at 0.465 m
+    path = _resting([(0.0, 0.0), (0.1, -0.05), (1.0, 0.0)])
+    sheet = Mesh(np.array([(x, y, 0.52) for x in (-0.3, 0.3) for y in (-0.3, 0.3)]), np.array([(0, 1, 2), (1, 3, 2)]))
+    for solid, height, error in ((slab, 0.465, 1e-6), (as_mesh(slab), 0.465, 0.01), (sheet, 0.52, 0.015)):
+        scene, _ = prepared(Scene((solid,)), 0.0)
+        tops = tops_under(scene, path)
+        assert np.abs(tops[:2] - height).max() < error and np.isnan(tops[2])
+    assert np.isnan(tops_under(Scene(), path)).all()
+
+
+def test_tops_follow_a_moving_seat_and_an_upper_storey():
+    path = RootPath(np.tile([0.0, 0.0, 3.0], (2, 1)), np.zeros(2))
+    lift = Box(np.array([[0.0, 0.0, 3.2], [0.0, 0.0, 3.3]]), np.array([0.3, 0.3, 0.2]), np.tile(np.eye(3), (2, 1, 1)))
+    assert np.allclose(tops_under(Scene((lift,)), path), [3.4, 3.5])
+    walls = Box(np.array([0.0, 0.0, 4.5]), np.array([0.5, 0.5, 1.5]), name="a pillar one stands in")
+    assert np.isnan(tops_under(Scene((walls,)), path)).all() or (tops_under(Scene((walls,)), path) > 3.85).all()

@@ -67,7 +67,7 @@ def steps(
         generate_steps(
             read.scene, read.controls, weights,
             seed=settings.seed, lower_seed=settings.lower_seed, temperature=settings.temperature,
-            clean_up=CleanUp(settings.plant_feet, settings.reach_targets),
+            clean_up=CleanUp(settings.plant_feet, settings.reach_targets, settings.rest_on_seats),
         ),
         _READ, _GENERATED,
     )

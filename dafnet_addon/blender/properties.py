@@ -88,6 +88,10 @@ class CharacterSettings(bpy.types.PropertyGroup):
         name="Plant Feet", default=1.0, min=0.0, max=1.0, subtype="FACTOR", options=set(),
         description="How firmly a foot that stands is held where it stands, so that it does not slide; 0 is the raw motion",
     )
+    rest_on_seats: FloatProperty(
+        name="Rest on Seats", default=1.0, min=0.0, max=1.0, subtype="FACTOR", options=set(),
+        description="How far a pelvis that has sunk into a seat is lifted out of it; 0 is the raw motion",
+    )
     reach_targets: FloatProperty(
         name="Reach Targets", default=1.0, min=0.0, max=1.0, subtype="FACTOR", options=set(),
         description="How exactly head and hands are put onto their targets, as far as arms and back allow; 0 is the raw motion",
@@ -114,7 +118,8 @@ class Settings:
     """A plain copy of what one generation needs; objects and the collection by ``name_full``, None where unset.
 
     ``mode``: None takes the armature's property frame by frame, a word overrules it. ``frame_start`` and ``frame_end``
-    are both generated. ``lower_seed``: None goes with ``seed``. ``plant_feet``, ``reach_targets``: strengths of the clean-up.
+    are both generated. ``lower_seed``: None goes with ``seed``. ``plant_feet`` and those
+    below it: strengths of the clean-up.
     """
 
     armature: str
@@ -132,6 +137,7 @@ class Settings:
     lower_seed: int | None = None
     temperature: float = 0.0
     plant_feet: float = 1.0
+    rest_on_seats: float = 1.0
     reach_targets: float = 1.0
 
     def __post_init__(self) -> None:
@@ -153,7 +159,7 @@ def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides:
         "frame_start": scene.frame_start if own.use_scene_range else own.frame_start,
         "frame_end": scene.frame_end if own.use_scene_range else own.frame_end,
         "seed": own.seed, "lower_seed": own.lower_seed if own.use_lower_seed else None, "temperature": own.temperature,
-        "plant_feet": own.plant_feet, "reach_targets": own.reach_targets,
+        "plant_feet": own.plant_feet, "rest_on_seats": own.rest_on_seats, "reach_targets": own.reach_targets,
     }
     return Settings(armature=armature.name_full, scene=scene.name_full, **(values | overrides))
 

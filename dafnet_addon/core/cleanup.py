@@ -1,8 +1,8 @@
-"""After the model: planted feet stay where they are, and head and hands reach their targets exactly.
+"""After the model: planted feet stay where they are, nobody sinks into a seat, head and hands reach their targets exactly.
 
 All is done on joint positions of a body with constant bones, 30 frames a second, and leaves them constant; the take's own poses
 are untouched, so that the strengths can be changed without sampling again. Corrections begin and end softly: what is added to a
-joint is held or faded where nothing asks for it. Feet first, since they may lower the pelvis; targets after them.
+joint is held or faded where nothing asks for it. Feet first, since they may lower the pelvis; then the seat, then targets.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from .kinematics import two_bone
 from .rotations import matrix_from_vector
 from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, TOE_HEIGHT, joint
 
-__all__ = ["CleanUp", "cleaned", "planted", "standing_still", "reaching"]
+__all__ = ["CleanUp", "cleaned", "planted", "seated", "standing_still", "reaching"]
 
 _TOES, _ANKLES = [joint("left_foot"), joint("right_foot")], [joint("left_ankle"), joint("right_ankle")]
 _KNEES, _HIPS = [joint("left_knee"), joint("right_knee")], [joint("left_hip"), joint("right_hip")]
@@ -26,6 +26,7 @@ _LOW, _SLOW = 0.035, 0.45  # metres over a planted toe base; metres a second tha
 _PLANTS, _MENDS = 4, 3  # frames: the shortest stand; the longest gap in one
 _SLIPS = 0.12  # metres from its place at which a foot is let go
 _FADE = 10  # frames in which what is added dies away
+_SITS_OVER, _SINKS = 0.08, 0.15  # metres of a pelvis over a hard seat, at least; the most that it is lifted by
 _STRAIGHT = 0.999  # of a leg's or arm's length, which is how far they reach
 
 _FARTHEST_HEAD, _FARTHEST_LEAN = 0.20, 0.25  # metres that the trunk is bent by for a target, at most
@@ -41,15 +42,22 @@ _DAMPING, _ROUNDS, _STEP = 0.03, 15, 0.10  # metres; rounds of least squares; me
 @dataclass(frozen=True)
 class CleanUp:
     """Strengths from 0 (off) to 1 of what is done after the model: ``feet`` stand still where they are planted, head and hands
-    ``reach`` their targets.
+    ``reach`` their targets, the pelvis is lifted out of the ``seat`` that it has sunk into.
     """
 
     feet: float = 0.0
     reach: float = 0.0
+    seat: float = 0.0
 
     def __post_init__(self) -> None:
-        if not all(0.0 <= strength <= 1.0 for strength in (self.feet, self.reach)):
-            raise InputError(f"The clean-up's strengths are {self.feet} and {self.reach}; give numbers from 0 to 1.")
+        strengths = (self.feet, self.reach, self.seat)
+        if not all(0.0 <= strength <= 1.0 for strength in strengths):
+            raise InputError(f"The clean-up's strengths are {', '.join(map(str, strengths))}; give numbers from 0 to 1.")
+
+    @property
+    def asked(self) -> bool:
+        """Whether anything is to be done."""
+        return self.feet > 0.0 or self.reach > 0.0 or self.seat > 0.0
 
 
 def _below() -> np.ndarray:
@@ -146,13 +154,39 @@ def _lowered(hips: np.ndarray, ankles: np.ndarray, held: np.ndarray) -> np.ndarr
     across = np.linalg.norm((hips - ankles)[..., :2], axis=-1)
     highest = np.sqrt(np.maximum(reach**2 - across**2, 0.0))
     need = np.where(held & (across < reach), hips[..., 2] - ankles[..., 2] - highest, 0.0).max(1).clip(0.0, 0.15)
+    return _covering(need)
+
+
+def _covering(need: np.ndarray) -> np.ndarray:
+    """A smooth curve (T,) nowhere under the ``need``: its running maximum, averaged over no more than it looks ahead."""
     if not need.any():
         return need
-    # The least smooth curve that is nowhere under the need: its running maximum, averaged over no more than it looks ahead.
     ahead = np.lib.stride_tricks.sliding_window_view(np.pad(need, 5, mode="edge"), 11).max(1)
     kernel = np.hanning(13)[1:-1]
     wide = np.pad(ahead, 5, mode="edge")
     return np.convolve(wide, kernel / kernel.sum(), mode="valid")
+
+
+def seated(joints: np.ndarray, tops: np.ndarray, strength: float = 1.0) -> np.ndarray:
+    """Joints (T, 22, 3) whose pelvis is no lower than 8 cm over the seat that it has sunk into; the feet stay, or hang.
+
+    ``tops`` (T,): heights of what is under the root (``tops_under``), NaN where nothing. A pelvis may be over a hard seat by
+    8 to 16 cm; on a soft one it comes to lie on the cushion, which does not give way.
+    """
+    need = np.maximum(_SITS_OVER - joints[:, 0, 2] + np.where(np.isfinite(tops), tops, -np.inf), 0.0)
+    for start, end in _runs(need > 0.0):
+        if need[start:end].max() > _SINKS:
+            need[start:end] = 0.0  # under a table, not on it
+    lift = strength * _covering(need)
+    if not lift.any():
+        return joints
+    out = joints.copy()
+    rest = [j for j in range(22) if j not in {*_KNEES, *_ANKLES, *_TOES}]
+    out[:, rest, 2] += lift[:, None]
+    poles = joints[:, _KNEES] + lift[:, None, None] * (0.0, 0.0, 0.5)
+    out[:, _KNEES], out[:, _ANKLES] = two_bone(out[:, _HIPS], joints[:, _ANKLES], poles, _THIGH, _SHIN)
+    out[:, _TOES] = out[:, _ANKLES] + joints[:, _TOES] - joints[:, _ANKLES]
+    return out
 
 
 def _limited(vectors: np.ndarray, most: float) -> np.ndarray:
@@ -230,11 +264,17 @@ def _bend(joints: np.ndarray, wants: list[tuple[int, np.ndarray]]) -> None:
 
 
 def cleaned(
-    joints: np.ndarray, targets: dict[str, np.ndarray], settings: CleanUp, floor: np.ndarray | float = 0.0
+    joints: np.ndarray, targets: dict[str, np.ndarray], settings: CleanUp, floor: np.ndarray | float = 0.0,
+    tops: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Joints (T, 22, 3) after all that ``settings`` ask for; canonical metres, world, 30 frames a second, constant bones."""
+    """Joints (T, 22, 3) after all that ``settings`` ask for; canonical metres, world, 30 frames a second, constant bones.
+
+    ``floor``: its height, one or one for each frame; ``tops``: see ``seated``.
+    """
     if settings.feet > 0.0:
         joints = planted(joints, floor, settings.feet)
+    if settings.seat > 0.0 and tops is not None:
+        joints = seated(joints, tops, settings.seat)
     if settings.reach > 0.0:
         joints = reaching(joints, targets, settings.reach)
     return joints

@@ -73,8 +73,9 @@ def _onto_bones(
     names = ("head_rotation", "hand_left_rotation", "hand_right_rotation")
     turned = [_rotation(controls, name, target) for name in names]
     pelvis, frames = fit(joints, 1.0, *turned)
-    if clean_up.feet or clean_up.reach:
-        joints = cleaned(forward_kinematics(frames, pelvis), targets_of(shot), clean_up, shot.path.position[:, 2])
+    if clean_up.asked:
+        joints = forward_kinematics(frames, pelvis)
+        joints = cleaned(joints, targets_of(shot), clean_up, shot.path.position[:, 2], shot.tops)
         pelvis, frames = fit(joints, 1.0, *turned)
     local = continuous_signs(quaternion_from_matrix(local_from_global(frames)))
     return blend_switches(local, pelvis, shot.path, switches) if len(switches) else (local, pelvis)

@@ -17,9 +17,11 @@ from .rotations import rotate, transpose
 from .sensor import HEIGHT, RADIUS, REACH, SPHERES, occupancy_of_distance
 from .solids import Box, Scene, box_distance
 
-__all__ = ["occupancy", "distance"]
+__all__ = ["occupancy", "distance", "tops_under"]
 
 _FRAMES_AT_ONCE = 32
+_LOWEST, _HIGHEST, _APART = 0.15, 0.925, 0.025  # metres over the floor between which tops are looked for, and how finely
+_FOOTPRINT, _CARRYING = 0.07, 3  # metres round a place; of the five spots there, how many must have a top
 
 
 @dataclass(frozen=True)
@@ -99,4 +101,26 @@ def distance(scene: Scene, points: np.ndarray, floor: np.ndarray | float) -> np.
         local = rotate(transpose(field.rotation)[:, None], points - field.position[:, None])
         near = ((local > field.low) & (local < field.high)).all(axis=-1) & field.present[:, None]
         out[near] = np.minimum(out[near], field.measure(local[near]))
+    return out
+
+
+def tops_under(scene: Scene, path: RootPath) -> np.ndarray:
+    """Height (T,) in the world of what could carry a body that sits where the root is: the highest surface between 15 and 90 cm
+    over the floor, under the root and around it; NaN where there is none. Canonical metres, solids as for ``occupancy``.
+    """
+    if not scene.solids:
+        return np.full(len(path), np.nan)
+    spots = np.array([(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)]) * _FOOTPRINT
+    heights = np.arange(_LOWEST, _HIGHEST, _APART)
+    columns = np.concatenate([np.c_[np.tile(spot, (len(heights), 1)), heights] for spot in spots])
+    found = distance(scene, path.position[:, None] + columns, path.position[:, 2]).reshape(len(path), len(spots), -1)
+    touches = found[..., :-1] < _APART / 2
+    highest = touches.shape[-1] - 1 - touches[..., ::-1].argmax(-1)
+    # Of a point over a level surface the distance is its height over it; of one inside a thin slab it may be another side's.
+    at, above = (np.take_along_axis(found, k[..., None], -1)[..., 0] for k in (highest, highest + 1))
+    top = np.where(at > 0, heights[highest] - at, heights[highest + 1] - above)
+    top[~touches.any(-1)] = np.nan
+    carried = np.isfinite(top).sum(-1) >= _CARRYING
+    out = np.full(len(path), np.nan)
+    out[carried] = np.nanmedian(top[carried], axis=-1) + path.position[carried, 2]
     return out

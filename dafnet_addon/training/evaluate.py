@@ -103,7 +103,7 @@ def made_clean(takes: np.ndarray, shot: Shot) -> np.ndarray:
     """Takes (S, T, 22, 3) after the clean-up at full strength."""
     out = []
     for joints in takes:
-        clean = cleaned(joints, targets_of(shot), CleanUp(1.0, 1.0), shot.path.position[:, 2])
+        clean = cleaned(joints, targets_of(shot), CleanUp(1.0, 1.0, 1.0), shot.path.position[:, 2], shot.tops)
         pelvis, frames = fit(clean, 1.0, None, None, None)
         out.append(forward_kinematics(frames, pelvis))
     return np.stack(out)
