@@ -16,13 +16,12 @@ from typing import Any
 import numpy as np
 import torch
 
-from dafnet_addon.baselines.flows import WholeFlow, sampler_of
+from dafnet_addon.baselines.flows import flow_of, sampler_of
 from dafnet_addon.core.sampler import Conditions, Sampler
 from dafnet_addon.core.skeleton import OFFSETS
 from dafnet_addon.core.threads import one_thread
 from dafnet_addon.core.weights import FORMAT, Weights, load_weights
 from dafnet_addon.model.config import PAPER, ModelConfig
-from dafnet_addon.model.flow import TwoPartFlow
 from dafnet_addon.model.predictor import ActionPredictor
 from dafnet_addon.training.batches import Statistics
 from dafnet_addon.training.export import tensors_of
@@ -34,7 +33,7 @@ _REPEATS = 3
 def random_weights(config: ModelConfig) -> Weights:
     """Weights of these sizes that were never trained."""
     torch.manual_seed(0)
-    flow = TwoPartFlow(config) if config.system == "dafnet" else WholeFlow(config)
+    flow = flow_of(config)
     unit = Statistics(np.zeros(66), np.ones(66), np.zeros(3), np.ones(3), np.zeros(18), np.ones(18))
     tensors = tensors_of(flow, ActionPredictor(config) if config.predicts else None, unit)
     description = {"model": config.as_dict(), "fps": 30, "offsets": OFFSETS.tolist()}

@@ -15,12 +15,16 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .core.errors import DafnetError, InputError
 from .core.take import MODES
 
+if TYPE_CHECKING:
+    from .data.held_out import HeldClip
+
 __all__ = ["main", "run"]
+
 
 def main(argv: Sequence[str] | None = None, in_blender: bool = False) -> int:
     """Run one command and return its exit code. ``in_blender``: the file that Blender has open is the scene."""
@@ -260,7 +264,11 @@ def _evaluate(options: argparse.Namespace) -> None:
     from .training.plots import plot
     from .training.report import contact_sheets, report, text
 
-    weights, clips = load_weights(options.weights), held_out(options.folder)
+    clips = held_out(options.folder)
+    if options.weights and options.weights.suffix == ".pt":
+        _evaluate_samp(options, clips)
+        return
+    weights = load_weights(options.weights)
     with _Bar() as bar:
         found = report(weights, clips, bar)
     if options.save:
@@ -274,6 +282,22 @@ def _evaluate(options: argparse.Namespace) -> None:
     if options.sheets:
         contact_sheets(weights, clips, options.sheets)
     print(json.dumps(found, indent=2) if options.json else text(found))
+
+
+def _evaluate_samp(options: argparse.Namespace, clips: "list[HeldClip]") -> None:
+    """A checkpoint of SAMP's: the rows alone, of each way that its network runs."""
+    from .baselines.samp_evaluate import measured_samp
+    from .baselines.train import load_samp
+    from .training.evaluate import rows, table
+
+    if options.save or options.sheets or options.output:
+        raise InputError("Of a checkpoint of SAMP's only the table is made; leave out --save, --sheets and --output.")
+    kind, _, _ = load_samp(options.weights)
+    found = {}
+    for each in ("samp", "samp-a") if kind == "samp" else (kind,):
+        with _Bar() as bar:
+            found[each] = rows(measured_samp(options.weights, each, clips, bar))
+    print(json.dumps(found, indent=2) if options.json else "\n\n".join(f"## {name}\n\n{table(r)}" for name, r in found.items()))
 
 
 def _bench(options: argparse.Namespace) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="the model's own code needs torch; inside Blender only NumPy runs")
 
+from dafnet_addon.baselines.flows import LowerFirstFlow  # noqa: E402
 from dafnet_addon.model.config import PAPER, SMALL, ModelConfig  # noqa: E402
 from dafnet_addon.model.flow import ActNorm, Coupling, InvertibleLinear, PartFlow, TwoPartFlow  # noqa: E402
 from dafnet_addon.model.predictor import GMVAE, gumbel_temperature  # noqa: E402
@@ -114,8 +115,9 @@ def _inputs(frames=5, batch=2):
     return upper, lower, base, torch.rand(batch, frames, 2640), observation, given
 
 
-def test_two_part_flow_inverts():
-    flow = _stirred(TwoPartFlow(TINY))
+@pytest.mark.parametrize("kind", [TwoPartFlow, LowerFirstFlow])
+def test_two_part_flow_inverts(kind: type[TwoPartFlow]):
+    flow = _stirred(kind(TINY))
     inputs = _inputs()
     z_upper, z_lower, _, _ = flow(*inputs)
     pose = flow.inverse(z_upper, z_lower, *inputs[2:])
@@ -128,6 +130,17 @@ def test_the_upper_body_does_not_hang_on_the_lower_noise():
     z_upper = torch.randn(2, 5, 42)
     one, two = (flow.inverse(z_upper, torch.randn(2, 5, 24), base, occupancy, observation, given) for _ in range(2))
     assert torch.allclose(one[..., :42], two[..., :42]) and not torch.allclose(one[..., 42:], two[..., 42:])
+
+
+def test_with_the_lower_body_first_it_is_the_other_way_round():
+    flow = _stirred(LowerFirstFlow(TINY))
+    upper, lower, base, occupancy, observation, given = _inputs()
+    z_lower = torch.randn(2, 5, 24)
+    one, two = (flow.inverse(torch.randn(2, 5, 42), z_lower, base, occupancy, observation, given) for _ in range(2))
+    assert torch.allclose(one[..., 42:], two[..., 42:]) and not torch.allclose(one[..., :42], two[..., :42])
+    told = flow.condition("upper", base, observation, given, torch.cat([upper, lower], -1))[..., base.shape[-1] :]
+    assert (told[..., :42] == observation[..., :42]).all() and (told[..., 42:66] == lower).all()
+    assert (told[..., 66:80] == given[..., :14]).all() and (told[..., 80:] == 1).all()
 
 
 def test_data_dependent_start_whitens_the_noise():

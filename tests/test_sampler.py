@@ -80,10 +80,10 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     assert np.abs(log_det - (det_upper + det_lower).numpy()).max() < 1e-8
 
 
-@pytest.mark.parametrize("system", ["ap-p", "moglow"])
+@pytest.mark.parametrize("system", ["ap-p", "moglow", "lower-first"])
 def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: Path):
     torch = pytest.importorskip("torch")
-    from dafnet_addon.baselines.flows import MoGlowSampler, WholeBodySampler, WholeFlow
+    from dafnet_addon.baselines.flows import LowerFirstSampler, MoGlowSampler, WholeBodySampler, flow_of
     from dafnet_addon.core.weights import FORMAT, Weights
     from dafnet_addon.model.config import ModelConfig
     from dafnet_addon.model.predictor import ActionPredictor
@@ -95,7 +95,7 @@ def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: 
         system=system, predictor_code=8, predictor_width=16, width=12, code=8, mask=True, steps_whole=4,
         shared_encoder=system == "moglow",
     )
-    flow = WholeFlow(config).double()
+    flow = flow_of(config).double()
     predictor = ActionPredictor(config).double() if config.predicts else None
     with torch.no_grad():
         for p in [*flow.parameters(), *(predictor.parameters() if predictor else ())]:
@@ -107,11 +107,11 @@ def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: 
     tensors = tensors_of(flow, predictor, statistics)
     description = {"model": config.as_dict(), "fps": 30, "offsets": OFFSETS.tolist()}
     conditions, z = _conditions(30), rng.normal(size=(2, 66))
-    sampler = {"ap-p": WholeBodySampler, "moglow": MoGlowSampler}[system](
+    sampler = {"ap-p": WholeBodySampler, "moglow": MoGlowSampler, "lower-first": LowerFirstSampler}[system](
         Weights(tensors, description, {"format": FORMAT}, tmp_path), dtype="float64"
     )
     made, actions = drained(sampler.run(conditions, z))
-    assert actions.shape == (30, 2, 10 if system == "ap-p" else 0)
+    assert actions.shape == (30, 2, 0 if system == "moglow" else 10)
 
     # The same, by the model's own forward: poses must go back to the noise that they were made from.
     poses = torch.from_numpy((model_order(made).transpose(1, 0, 2) - tensors["pose_mean"]) / tensors["pose_std"])
@@ -124,8 +124,12 @@ def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: 
     observation = torch.from_numpy(scaled).repeat(2, 1, 1)
     with torch.no_grad():
         told = past if predictor is None else torch.cat([predictor(past, occupancy), velocity[:, 10:]], -1)
-        noise, log_det, _ = flow.whole(poses, flow.condition(told, observation, given), occupancy)
-    assert np.abs(noise.numpy() - z[:, None]).max() < 1e-8
+        log_det = torch.zeros(2, 30)
+        for name, columns in flow.places.items():
+            condition = flow.condition(name, told, observation, given, poses)
+            noise, part_det, _ = flow.parts()[name](poses[..., columns], condition, occupancy)
+            assert np.abs(noise.numpy() - z[:, None, columns]).max() < 1e-8
+            log_det = log_det + part_det
     sampler.start(conditions, takes=2)
     taken = [sampler.absorb(t, sampler.standardised(made[t])) for t in range(30)]
     assert np.abs(np.stack([d for _, _, d in taken], axis=1) - log_det.numpy()).max() < 1e-8

@@ -12,7 +12,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from dafnet_addon.baselines.flows import sampler_of  # noqa: E402
+from dafnet_addon.baselines.flows import flow_of, sampler_of  # noqa: E402
 from dafnet_addon.core.errors import InputError, WeightsError  # noqa: E402
 from dafnet_addon.core.progress import drained  # noqa: E402
 from dafnet_addon.core.root import RootPath  # noqa: E402
@@ -243,6 +243,8 @@ def test_configurations_are_read_and_bad_ones_refused(tmp_path):
             read_config(bad)
     with pytest.raises(InputError, match="holds no windows"):
         train_part("predictor", tmp_path, tmp_path / "run", TINY, _config(1))
+    with pytest.raises(InputError, match="'lower' is unknown"):
+        flow_of(replace(TINY, system="lower"))
 
 
 def test_batches_are_noisy_by_three_millimetres(dataset):
@@ -270,6 +272,15 @@ def test_free_running_loss_is_zero_for_the_captured_motion_and_knows_sliding():
     turning[..., 2] = 0.1
     fixed = torch.tensor([[0.0, 1.0, 0.0], [0.1, 0.995, 0.0]])[None, :, None]
     assert float(sliding(fixed, turning)) < 0.02, "a point that stays in the world while the root turns to the left"
+
+
+@pytest.mark.parametrize("part", ["lower", "upper"])
+def test_the_lower_body_first_runs_freely_too(part: str, dataset: Path, tmp_path: Path):
+    pool, model = _pool(dataset), replace(TINY, system="lower-first")
+    run = Run(part, tmp_path, model, replace(_config(1), free_run=1.0, mixed=True), pool.statistics())
+    loss = run.loss(pool.batch(torch.arange(4), run.statistics, model))
+    loss.backward()
+    assert loss.isfinite() and all(p.grad.isfinite().all() for p in run.network.parameters())
 
 
 def test_running_on_is_the_likelihood_and_the_inverse(dataset):
@@ -306,15 +317,16 @@ def test_two_processes_train_one_model(dataset, tmp_path):
     assert load_weights(tmp_path / "run" / "dafnet.safetensors").config["model"]["width"] == 16
 
 
-@pytest.mark.parametrize("system", ["ap-p", "moglow"])
+@pytest.mark.parametrize("system", ["ap-p", "moglow", "lower-first"])
 def test_baselines_learn_and_their_weights_run(system: str, dataset: Path, tmp_path: Path):
     model = replace(TINY, system=system, steps_whole=2)
     folder = tmp_path / "run"
     if model.predicts:
         _until("predictor", dataset, folder, steps=2, model=model)
-    fresh = Run("whole", tmp_path / "fresh", model, _config(10), _pool(dataset).statistics())
-    before = _loss_at(fresh, dataset)
-    assert _loss_at(_until("whole", dataset, folder, steps=40, model=model), dataset) < before - 5.0
+    for part in model.parts:
+        fresh = Run(part, tmp_path / "fresh", model, _config(10), _pool(dataset).statistics())
+        before = _loss_at(fresh, dataset)
+        assert _loss_at(_until(part, dataset, folder, steps=40, model=model), dataset) < before - 5.0
     flow, predictor, statistics = trained(folder)
     assert (predictor is None) == (system == "moglow")
     spread = take_spread(flow, predictor, _pool(dataset), statistics)

@@ -136,9 +136,12 @@ class _Step:
 
 @dataclass
 class _Part:
-    """One part's place in a pose, its flow steps, and its environment encoders: one for all steps, or one each."""
+    """One part's place in a pose and those of the parts made before it, its flow steps, and its environment encoders: one for
+    all steps, or one each.
+    """
 
     columns: slice
+    before: list[slice]
     encoders: list[tuple[tuple[Array, Array], tuple[Array, Array]]]
     steps: list[_Step]
 
@@ -186,7 +189,10 @@ class Sampler:
                 size = columns.stop - columns.start
                 self._spread[columns, columns] = array(f"{name}.spread", size, size)
         self._read_told(array, c)
-        self._parts = [self._part(array, name, columns, shared, c) for name, columns in self.parts.items()]
+        places = list(self.parts.values())
+        self._parts = [self._part(array, name, places[: i + 1], shared, c) for i, name in enumerate(self.parts)]
+        self._as_pose = sorted(range(len(places)), key=lambda i: places[i].start)
+        """Which part, counted in the order of sampling, stands where in a pose."""
 
     def _read_told(self, array: Any, c: dict[str, int]) -> None:
         """What turns the scene feature s into what each coupling's net is told of it: here, the action predictor."""
@@ -213,16 +219,18 @@ class Sampler:
     def _linear(self, array: Any, name: str, inputs: int, outputs: int) -> tuple[Array, Array]:
         return self._to(array(f"{name}.weight", outputs, inputs).T), self._to(array(f"{name}.bias", outputs))
 
-    def _part(self, array: Any, part: str, columns: slice, shared: bool, c: dict[str, int]) -> _Part:
+    def _part(self, array: Any, part: str, places: list[slice], shared: bool, c: dict[str, int]) -> _Part:
+        *before, columns = places
         steps = c[f"steps_{part}"]
         encoders = [
             (self._linear(array, f"{part}.encoders.{e}.first", 2640, c["code"]),
              self._linear(array, f"{part}.encoders.{e}.second", c["code"], c["code"]))
             for e in range(1 if shared else steps)
         ]
-        return _Part(columns, encoders, [self._step(array, f"{part}.{k}", columns, c) for k in range(steps)])
+        made = [self._step(array, f"{part}.{k}", columns, before, c) for k in range(steps)]
+        return _Part(columns, before, encoders, made)
 
-    def _step(self, array: Any, name: str, columns: slice, c: dict[str, int]) -> _Step:
+    def _step(self, array: Any, name: str, columns: slice, before: list[slice], c: dict[str, int]) -> _Step:
         size = columns.stop - columns.start
         half, width = size // 2, c["width"]
         observed = _POSE_SIZE + (22 if self.mask else 0)
@@ -241,10 +249,9 @@ class Sampler:
             total = array(f"{name}.lstm.bias_ih_l{i}", 4 * width) + array(f"{name}.lstm.bias_hh_l{i}", 4 * width)
             if i == 0:
                 # Rows of the input: half a pose, actions, velocity and way ahead, observation (upper part first), mask, code.
-                start = half + self.fresh + self.moving
+                slots = half + self.fresh + self.moving + np.arange(_POSE_SIZE)
                 # The observation's slots of the parts made before are those parts: known only now.
-                fresh = [np.arange(half + self.fresh), np.arange(start, start + columns.start)]
-                rows = np.concatenate(fresh)
+                rows = np.concatenate([np.arange(half + self.fresh), *(slots[made] for made in before)])
                 known = np.setdiff1d(np.arange(inputs), rows)
                 static = self._to(np.concatenate([into[known], total[None]]))
                 into = into[rows]
@@ -285,9 +292,11 @@ class Sampler:
         one = self._to(np.ones((frames, 1)))
         empty = self._to(np.zeros((takes, self.width)))
         for part in self._parts:
-            made = part.columns.start  # of the pose, by the parts before: given, and told at each frame
-            mask = [np.ones((frames, made // 3)), conditions.given[:, made // 3 :]] if self.mask else []
-            seen = self._to(np.concatenate([observation[:, made:], *mask], axis=1))
+            made = np.zeros(_POSE_SIZE, bool)  # of the pose, by the parts before: given, and told at each frame
+            for columns in part.before:
+                made[columns] = True
+            mask = [np.where(made[::3], 1.0, conditions.given)] if self.mask else []
+            seen = self._to(np.concatenate([observation[:, ~made], *mask], axis=1))
             codes = []
             for first, second in part.encoders:
                 hidden = occupancy @ first[0] + first[1]
@@ -336,7 +345,7 @@ class Sampler:
                 changed = z[:, step.half :] / scale - shift
                 z = xp.concatenate([passed, changed], axis=-1) @ step.inverse + step.inverse_offset
             made.append(z)
-        pose = xp.concatenate(made, axis=-1)
+        pose = xp.concatenate([made[i] for i in self._as_pose], axis=-1)
         self._remember(pose)
         return pose, told
 
@@ -349,16 +358,16 @@ class Sampler:
         told = self._told(index) if told is None else told
         noise, log_det = [], 0.0 * pose.sum(-1)
         for part in self._parts:
-            x, before = pose[:, part.columns], pose[:, : part.columns.start]
+            x, before = pose[:, part.columns], [pose[:, columns] for columns in part.before]
             for step in part.steps:
                 x = x @ step.matrix + step.offset
                 passed = x[:, : step.half]
-                shift, scale = step.coupling(index, xp.concatenate([passed, told, before], axis=-1))
+                shift, scale = step.coupling(index, xp.concatenate([passed, told, *before], axis=-1))
                 x = xp.concatenate([passed, (x[:, step.half :] + shift) * scale], axis=-1)
                 log_det = log_det + xp.log(scale).sum(-1) + step.log_det
             noise.append(x)
         self._remember(pose)
-        return xp.concatenate(noise, axis=-1), told, log_det
+        return xp.concatenate([noise[i] for i in self._as_pose], axis=-1), told, log_det
 
     def run(
         self, conditions: Conditions, z: np.ndarray, kept: np.ndarray | None = None

@@ -11,14 +11,14 @@ POSE_SIZE, UPPER_SIZE, LOWER_SIZE, VELOCITY_SIZE, SENSOR_SIZE = 66, 42, 24, 3, 2
 class ModelConfig:
     """Sizes and switches.
 
-    ``system``: "dafnet", the two-part flow; or what the paper compares it with, "ap-p" or "moglow" (``baselines.flows``), one
-    flow of ``steps_whole`` steps for the whole body. ``actions``: K of the action predictor. ``predictor_code``,
-    ``predictor_width``: its environment code and its layers. ``latent``: the GMVAE's. ``steps_upper``, ``steps_lower``: flow
-    steps of each part. ``width``, ``layers``: the coupling's LSTM. ``code``: the flow's environment code. ``shared_encoder``:
-    one environment encoder for all couplings of a part (else one each). ``mask``: 22 values beside the observation say which
-    joints are given. ``action_temperature``: softmax temperature after training (paper, section 4.2). ``history``: past frames
-    that the predictor (and MoGlow) sees. ``ahead``: numbers that tell the flow where the root will be (``core.root.ahead``),
-    or 0 as in the paper.
+    ``system``: "dafnet", the two-part flow; or what it is compared with (``baselines.flows``): "ap-p" or "moglow", one flow
+    of ``steps_whole`` steps for the whole body, or "lower-first", the two parts in the opposite order. ``actions``: K of the
+    action predictor. ``predictor_code``, ``predictor_width``: its environment code and its layers. ``latent``: the GMVAE's.
+    ``steps_upper``, ``steps_lower``: flow steps of each part. ``width``, ``layers``: the coupling's LSTM. ``code``: the
+    flow's environment code. ``shared_encoder``: one environment encoder for all couplings of a part (else one each).
+    ``mask``: 22 values beside the observation say which joints are given. ``action_temperature``: softmax temperature after
+    training (paper, section 4.2). ``history``: past frames that the predictor (and MoGlow) sees. ``ahead``: numbers that tell
+    the flow where the root will be (``core.root.ahead``), or 0 as in the paper.
     """
 
     system: str = "dafnet"
@@ -41,7 +41,7 @@ class ModelConfig:
     @property
     def parts(self) -> tuple[str, ...]:
         """The flow's parts, in the order of sampling."""
-        return ("upper", "lower") if self.system == "dafnet" else ("whole",)
+        return {"dafnet": ("upper", "lower"), "lower-first": ("lower", "upper")}.get(self.system, ("whole",))
 
     @property
     def predicts(self) -> bool:

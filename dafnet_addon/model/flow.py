@@ -11,9 +11,9 @@ from typing import cast
 import torch
 from torch import Tensor, nn
 
-from .config import LOWER_SIZE, SENSOR_SIZE, UPPER_SIZE, ModelConfig
+from .config import POSE_SIZE, SENSOR_SIZE, UPPER_SIZE, ModelConfig
 
-__all__ = ["ActNorm", "InvertibleLinear", "Coupling", "PartFlow", "EnvironmentEncoder", "TwoPartFlow"]
+__all__ = ["ActNorm", "InvertibleLinear", "Coupling", "PartFlow", "EnvironmentEncoder", "BodyFlow", "TwoPartFlow"]
 
 LSTMState = tuple[Tensor, Tensor]
 
@@ -223,47 +223,64 @@ class EnvironmentEncoder(nn.Module):
             return self.second(torch.relu(self.first(occupancy))).to(occupancy.dtype)
 
 
-class TwoPartFlow(nn.Module):
-    """The upper body's flow, then the lower's, whose observation is updated by the upper body (paper, figure 5).
+class BodyFlow(nn.Module):
+    """One flow for each part of the body, made one after another: a part's observation is updated by the parts before it.
 
-    Everything here is standardised. ``upper`` (B, T, 42), ``lower`` (B, T, 24); ``base`` (B, T, K + 3): action probabilities
-    and root velocity; ``occupancy`` (B, T, 2640); ``observation`` (B, T, 66): the upper slots first, in the order of
-    ``skeleton.UPPER``, zero where free; ``given`` (B, T, 22): 1 where a joint of that order is given.
+    Everything here is standardised. ``pose`` (B, T, 66): the upper body first, in the order of ``skeleton.UPPER``; ``base``
+    (B, T, K + 3): action probabilities and root velocity; ``occupancy`` (B, T, 2640); ``observation`` (B, T, 66): in the order
+    of a pose, zero where free; ``given`` (B, T, 22): 1 where a joint of that order is given.
     """
+
+    places: dict[str, slice]
+    """The parts in the order of sampling, and their places in a pose."""
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
         self.config = config
-        self.upper = PartFlow(UPPER_SIZE, config.steps_upper, config)
-        self.lower = PartFlow(LOWER_SIZE, config.steps_lower, config)
+        for name, columns in self.places.items():
+            steps = getattr(config, f"steps_{name}")
+            self.add_module(name, PartFlow(columns.stop - columns.start, steps, config))
 
     def parts(self) -> dict[str, PartFlow]:
         """The flows by name, in the order of sampling."""
-        return {"upper": self.upper, "lower": self.lower}
+        return {name: getattr(self, name) for name in self.places}
 
-    def upper_condition(self, base: Tensor, observation: Tensor, given: Tensor) -> Tensor:
-        """What the upper part is told beside the environment (B, T, K + 3 + 66 [+ 22])."""
+    def condition(self, part: str, base: Tensor, observation: Tensor, given: Tensor, pose: Tensor) -> Tensor:
+        """What a part is told beside the environment (B, T, K + 3 + 66 [+ 22]): the slots of the parts before it are those of
+        ``pose``, which is the true one, or the one being made.
+        """
+        observation, given = observation.clone(), given.clone()
+        for name, columns in self.places.items():
+            if name == part:
+                break
+            observation[..., columns] = pose[..., columns]
+            given[..., columns.start // 3 : columns.stop // 3] = 1.0
         return torch.cat([base, observation, given] if self.config.mask else [base, observation], dim=-1)
 
-    def lower_condition(self, base: Tensor, observation: Tensor, given: Tensor, upper: Tensor) -> Tensor:
-        """The same for the lower part: the observation's upper slots are the true or the generated upper body."""
-        updated = torch.cat([upper, observation[..., UPPER_SIZE:]], dim=-1)
-        joints = UPPER_SIZE // 3
-        known = torch.cat([torch.ones_like(given[..., :joints]), given[..., joints:]], dim=-1)
-        return self.upper_condition(base, updated, known)
+
+class TwoPartFlow(BodyFlow):
+    """The upper body's flow, then the lower's, whose observation is updated by the upper body (paper, figure 5)."""
+
+    places = {"upper": slice(0, UPPER_SIZE), "lower": slice(UPPER_SIZE, POSE_SIZE)}
+    upper: PartFlow
+    lower: PartFlow
 
     def forward(
         self, upper: Tensor, lower: Tensor, base: Tensor, occupancy: Tensor, observation: Tensor, given: Tensor,
     ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Noise of both parts (B, T, 42), (B, T, 24) and both log-determinants (B, T)."""
-        z_upper, det_upper, _ = self.upper(upper, self.upper_condition(base, observation, given), occupancy)
-        z_lower, det_lower, _ = self.lower(lower, self.lower_condition(base, observation, given, upper), occupancy)
+        pose = torch.cat([upper, lower], dim=-1)
+        z_upper, det_upper, _ = self.upper(upper, self.condition("upper", base, observation, given, pose), occupancy)
+        z_lower, det_lower, _ = self.lower(lower, self.condition("lower", base, observation, given, pose), occupancy)
         return z_upper, z_lower, det_upper, det_lower
 
     def inverse(
         self, z_upper: Tensor, z_lower: Tensor, base: Tensor, occupancy: Tensor, observation: Tensor, given: Tensor
     ) -> Tensor:
-        """Pose (B, T, 66), upper part first, of noise: the upper body, then the lower under it."""
-        upper, _ = self.upper.inverse(z_upper, self.upper_condition(base, observation, given), occupancy)
-        lower, _ = self.lower.inverse(z_lower, self.lower_condition(base, observation, given, upper), occupancy)
-        return torch.cat([upper, lower], dim=-1)
+        """Pose (B, T, 66), upper part first, of noise: one part, then the other under or over it."""
+        noise = torch.cat([z_upper, z_lower], dim=-1)
+        pose = torch.zeros_like(noise)
+        for name, columns in self.places.items():
+            told = self.condition(name, base, observation, given, pose)
+            pose[..., columns], _ = self.parts()[name].inverse(noise[..., columns], told, occupancy)
+        return pose

@@ -274,7 +274,8 @@ def rows(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
     }
     out: dict[str, dict[str, Any]] = {}
     for suffix, chosen in groups.items():
-        out |= {run + suffix: values for run, values in rows_of(chosen, _RUNS).items()}
+        runs = [run for run in _RUNS if chosen and run in chosen[0].runs]
+        out |= {run + suffix: values for run, values in rows_of(chosen, runs).items()}
     return out
 
 

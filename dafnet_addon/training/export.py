@@ -8,21 +8,18 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from ..baselines.flows import WholeFlow
 from ..core.errors import WeightsError
 from ..core.skeleton import JOINTS, OFFSETS
 from ..core.weights import FORMAT, Weights, quantised, read_safetensors, write_safetensors
 from ..model.config import VELOCITY_SIZE, ModelConfig
-from ..model.flow import Coupling, PartFlow, TwoPartFlow
+from ..model.flow import BodyFlow, Coupling, PartFlow
 from ..model.predictor import ActionPredictor
 from .batches import NOISE, Statistics
 
 __all__ = ["tensors_of", "adopt_predictor", "adopt_part", "adopted_statistics", "export", "annotate"]
 
 
-def tensors_of(
-    flow: TwoPartFlow | WholeFlow, predictor: ActionPredictor | None, statistics: Statistics
-) -> dict[str, np.ndarray]:
+def tensors_of(flow: BodyFlow, predictor: ActionPredictor | None, statistics: Statistics) -> dict[str, np.ndarray]:
     """Every array that the sampler needs, by the names that it knows them by."""
     out: dict[str, np.ndarray] = {name: value.astype(np.float32) for name, value in asdict(statistics).items()}
     for name, tensor in predictor.state_dict().items() if predictor is not None else ():
@@ -87,7 +84,7 @@ def adopted_statistics(weights: Weights, found: Statistics) -> Statistics:
 
 
 def export(
-    file: Path, flow: TwoPartFlow | WholeFlow, predictor: ActionPredictor | None, statistics: Statistics,
+    file: Path, flow: BodyFlow, predictor: ActionPredictor | None, statistics: Statistics,
     words: Mapping[str, str], spread: Mapping[str, np.ndarray] | None = None,
 ) -> None:
     """Write the weights file; ``words`` are its metadata (licence, provenance, metrics), texts or JSON texts; ``spread`` (see

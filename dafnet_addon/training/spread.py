@@ -9,9 +9,8 @@ how far real takes differ. The paper's draw from N(0, I) is temperature 1 of wei
 import numpy as np
 import torch
 
-from ..baselines.flows import WholeFlow
 from ..model.config import POSE_SIZE
-from ..model.flow import TwoPartFlow
+from ..model.flow import BodyFlow
 from ..model.predictor import ActionPredictor
 from .batches import Batch, Pool, Statistics
 
@@ -22,22 +21,22 @@ _AT_ONCE = 50
 
 
 @torch.no_grad()
-def noise_along(flow: TwoPartFlow | WholeFlow, predictor: ActionPredictor | None, batch: Batch) -> dict[str, torch.Tensor]:
-    """Noise of each part (B, T, …) along captured windows in FREE mode, the lower body under the captured upper one."""
+def noise_along(flow: BodyFlow, predictor: ActionPredictor | None, batch: Batch) -> dict[str, torch.Tensor]:
+    """Noise of each part (B, T, …) along captured windows in FREE mode, each beside the captured parts before it."""
     observation = torch.zeros(*batch.upper.shape[:2], POSE_SIZE, device=batch.upper.device)
     given = observation[..., :22]
     told = batch.past
     if predictor is not None:
         told = torch.cat([predictor(batch.past, batch.occupancy), batch.root], dim=-1)
-    if isinstance(flow, WholeFlow):
-        pose = torch.cat([batch.upper, batch.lower], dim=-1)
-        return {"whole": flow.whole(pose, flow.condition(told, observation, given), batch.occupancy)[0]}
-    upper, lower, _, _ = flow(batch.upper, batch.lower, told, batch.occupancy, observation, given)
-    return {"upper": upper, "lower": lower}
+    pose = torch.cat([batch.upper, batch.lower], dim=-1)
+    conditions = {name: flow.condition(name, told, observation, given, pose) for name in flow.places}
+    return {
+        name: part(pose[..., flow.places[name]], conditions[name], batch.occupancy)[0] for name, part in flow.parts().items()
+    }
 
 
 def take_spread(
-    flow: TwoPartFlow | WholeFlow, predictor: ActionPredictor | None, pool: Pool, statistics: Statistics, windows: int = 2000
+    flow: BodyFlow, predictor: ActionPredictor | None, pool: Pool, statistics: Statistics, windows: int = 2000
 ) -> dict[str, np.ndarray]:
     """By part, the lower triangular matrix L (n, n) of which a take's noise is L e with e from N(0, I), of as many windows."""
     rows = torch.randperm(len(pool), generator=torch.Generator().manual_seed(0))[:windows]

@@ -20,11 +20,11 @@ from typing import Any
 import torch
 from torch import nn
 
-from ..baselines.flows import WholeFlow
+from ..baselines.flows import flow_of
 from ..core.errors import InputError
 from ..core.weights import Weights
 from ..model.config import LOWER_SIZE, PAPER, POSE_SIZE, SMALL, UPPER_SIZE, ModelConfig
-from ..model.flow import Coupling, EnvironmentEncoder, TwoPartFlow
+from ..model.flow import BodyFlow, Coupling, EnvironmentEncoder
 from ..model.predictor import GMVAE, ActionPredictor, gumbel_temperature
 from . import ranks
 from .batches import Batch, Pool, Statistics, observation_for
@@ -94,8 +94,8 @@ def read_config(file: Path) -> tuple[ModelConfig, TrainingConfig]:
 class Run:
     """One network in training: 'predictor' (within its GMVAE), the flow's 'upper' or 'lower' part, or a baseline's 'whole'.
 
-    The likelihood is a sum of the two parts', and the lower is trained under the true upper body: given the predictor they
-    have nothing in common, and are trained as two runs, side by side where there are two cores.
+    The likelihood is a sum of the two parts', and the second is trained under the true first: given the predictor they have
+    nothing in common, and are trained as two runs, side by side where there are two cores.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class Run:
         self.part, self.folder, self.model, self.config, self.statistics = part, folder, model, config, statistics
         self.device = torch.device(device)
         self.gmvae = GMVAE(model).to(self.device)
-        self.flow: TwoPartFlow | WholeFlow = (TwoPartFlow if model.system == "dafnet" else WholeFlow)(model).to(self.device)
+        self.flow = flow_of(model).to(self.device)
         for module in self.flow.modules():
             if isinstance(module, Coupling | EnvironmentEncoder):
                 module.mixed = config.mixed
@@ -188,20 +188,16 @@ class Run:
         self, batch: Batch, occupancy: torch.Tensor, observation: torch.Tensor, given: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """The part's poses (B, T, …), and what its flow is told of them beside the environment."""
-        if isinstance(self.flow, WholeFlow) and not self.model.predicts:
+        if self.model.predicts:
+            with torch.no_grad():
+                base = torch.cat([self.gmvae.predictor(batch.past, occupancy), batch.root], dim=-1)
+        else:
             # MoGlow's data dropout: whole past poses are hidden, so that it heeds what it is told.
-            past = batch.past.clone()
-            poses = past[..., : self.model.history * POSE_SIZE].unflatten(-1, (-1, POSE_SIZE))
+            base = batch.past.clone()
+            poses = base[..., : self.model.history * POSE_SIZE].unflatten(-1, (-1, POSE_SIZE))
             poses *= torch.rand(*poses.shape[:-1], 1, device=self.device) >= self.config.slot_dropout
-            return torch.cat([batch.upper, batch.lower], dim=-1), self.flow.condition(past, observation, given)
-        with torch.no_grad():
-            actions = self.gmvae.predictor(batch.past, occupancy)
-        base = torch.cat([actions, batch.root], dim=-1)
-        if isinstance(self.flow, WholeFlow):
-            return torch.cat([batch.upper, batch.lower], dim=-1), self.flow.condition(base, observation, given)
-        if self.part == "upper":
-            return batch.upper, self.flow.upper_condition(base, observation, given)
-        return batch.lower, self.flow.lower_condition(base, observation, given, batch.upper)
+        pose = torch.cat([batch.upper, batch.lower], dim=-1)
+        return pose[..., self.flow.places[self.part]], self.flow.condition(self.part, base, observation, given, pose)
 
     def _free_run(
         self, made: torch.Tensor, true: torch.Tensor, calm: torch.Tensor, batch: Batch, given: torch.Tensor, kept: int
@@ -374,7 +370,7 @@ def train(
             done.result()
 
 
-def trained(folder: Path) -> tuple[TwoPartFlow | WholeFlow, ActionPredictor | None, Statistics]:
+def trained(folder: Path) -> tuple[BodyFlow, ActionPredictor | None, Statistics]:
     """The flow, the predictor (of MoGlow none) and the statistics of a run's latest checkpoints."""
     runs = _checkpoints(folder)
     flow = next(run.flow for part, run in runs.items() if part != "predictor")
