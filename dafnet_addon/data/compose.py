@@ -34,7 +34,7 @@ from .pieces import (
 from .uses import runs
 from .windows import Motion, mirrored
 
-__all__ = ["composed"]
+__all__ = ["LEANS", "at_board", "at_top", "composed", "seated_work"]
 
 _BUSY = {"standing_gesture", "social_gesture", "greeting", "documents", "work_standing", "reach-hand-task", "standing_idle"}
 _HIGHEST_BED = 0.62
@@ -43,7 +43,7 @@ _TURNING = 66  # frames of getting onto a bed
 _WAITS = 90  # frames
 _IDLES = 45  # pieces of standing that are used, of many that are alike
 _BOARD = np.array([0.0, 0.6])  # from the root that stands before it; or a counter
-_LEANS = (-0.3, -0.15, 0.0, 0.0, 0.15, 0.3)  # radians; back is positive
+LEANS = (-0.3, -0.15, 0.0, 0.0, 0.15, 0.3)  # radians; back is positive
 _AT_DESK_LEANS = (-0.2, -0.1, 0.0, 0.0, 0.06)
 
 
@@ -74,7 +74,7 @@ def _waiting(sits: list[Piece]) -> Iterator[Composed]:
         yield from made("wait", sit.name + " reversed", sit.subject, "sit-stand", whole[::-1], len(whole) - 1 - focus[::-1])
 
 
-def _at_top(
+def at_top(
     rng: np.random.Generator, joints: np.ndarray, start: int, end: int, height: float, farther: float = 0.0
 ) -> np.ndarray:
     """The motion with hands that work on a top at ``height`` in frames ``start`` to ``end``, wherever its root is then."""
@@ -99,25 +99,45 @@ def _leaning(rng: np.random.Generator, frames: int, rest: int, leans: Sequence[f
     return lean + wander[:, 0], wander[:, 1]
 
 
+def seated_work(
+    rng: np.random.Generator, sit: np.ndarray, upper: np.ndarray, leans: Sequence[float]
+) -> tuple[np.ndarray, int]:
+    """A motion (T, 22, 3) that ends seated, gone on for ``WORKS`` frames under another's upper body; and where it rests.
+
+    That is 20 frames before the end of ``sit``: from there on ``upper`` (T, 22, 3) is lent and the trunk leans, from one of
+    ``leans`` (radians, back is positive) to another.
+    """
+    body = np.concatenate([sit, np.repeat(sit[-1:], WORKS, axis=0)])
+    rest, frames = len(sit) - 20, len(body)
+    upper = np.pad(upper, ((rest, frames), (0, 0), (0, 0)), mode="edge")[:frames]
+    body = lent(body, upper, presence(frames, rest, 2 * frames, 30))
+    return swayed(body, *_leaning(rng, frames, rest, leans)), rest
+
+
+def at_board(rng: np.random.Generator, joints: np.ndarray, start: int, end: int) -> np.ndarray:
+    """The motion with a right hand that writes or draws on a board in frames ``start`` to ``end``, before its root there."""
+    path, middle = root_from_joints(joints), (start + end) // 2
+    course = (lettering, lettering, drawing)[rng.integers(3)](rng, len(joints))
+    wrist = path.position[middle] + rotate(path.rotation[middle], course)
+    return handed(joints, "right_", wrist, presence(len(joints), start, end))
+
+
 def _while_seated(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed]:
     """Seated legs under upper bodies that gesture, greet and reach ("work"), or whose hands work at a desk ("desk")."""
     rng = np.random.default_rng(12)
     seated = upper_bodies(motions, {"seated_chair", "seated_table"})
     busy = upper_bodies(motions, _BUSY) + seated
     for sit in sits * 3:
-        for kind, uppers, leans in (("work", busy, _LEANS), ("desk", seated, _AT_DESK_LEANS)):
+        for kind, uppers, leans in (("work", busy, LEANS), ("desk", seated, _AT_DESK_LEANS)):
             if not uppers:
                 continue
-            body = np.concatenate([sit.joints, np.repeat(sit.joints[-1:], WORKS, axis=0)])
-            rest, frames = len(sit.joints) - 20, len(body)
             upper = uppers[rng.integers(len(uppers))]
             upper = upper if rng.random() < 0.5 else mirrored(upper)
-            upper = np.pad(upper, ((rest, frames), (0, 0), (0, 0)), mode="edge")[:frames]
-            body = lent(body, upper, presence(frames, rest, 2 * frames, 30))
-            body = swayed(body, *_leaning(rng, frames, rest, leans))
+            body, rest = seated_work(rng, sit.joints, upper, leans)
+            frames = len(body)
             if kind == "desk":
                 top = body[rest + 20, 0, 2] - SEAT_TO_PELVIS + rng.uniform(0.24, 0.33)
-                body = _at_top(rng, body, rest + 5, frames + 60, top)
+                body = at_top(rng, body, rest + 5, frames + 60, top)
             yield from made(kind, sit.name, sit.subject, "seated", body, np.arange(rest, frames - 20, 5))
 
 
@@ -136,13 +156,9 @@ def _while_standing(motions: list[Motion], to: Pool, away: Pool) -> Iterator[Com
                 whole = joined(joined(come[rng.integers(len(come))], stands), go[rng.integers(len(go))])
                 start, end = BEFORE + 8, BEFORE + WORKS - 4
                 if kind == "counter":
-                    whole = _at_top(rng, whole, start, end, rng.uniform(0.72, 1.05))
+                    whole = at_top(rng, whole, start, end, rng.uniform(0.72, 1.05))
                 else:
-                    path = root_from_joints(whole)
-                    turn = path.rotation[(start + end) // 2]
-                    course = (lettering, lettering, drawing)[rng.integers(3)](rng, len(whole))
-                    wrist = path.position[(start + end) // 2] + rotate(turn, course)
-                    whole = handed(whole, "right_", wrist, presence(len(whole), start, end))
+                    whole = at_board(rng, whole, start, end)
                 if rng.random() < 0.5:
                     whole = mirrored(whole)
                 yield from made(kind, "standing", "composed", "standing", whole, np.arange(start - 30, end + 30, 5))

@@ -13,7 +13,9 @@ from ..core.skeleton import SEAT_TO_PELVIS, joint
 from .boxes import NO_BOXES, box, placed
 from .uses import Use, lying, reaching, runs, stroking, working
 
-__all__ = ["Rest", "resting", "probes", "seat_for", "scattered", "fitted", "furnished"]
+__all__ = [
+    "Rest", "SeatKind", "resting", "probes", "seat_for", "desk_for", "board_for", "scattered", "fitted", "furnished",
+]
 
 _PROBES = [  # bone from, bone to, share of the way, radius of the flesh there
     ("pelvis", "pelvis", 0.0, 0.09), ("left_hip", "left_knee", 0.5, 0.06), ("right_hip", "right_knee", 0.5, 0.06),
@@ -73,7 +75,7 @@ _STYLES = ("block", "legs", "legs", "column", "panels")
 
 
 @dataclass(frozen=True)
-class _Seat:
+class SeatKind:
     """Ranges of a kind of seat in metres: half its width, what lies behind and before the pelvis, thickness; how often it has a
     back and arms; what may carry it; whether it is ever soft.
     """
@@ -89,13 +91,13 @@ class _Seat:
 
 
 _SEATS = (
-    _Seat((0.15, 0.22), (0.12, 0.2), (0.1, 0.25), (0.03, 0.08), 0.0, 0.0),  # stool
-    _Seat((0.18, 0.26), (0.14, 0.30), (0.14, 0.36), (0.03, 0.08), 0.85, 0.2, ("legs", "legs", "panels")),  # chair
-    _Seat((0.22, 0.30), (0.15, 0.30), (0.14, 0.36), (0.05, 0.10), 0.9, 0.6, ("column",)),  # office chair
-    _Seat((0.5, 1.0), (0.12, 0.25), (0.12, 0.3), (0.03, 0.12), 0.2, 0.0, ("block", "legs", "panels")),  # bench
-    _Seat((0.27, 0.36), (0.18, 0.35), (0.2, 0.42), (0.1, 0.25), 0.9, 0.8, ("block", "legs"), soft=True),  # armchair
-    _Seat((0.5, 1.1), (0.18, 0.35), (0.2, 0.42), (0.1, 0.25), 0.9, 0.7, ("block", "legs"), soft=True),  # sofa
-    _Seat((0.3, 1.0), (0.3, 0.6), (0.04, 0.14), (0.03, 0.3), 0.3, 0.0, ("block", "legs", "panels")),  # its edge
+    SeatKind((0.15, 0.22), (0.12, 0.2), (0.1, 0.25), (0.03, 0.08), 0.0, 0.0),  # stool
+    SeatKind((0.18, 0.26), (0.14, 0.30), (0.14, 0.36), (0.03, 0.08), 0.85, 0.2, ("legs", "legs", "panels")),  # chair
+    SeatKind((0.22, 0.30), (0.15, 0.30), (0.14, 0.36), (0.05, 0.10), 0.9, 0.6, ("column",)),  # office chair
+    SeatKind((0.5, 1.0), (0.12, 0.25), (0.12, 0.3), (0.03, 0.12), 0.2, 0.0, ("block", "legs", "panels")),  # bench
+    SeatKind((0.27, 0.36), (0.18, 0.35), (0.2, 0.42), (0.1, 0.25), 0.9, 0.8, ("block", "legs"), soft=True),  # armchair
+    SeatKind((0.5, 1.1), (0.18, 0.35), (0.2, 0.42), (0.1, 0.25), 0.9, 0.7, ("block", "legs"), soft=True),  # sofa
+    SeatKind((0.3, 1.0), (0.3, 0.6), (0.04, 0.14), (0.03, 0.3), 0.3, 0.0, ("block", "legs", "panels")),  # its edge
 )
 _SEAT_SHARES = (0.14, 0.27, 0.15, 0.10, 0.10, 0.14, 0.10)
 
@@ -182,7 +184,7 @@ def _carrier(
     return [box((sx * (x - 0.02), middle, under / 2), (0.04, depth, under)) for sx in (-1, 1)]
 
 
-def _seat(rng: np.random.Generator, top: float, kind: _Seat, small: float) -> tuple[np.ndarray, np.ndarray]:
+def _seat(rng: np.random.Generator, top: float, kind: SeatKind, small: float) -> tuple[np.ndarray, np.ndarray]:
     """A seat with its front along +y, the sitter's pelvis over the origin: (carrying boxes, back and arms).
 
     ``small`` from 1 to 0 takes away what lies before the pelvis.
@@ -212,14 +214,19 @@ def _seat(rng: np.random.Generator, top: float, kind: _Seat, small: float) -> tu
     return both
 
 
-def seat_for(rng: np.random.Generator, rest: Rest, points: np.ndarray) -> np.ndarray | None:
-    """Boxes of a random seat under a resting pelvis, or None where no try leaves the body's path (``points``) free."""
-    kind = _SEATS[rng.choice(len(_SEATS), p=_SEAT_SHARES)]
-    sink = float(np.clip(rng.normal(0.0, 0.015), -0.04, 0.04))
+def seat_for(
+    rng: np.random.Generator, rest: Rest, points: np.ndarray, wanted: SeatKind | None = None
+) -> np.ndarray | None:
+    """Boxes of a random seat under a resting pelvis, or None where no try leaves the body's path (``points``) free.
+
+    A ``wanted`` kind of seat is exactly as far under the pelvis as hard seats are, and no stool takes its place.
+    """
+    kind = wanted or _SEATS[rng.choice(len(_SEATS), p=_SEAT_SHARES)]
+    sink = 0.0 if wanted else float(np.clip(rng.normal(0.0, 0.015), -0.04, 0.04))
     if kind.soft and rng.random() < _SOFT:
         sink = SEAT_TO_PELVIS - rng.uniform(0.0, 0.06)
     for attempt in range(_TRIES):
-        if attempt == _TRIES // 2:
+        if attempt == _TRIES // 2 and not wanted:
             kind = _SEATS[0]  # a plain stool fits where nothing else does
         top = rest.position[2] - SEAT_TO_PELVIS + sink
         carrying, extra = _seat(rng, top, kind, small=1.0 - 0.5 * attempt / _TRIES)
@@ -278,7 +285,7 @@ def _across(use: Use, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return offset @ (c, s), offset @ (-s, c)
 
 
-def _desk_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
+def desk_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
     """A desk, table or counter whose top is 2 to 5 cm under the lowest wrist that works there."""
     origin = use.points[:, :2].mean(0)
     right, ahead = _across(use, origin)
@@ -301,7 +308,7 @@ def _desk_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndar
     return None
 
 
-def _board_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
+def board_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
     """A board or wall 5 to 9 cm beyond the furthest wrist that strokes it."""
     origin = use.points[:, :2].mean(0)
     right, ahead = _across(use, origin)
@@ -491,4 +498,4 @@ def furnished(rng: np.random.Generator, joints: np.ndarray, path: RootPath) -> t
     return np.concatenate([NO_BOXES, *used, scattered(rng, points, path, count)]), ""
 
 
-_FITS = {"desk": _desk_for, "board": _board_for, "shelf": _shelf_for}
+_FITS = {"desk": desk_for, "board": board_for, "shelf": _shelf_for}

@@ -12,8 +12,8 @@ from ..core.skeleton import joint
 from .windows import COMPOSED, Motion, mirrored, motion_of
 
 __all__ = [
-    "BEFORE", "DIRECTIONS", "STAYS", "TOELESS", "WORKS", "Composed", "Piece", "Pool", "entrance", "features_of", "made",
-    "pool_of", "sit_downs", "upper_bodies", "ways_of",
+    "BEFORE", "DIRECTIONS", "STAYS", "TOELESS", "WORKS", "Composed", "Piece", "Pool", "entrance", "features_of", "fluent",
+    "made", "matches_of", "pool_of", "sit_downs", "upper_bodies", "ways_of",
 ]
 
 _WALK = {"locomotion", "walk", "turn", "carry_other", "door", "reach-hand-task", "greeting", "standing"}
@@ -45,7 +45,7 @@ class Composed:
     focus: np.ndarray
 
 
-def _fluent(joints: np.ndarray) -> np.ndarray:
+def fluent(joints: np.ndarray) -> np.ndarray:
     """False in frames (T,) around a speed or an acceleration that no captured motion of these kinds has."""
     step = np.diff(joints, axis=0, prepend=joints[:1])
     change = np.diff(step, axis=0, prepend=step[:1])
@@ -54,7 +54,7 @@ def _fluent(joints: np.ndarray) -> np.ndarray:
 
 def made(kind: str, name: str, subject: str, category: str, joints: np.ndarray, focus: np.ndarray) -> Iterator[Composed]:
     """The composed motion, where it is fluent; nothing where it is not. ``focus`` counts frames of ``joints``."""
-    if not _fluent(joints).all():
+    if not fluent(joints).all():
         return
     motion = motion_of(f"{name} {kind}", COMPOSED, subject, category, joints)
     if category == "lying":  # on a bed the feet are off the floor
@@ -106,7 +106,7 @@ def upper_bodies(motions: list[Motion], categories: set[str]) -> list[np.ndarray
                 piece = m.joints[start : start + WORKS]
                 trunk = normalised(piece[:, joint("neck")] - piece[:, 0])[:, 2]
                 stays = np.ptp(piece[:, 0, :2], axis=0).max() < 0.3
-                if stays and trunk.min() > 0.75 and m.valid[start : start + WORKS].all() and _fluent(piece).all():
+                if stays and trunk.min() > 0.75 and m.valid[start : start + WORKS].all() and fluent(piece).all():
                     found.append(piece)
     return found
 
@@ -124,48 +124,49 @@ class Pool:
     """Frames (N, 2: clip, frame) in which a body is slow that comes from, or goes, elsewhere.
 
     ``features`` (N, 48) must match; ``tracks`` (N, T, 2): where it was before, or will be, as seen from it, the farthest first.
+    ``names``: of each clip its source and name, as "source/name", and whether it is seen in a mirror.
     """
 
     arriving: bool
     clips: list[np.ndarray]
+    names: list[tuple[str, bool]]
     rows: np.ndarray
     features: np.ndarray
     tracks: np.ndarray
 
 
-def pool_of(motions: list[Motion], arriving: bool) -> Pool:
+def pool_of(motions: list[Motion], arriving: bool, kept: tuple[int, int] = (BEFORE, BEFORE)) -> Pool:
+    """All places where a walk may end, or begin, with ``kept`` frames of its clip before and after them."""
     clips: list[np.ndarray] = []
+    names: list[tuple[str, bool]] = []
     rows, features, tracks = [], [], []
     offsets = np.arange(_TRAVELLED, -1, -8) * (-1 if arriving else 1)
     for m in motions:
-        if m.category not in _WALK or m.source == TOELESS or len(m.joints) < 2 * BEFORE:
+        if m.category not in _WALK or m.source == TOELESS or len(m.joints) < sum(kept):
             continue
-        for joints in (m.joints, mirrored(m.joints)):
+        for joints, mirror in ((m.joints, False), (mirrored(m.joints), True)):
             path = root_from_joints(joints)
-            frames = np.arange(BEFORE, len(joints) - BEFORE, 2)
+            frames = np.arange(kept[0], len(joints) - kept[1], 2)
             slow = np.linalg.norm(np.gradient(path.position, axis=0), axis=-1) * 30 < _SLOW
             far = np.linalg.norm(path.position[frames + offsets[0]] - path.position[frames], axis=-1) > _FAR
-            broken = np.concatenate([[0], np.cumsum(~(m.valid & _fluent(joints)))])
-            frames = frames[slow[frames] & far & (broken[frames + BEFORE] == broken[frames - BEFORE])]
+            broken = np.concatenate([[0], np.cumsum(~(m.valid & fluent(joints)))])
+            frames = frames[slow[frames] & far & (broken[frames + kept[1]] == broken[frames - kept[0]])]
             if len(frames):
                 around = path.position[frames[:, None] + offsets] - path.position[frames][:, None]
                 tracks.append(np.einsum("nji,ntj->nti", path.rotation[frames], around)[..., :2])
                 rows.append(np.stack([np.full(len(frames), len(clips)), frames], axis=1))
                 features.append(features_of(joints)[frames].astype(np.float32))
                 clips.append(joints)
+                names.append((f"{m.source}/{m.name}", mirror))
     if not clips:
-        return Pool(arriving, [], np.zeros((0, 2), int), np.zeros((0, 48), np.float32), np.zeros((0, len(offsets), 2)))
-    return Pool(arriving, clips, np.concatenate(rows), np.concatenate(features), np.concatenate(tracks))
+        return Pool(arriving, [], [], np.zeros((0, 2), int), np.zeros((0, 48), np.float32), np.zeros((0, len(offsets), 2)))
+    return Pool(arriving, clips, names, np.concatenate(rows), np.concatenate(features), np.concatenate(tracks))
 
 
-def ways_of(
+def matches_of(
     pool: Pool, pose: np.ndarray, place: np.ndarray, each: int, directions: Sequence[int] = range(DIRECTIONS)
-) -> Iterator[np.ndarray]:
-    """Walks that end, or begin, with a pose that matches ``pose`` (48,): the best ``each`` in every direction from a place.
-
-    ``place`` (2,): a seat's middle, say, in the root's frame at the join; a way that leads through it is none. Direction 0 is
-    the one that the body faces, the others follow counter-clockwise.
-    """
+) -> Iterator[tuple[int, int]]:
+    """Clip and frame in the pool where a walk ends, or begins, that matches ``pose``: as ``ways_of`` finds them."""
     cost = np.abs(pool.features - pose.astype(np.float32)).mean(1)
     like = np.flatnonzero(cost < _ALIKE)
     like = like[np.argsort(cost[like])]
@@ -178,4 +179,16 @@ def ways_of(
         for clip, at in pool.rows[like[sector == direction]]:
             if clip not in used and len(used) < each:
                 used.add(clip)
-                yield pool.clips[clip][at - BEFORE : at + 1] if pool.arriving else pool.clips[clip][at : at + BEFORE]
+                yield int(clip), int(at)
+
+
+def ways_of(
+    pool: Pool, pose: np.ndarray, place: np.ndarray, each: int, directions: Sequence[int] = range(DIRECTIONS)
+) -> Iterator[np.ndarray]:
+    """Walks that end, or begin, with a pose that matches ``pose`` (48,): the best ``each`` in every direction from a place.
+
+    ``place`` (2,): a seat's middle, say, in the root's frame at the join; a way that leads through it is none. Direction 0 is
+    the one that the body faces, the others follow counter-clockwise.
+    """
+    for clip, at in matches_of(pool, pose, place, each, directions):
+        yield pool.clips[clip][at - BEFORE : at + 1] if pool.arriving else pool.clips[clip][at : at + BEFORE]

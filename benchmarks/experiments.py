@@ -1,0 +1,260 @@
+"""The paper's comparisons on open data: every system trained alike from nothing, then Tables 1 and 2 (docs/experiments.md).
+
+    python benchmarks/experiments.py train DATASET -o RUNS --minutes 20
+    python benchmarks/experiments.py table1 FOLDER -o RUNS
+    python benchmarks/experiments.py table2 FOLDER -o RUNS
+
+``DATASET`` is made by ``dafnet prepare``, ``FOLDER`` holds its motion files. All systems have the width of the weights that
+ship, the same windows, batches, learning rates, modes and sensor dropout, and the likelihood alone (SAMP: its own loss): what
+this project adds (the way ahead, the free run) is left out, so that the systems differ by what the paper says they differ by.
+There are two budgets: equal processor time for a whole system, and as many steps as MoGlow, the dearest, takes in that time.
+What is finished is kept; a killed command goes on where it was.
+"""
+
+import argparse
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from dafnet_addon.baselines.samp import SMALL_SAMP, SampConfig
+from dafnet_addon.baselines.samp_evaluate import measured_samp
+from dafnet_addon.baselines.train import load_samp, train_samp
+from dafnet_addon.core.weights import load_weights
+from dafnet_addon.data.held_out import HeldClip, held_out
+from dafnet_addon.data.paper_test import paper_test
+from dafnet_addon.model.config import SMALL, ModelConfig
+from dafnet_addon.training.evaluate import Measured, captured, measured, row
+from dafnet_addon.training.export import export
+from dafnet_addon.training.spread import take_spread
+from dafnet_addon.training.train import Run, TrainingConfig, dataset_pool, train_part, trained
+
+MODEL = SMALL
+TRAINING = TrainingConfig(batch=40, peak=1e-3, mixed=True, minutes_predictor=2.0)
+FLOWS: dict[str, dict[str, Any]] = {
+    "MoGlow": {"system": "moglow", "steps_whole": 16}, "AP-P": {"system": "ap-p", "steps_whole": 6},
+    "DAFNet": {"system": "dafnet"}, "Lower body first": {"system": "lower-first"},
+}
+"""The likelihood models of Table 2, as the paper sizes them, and DAFNet the other way round (the paper's section 7)."""
+STEPPED = ("AP-P", "DAFNet")
+"""Those that get a second run, of as many steps as MoGlow's."""
+SAMP = {"SAMP": ("samp", "samp"), "SAMP-A": ("samp", "samp-a"), "SAMP on our input": ("samp-ob", "samp-ob")}
+"""By system, the network that it runs, and how (``baselines.samp``)."""
+NETWORKS = ("samp", "samp-ob")
+BUDGETS = ("equal time", "equal steps")
+SHIPPED = "the weights that ship"
+
+_FIGURES = {"fs": "foot_sliding_per_frame", "eed": "end_effector_error", "bcc": "bad_collisions_per_frame"}
+_SEATS = {"sits": "sits_within_6cm", "stands": "stands_when_it_should"}
+TABLES: dict[str, tuple[tuple[str, ...], dict[str, tuple[float, ...]]]] = {
+    "table1": (("fs free", "bcc free"), {"SAMP": (5701, 9617), "SAMP-A": (5427, 9846), "DAFNet": (5170, 8129)}),
+    "table2": (("fs free", "fs ee", "eed ee", "bcc free", "bcc ee"), {
+        "MoGlow": (5495, 5361, 0.230, 1328, 609), "AP-P": (2623, 2344, 0.106, 561, 289),
+        "DAFNet": (2528, 2050, 0.026, 289, 385),
+    }),
+}
+"""The paper's tables: what is measured, and its figures (sums over 5,359 and 4,135 frames)."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One network to train in a folder: a flow's part, or SAMP's."""
+
+    folder: Path
+    part: str
+    model: ModelConfig
+    training: TrainingConfig
+
+
+def _each(task: Callable[[Any], Any], items: Sequence[Any], processes: int) -> list[Any]:
+    """``task`` of each item, in order of the items, in processes."""
+    if processes == 1:
+        return [task(item) for item in items]
+    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
+        return list(pool.map(task, items))
+
+
+def _train(dataset: Path, samp: SampConfig, job: Job) -> None:
+    if job.part in NETWORKS:
+        train_samp(job.part, samp, dataset, job.folder / f"{job.part}.pt", replace(job.training, batch=32))
+    else:
+        train_part(job.part, dataset, job.folder, job.model, job.training, threads=1)
+
+
+def _jobs(runs: Path, budget: str, model: ModelConfig, training: TrainingConfig) -> Iterator[Job]:
+    """What has to be trained for a budget, the longest first; a flow's parts share its time."""
+    for name, changed in FLOWS.items():
+        of_it = replace(model, **changed)
+        if budget == "equal steps" and name not in STEPPED:
+            continue
+        for part in of_it.parts:
+            shared = replace(training, minutes_flow=training.minutes_flow / len(of_it.parts))
+            yield Job(runs / budget.replace(" ", "_") / of_it.system, part, of_it, shared)
+    if budget == "equal time":
+        for kind in NETWORKS:
+            yield Job(runs / budget.replace(" ", "_") / kind, kind, model, training)
+
+
+def train(
+    dataset: Path, runs: Path, minutes: float, processes: int = os.cpu_count() or 1, model: ModelConfig = MODEL,
+    training: TrainingConfig = TRAINING, samp: SampConfig = SMALL_SAMP,
+) -> None:
+    """Train every system with both budgets; ``minutes`` of one core for each whole system, the shared predictor not counted."""
+    first = runs / "predictor"
+    if not (first / "predictor.pt").exists():
+        train_part("predictor", dataset, first, model, training)
+    training = replace(training, minutes_flow=minutes)
+    for budget in BUDGETS:
+        if budget == "equal steps":
+            dearest = runs / BUDGETS[0].replace(" ", "_") / "moglow"
+            training = replace(training, steps_flow=Run.load("whole", dearest).step)
+        jobs = list(_jobs(runs, budget, model, training))
+        for job in jobs:
+            job.folder.mkdir(parents=True, exist_ok=True)
+            if job.model.predicts and not (job.folder / "predictor.pt").exists():
+                shutil.copy(first / "predictor.pt", job.folder)
+        _each(partial(_train, dataset, samp), jobs, processes)
+        for folder in {job.folder for job in jobs if job.part not in NETWORKS}:
+            flow, predictor, statistics = trained(folder)
+            spread = take_spread(flow, predictor, dataset_pool(dataset), statistics)
+            export(folder / "weights.safetensors", flow, predictor, statistics, {}, spread)
+
+
+def steps_of(folder: Path) -> str:
+    """How many steps each network in a run's folder took."""
+    flows = [Run.load(part, folder).step for part in ("upper", "lower", "whole") if (folder / f"{part}.pt").exists()]
+    samp = [load_samp(folder / f"{kind}.pt")[2] for kind in NETWORKS if (folder / f"{kind}.pt").exists()]
+    return " + ".join(map(str, [*flows, *samp])) or "–"
+
+
+Measuring = Callable[[Sequence[HeldClip]], list[Measured]]
+
+
+def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
+    """The table's systems by name and budget: the steps that they were trained, and what measures them."""
+
+    def flow(file: Path | None) -> Measuring:
+        return lambda clips: measured(load_weights(file), clips, modes=("FREE", "EE"), clean=False)
+
+    out: dict[str, tuple[str, Measuring]] = {}
+    compared = {"DAFNet": FLOWS["DAFNet"]} if table == "table1" else FLOWS
+    for budget in BUDGETS[:1] if table == "table1" else BUDGETS:
+        at = runs / budget.replace(" ", "_")
+        for name, (network, kind) in SAMP.items() if table == "table1" else ():
+            file = at / network / f"{network}.pt"
+            out[f"{name}, {budget}"] = steps_of(file.parent), partial(measured_samp, file, kind)
+        for name, changed in compared.items():
+            if budget == BUDGETS[1] and name not in ("MoGlow", *STEPPED):
+                continue
+            # MoGlow's run with equal time is that with equal steps too.
+            folder = (runs / BUDGETS[0].replace(" ", "_") if name == "MoGlow" else at) / changed["system"]
+            out[f"{name}, {budget}"] = steps_of(folder), flow(folder / "weights.safetensors")
+    out[f"DAFNet, {SHIPPED}"] = "–", flow(None)
+    return out
+
+
+def measure(table: str, clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path) -> dict[str, Any]:
+    """Every system of a table on every group of clips; written to ``output`` as it comes, and what is there is kept."""
+    file = output / f"{table}.json"
+    found: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
+    for name, (steps, measuring) in systems_of(table, runs).items():
+        if name in found:
+            continue
+        if name == f"MoGlow, {BUDGETS[1]}":
+            found[name] = found[f"MoGlow, {BUDGETS[0]}"]  # the same run
+            continue
+        every = [clip for group in clips.values() for clip in group]
+        results, at = measuring(every), 0
+        found[name] = {"steps": steps, "groups": {}}
+        for group, members in clips.items():
+            chosen, at = results[at : at + len(members)], at + len(members)
+            settings = [key for key in results[0].runs if key != "legs"]
+            found[name]["groups"][group] = {
+                key: row([each.runs[key] for each in chosen]) for key in settings
+            }
+        output.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(found, indent=1))
+    file.write_text(json.dumps(found, indent=1))
+    (output / f"{table}.md").write_text(markdown(table, found))
+    return found
+
+
+def _cell(values: Mapping[str, Any], figure: str, ours: float | None = None, paper: float | None = None) -> str:
+    """A figure and its interval; its ratio to ``ours``, and beside it the paper's."""
+    if values.get(figure) is None:
+        return "–"
+    low, high = values["intervals"][figure]
+    ratio = f", ×{values[figure] / ours:.2f}" if ours else ""
+    return f"{values[figure]:.3g} ({low:.2g} to {high:.2g}){ratio}" + (f" [×{paper:.2f}]" if paper else "")
+
+
+def _row(table: str, system: str, found: Mapping[str, Any], group: str, heat: str, columns: Sequence[str]) -> str:
+    name, budget = system.split(", ", 1)
+    printed, paper = TABLES[table]
+    cells = []
+    for column in columns:
+        what, mode = column.split()
+        figure = {**_FIGURES, **_SEATS}[what]
+        values, ours = (found[s]["groups"][group].get(f"{mode}_{heat}", {}) for s in (system, f"DAFNet, {budget}"))
+        compared = name != "DAFNet" and what in _FIGURES
+        theirs = None
+        if name in paper and compared:
+            theirs = paper[name][printed.index(column)] / paper["DAFNet"][printed.index(column)]
+        cells.append(_cell(values, figure, ours.get(figure) if compared else None, theirs))
+    return f"| {system} | {found[system]['steps']} | " + " | ".join(cells) + " |"
+
+
+def markdown(table: str, found: Mapping[str, Any]) -> str:
+    """The table, a section for each group of clips and temperature: figures (95 % interval over clips), then the ratio to the
+    two-part flow's of the same budget, and in brackets the paper's ratio.
+    """
+    modes = ("free",) if table == "table1" else ("free", "ee")
+    columns = [*TABLES[table][0], *(f"{what} {mode}" for what in _SEATS for mode in modes)]
+    parts = []
+    groups = next(iter(found.values()))["groups"]
+    for group, heat in product(groups, ("t0", "t1")):
+        truth = groups[group]["ground_truth"]
+        real = " | ".join(_cell(truth, {**_FIGURES, **_SEATS}[column.split()[0]]) for column in columns)
+        parts += [
+            f"### {group}, temperature {heat[1]} ({truth['clips']} clips, {truth['seat_episodes']} seat episodes)",
+            "\n".join([
+                "| | steps | " + " | ".join(column.upper() for column in columns) + " |", "|---" * (len(columns) + 2) + "|",
+                f"| **ground truth** | – | {real} |",
+                *(_row(table, system, found, group, heat, columns) for system in found),
+            ]),
+        ]
+    return "\n\n".join(parts) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(dest="command", required=True)
+    training = commands.add_parser("train")
+    training.add_argument("dataset", type=Path)
+    training.add_argument("--minutes", type=float, default=20.0, help="of one core, for each system")
+    training.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    for name in TABLES:
+        commands.add_parser(name).add_argument("folder", type=Path)
+    for command in commands.choices.values():
+        command.add_argument("-o", "--output", type=Path, required=True, metavar="RUNS")
+    options = parser.parse_args()
+    if options.command == "train":
+        train(options.dataset, options.output, options.minutes, options.processes)
+        return
+    clips = {
+        "The paper's kinds of furniture (composed)": paper_test(options.folder),
+        "Every second captured clip of unseen bodies": captured(held_out(options.folder))[::2],
+    }
+    measure(options.command, clips, options.output, options.output)
+    print((options.output / f"{options.command}.md").read_text())
+
+
+if __name__ == "__main__":
+    main()
