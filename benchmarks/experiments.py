@@ -15,6 +15,7 @@ import argparse
 import json
 import os
 import shutil
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -27,6 +28,7 @@ from typing import Any
 from dafnet_addon.baselines.samp import SMALL_SAMP, SampConfig
 from dafnet_addon.baselines.samp_evaluate import measured_samp
 from dafnet_addon.baselines.train import load_samp, train_samp
+from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.weights import load_weights
 from dafnet_addon.data.held_out import HeldClip, held_out
 from dafnet_addon.data.paper_test import paper_test
@@ -141,6 +143,8 @@ def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
     """The table's systems by name and budget: the steps that they were trained, and what measures them."""
 
     def flow(file: Path | None) -> Measuring:
+        if file is not None and not file.exists():
+            raise InputError(f"'{file}' is not there yet; run 'experiments.py train' to its end first.")
         return lambda clips: measured(load_weights(file), clips, modes=("FREE", "EE"), clean=False)
 
     out: dict[str, tuple[str, Measuring]] = {}
@@ -161,27 +165,29 @@ def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
 
 
 def measure(table: str, clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path) -> dict[str, Any]:
-    """Every system of a table on every group of clips; written to ``output`` as it comes, and what is there is kept."""
-    file = output / f"{table}.json"
-    found: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
-    for name, (steps, measuring) in systems_of(table, runs).items():
-        if name in found:
+    """Every system of a table on every group of clips. ``output``/measured.json is written as figures come; what is there is
+    kept, for either table.
+    """
+    file = output / "measured.json"
+    known: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
+    systems = systems_of(table, runs)
+    for name, (steps, measuring) in systems.items():
+        if name in known:
             continue
         if name == f"MoGlow, {BUDGETS[1]}":
-            found[name] = found[f"MoGlow, {BUDGETS[0]}"]  # the same run
+            known[name] = known[f"MoGlow, {BUDGETS[0]}"]  # the same run
             continue
         every = [clip for group in clips.values() for clip in group]
         results, at = measuring(every), 0
-        found[name] = {"steps": steps, "groups": {}}
+        known[name] = {"steps": steps, "groups": {}}
         for group, members in clips.items():
             chosen, at = results[at : at + len(members)], at + len(members)
             settings = [key for key in results[0].runs if key != "legs"]
-            found[name]["groups"][group] = {
-                key: row([each.runs[key] for each in chosen]) for key in settings
-            }
+            known[name]["groups"][group] = {key: row([each.runs[key] for each in chosen]) for key in settings}
         output.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps(found, indent=1))
-    file.write_text(json.dumps(found, indent=1))
+        file.write_text(json.dumps(known, indent=1))
+    found = {name: known[name] for name in systems}
+    (output / f"{table}.json").write_text(json.dumps(found, indent=1))
     (output / f"{table}.md").write_text(markdown(table, found))
     return found
 
@@ -233,7 +239,7 @@ def markdown(table: str, found: Mapping[str, Any]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def main() -> None:
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
     training = commands.add_parser("train")
@@ -247,14 +253,19 @@ def main() -> None:
     options = parser.parse_args()
     if options.command == "train":
         train(options.dataset, options.output, options.minutes, options.processes)
-        return
+        return 0
     clips = {
         "The paper's kinds of furniture (composed)": paper_test(options.folder),
         "Every second captured clip of unseen bodies": captured(held_out(options.folder))[::2],
     }
-    measure(options.command, clips, options.output, options.output)
+    try:
+        measure(options.command, clips, options.output, options.output)
+    except InputError as error:
+        print(f"experiments: {error}", file=sys.stderr)
+        return 1
     print((options.output / f"{options.command}.md").read_text())
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
