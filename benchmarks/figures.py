@@ -18,6 +18,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from dafnet_addon import Controls, InputError, Scene, generate, load_weights
+from dafnet_addon.baselines.samplers import sampler_of
 from dafnet_addon.blender.demo_room import FURNITURE, Part
 from dafnet_addon.blender.stage import Colour, Stage, mixed, solids
 from dafnet_addon.core.conditions import PREROLL, shot_steps
@@ -531,8 +532,6 @@ def _through_a_room(studio: _Studio) -> Image.Image:
 
 
 def _systems(studio: _Studio) -> dict[str, Sampler]:
-    from dafnet_addon.baselines.flows import sampler_of  # needs torch, which nothing else here does
-
     return {"ours": Sampler(studio.weights), **{name: sampler_of(weights) for name, weights in studio.others.items()}}
 
 

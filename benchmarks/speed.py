@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from dafnet_addon.baselines.flows import flow_of, sampler_of
+from dafnet_addon.baselines.flows import flow_of
+from dafnet_addon.baselines.samplers import sampler_of
 from dafnet_addon.core.sampler import Conditions, Sampler
 from dafnet_addon.core.skeleton import OFFSETS
 from dafnet_addon.core.threads import one_thread

@@ -83,7 +83,8 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
 @pytest.mark.parametrize("system", ["ap-p", "moglow", "lower-first"])
 def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: Path):
     torch = pytest.importorskip("torch")
-    from dafnet_addon.baselines.flows import LowerFirstSampler, MoGlowSampler, WholeBodySampler, flow_of
+    from dafnet_addon.baselines.flows import flow_of
+    from dafnet_addon.baselines.samplers import LowerFirstSampler, MoGlowSampler, WholeBodySampler
     from dafnet_addon.core.weights import FORMAT, Weights
     from dafnet_addon.model.config import ModelConfig
     from dafnet_addon.model.predictor import ActionPredictor

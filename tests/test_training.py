@@ -12,7 +12,8 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from dafnet_addon.baselines.flows import flow_of, sampler_of  # noqa: E402
+from dafnet_addon.baselines.flows import flow_of  # noqa: E402
+from dafnet_addon.baselines.samplers import sampler_of  # noqa: E402
 from dafnet_addon.core.errors import InputError, WeightsError  # noqa: E402
 from dafnet_addon.core.progress import drained  # noqa: E402
 from dafnet_addon.core.root import RootPath  # noqa: E402

@@ -8,18 +8,12 @@ The lower body first is the paper's outlook (section 7): both parts are told wha
 slots, which no user gives, hold the lower body just made when the upper is made.
 """
 
-from collections.abc import Callable
-from typing import Any
-
-import numpy as np
-
 from ..core.errors import InputError
-from ..core.sampler import Sampler
-from ..core.weights import Weights
-from ..model.config import POSE_SIZE, VELOCITY_SIZE, ModelConfig
+from ..model.config import ModelConfig
 from ..model.flow import BodyFlow, PartFlow, TwoPartFlow
+from .samplers import LowerFirstSampler, WholeBodySampler
 
-__all__ = ["LowerFirstFlow", "LowerFirstSampler", "MoGlowSampler", "WholeBodySampler", "WholeFlow", "flow_of", "sampler_of"]
+__all__ = ["LowerFirstFlow", "WholeFlow", "flow_of"]
 
 
 class WholeFlow(BodyFlow):
@@ -28,50 +22,19 @@ class WholeFlow(BodyFlow):
     ``base`` is [π, velocity] (B, T, K + 3) of AP-P, the scene feature's [past poses, velocities] (B, T, 693) of MoGlow.
     """
 
-    places = {"whole": slice(0, POSE_SIZE)}
+    places = WholeBodySampler.parts
     whole: PartFlow
-
-
-class WholeBodySampler(Sampler):
-    """Runs AP-P: the core's sampler with the one part."""
-
-    systems = ("ap-p",)
-    parts = WholeFlow.places
-
-
-class MoGlowSampler(WholeBodySampler):
-    """Runs MoGlow, which is told its own past poses at each frame, and no actions."""
-
-    systems = ("moglow",)
-
-    def _read_told(self, array: Callable[..., np.ndarray], c: dict[str, int]) -> None:
-        self.actions = 0
-        self.fresh, self.moving = self.history * POSE_SIZE, (self.history + 1) * VELOCITY_SIZE
-
-    def _told_ahead(self, window: np.ndarray, moving: np.ndarray, occupancy: Any) -> Any:
-        return self._to(window)
-
-    def _told(self, frame: int) -> Any:
-        return self._past
 
 
 class LowerFirstFlow(TwoPartFlow):
     """The lower body's flow, then the upper's, whose observation is updated by the lower body."""
 
-    places = {name: TwoPartFlow.places[name] for name in ("lower", "upper")}
-
-
-class LowerFirstSampler(Sampler):
-    """Runs the lower body's flow, then the upper's."""
-
-    systems = ("lower-first",)
-    parts = LowerFirstFlow.places
+    places = LowerFirstSampler.parts
 
 
 _FLOWS: dict[str, type[BodyFlow]] = {
     "dafnet": TwoPartFlow, "lower-first": LowerFirstFlow, "ap-p": WholeFlow, "moglow": WholeFlow,
 }
-_SAMPLERS = {"dafnet": Sampler, "lower-first": LowerFirstSampler, "ap-p": WholeBodySampler, "moglow": MoGlowSampler}
 
 
 def flow_of(config: ModelConfig) -> BodyFlow:
@@ -79,10 +42,3 @@ def flow_of(config: ModelConfig) -> BodyFlow:
     if config.system not in _FLOWS:
         raise InputError(f"The system '{config.system}' is unknown; use one of {', '.join(_FLOWS)}.")
     return _FLOWS[config.system](config)
-
-
-def sampler_of(weights: Weights, device: str | None = None) -> Sampler:
-    """The sampler of the system that the weights are of. Raises WeightsError where the file does not fit it."""
-    model = weights.config.get("model")
-    system = model.get("system", "dafnet") if isinstance(model, dict) else "dafnet"
-    return _SAMPLERS.get(system, Sampler)(weights, device)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..baselines.flows import sampler_of
+from ..baselines.samplers import sampler_of
 from ..core.cleanup import CleanUp, cleaned
 from ..core.conditions import PREROLL, Shot, shot_steps
 from ..core.generate import targets_of
