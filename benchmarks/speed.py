@@ -2,9 +2,10 @@
 
     dafnet bench speed
 
-Random weights of the paper's sizes (width 512, environment code 512; MoGlow of 16 steps, AP-P of 6, DAFNet of 3 + 3), and the
-weights that ship, on one thread. At batch 1 every frame reads all recurrent matrices once, so their bytes over the bandwidth of
-a matrix-vector product is the time that no implementation goes under; where they fit a cache, they may.
+Random weights of the paper's sizes (width 512, environment code 512; MoGlow of 16 steps, AP-P of 6, DAFNet of 3 + 3; of SAMP's
+the decoder alone, without the features that it is fed), and the weights that ship, on one thread. At batch 1 every frame reads all
+recurrent matrices once, so their bytes over the bandwidth of a matrix-vector product is the time that no implementation goes
+under; where they fit a cache, they may.
 """
 
 from collections.abc import Callable
@@ -17,6 +18,7 @@ import numpy as np
 import torch
 
 from dafnet_addon.baselines.flows import flow_of
+from dafnet_addon.baselines.samp import PAPER_SAMP, SampConfig, network_of
 from dafnet_addon.baselines.samplers import sampler_of
 from dafnet_addon.core.sampler import Conditions, Sampler
 from dafnet_addon.core.skeleton import OFFSETS
@@ -78,8 +80,31 @@ def per_pose(sampler: Sampler, batch: int, frames: int) -> float:
     return 1000.0 * best / (frames * batch)
 
 
+def samp_row(config: SampConfig, frames: int, speed: float) -> dict[str, Any]:
+    """SAMP's next state from its last one, one a frame; the features between are not counted."""
+    torch.manual_seed(0)
+    network = network_of("samp", config)
+    parts = (network.gating, network.interaction, network.first, network.second, network.third)
+    size = sum(int(p.nbytes) for part in parts for p in part.parameters())
+    row: dict[str, Any] = {"system": "SAMP", "library": "torch", "megabytes": round(size / 1e6, 2)}
+    row["floor_ms"] = round(1e3 * size / speed, 3)
+    for batch in (1, 64):
+        state, sensor = torch.zeros(batch, len(network.in_mean)), torch.zeros(batch, len(network.sensor_mean))
+        z, best = torch.zeros(batch, config.latent), np.inf
+        with torch.no_grad():
+            for _ in range(_REPEATS):
+                begin = perf_counter()
+                for _ in range(frames):
+                    network.decode(z, state, sensor)
+                best = min(best, perf_counter() - begin)
+        row[f"ms_{batch}"] = round(1000.0 * best / (frames * batch), 3)
+    row["over_floor"] = round(row["ms_1"] / row["floor_ms"], 2)
+    return row
+
+
 def measure(
-    file: Path | None, progress: Callable[[float], None], paper: ModelConfig = PAPER, frames: int = 60
+    file: Path | None, progress: Callable[[float], None], paper: ModelConfig = PAPER, frames: int = 60,
+    samp: SampConfig = PAPER_SAMP,
 ) -> tuple[dict[str, Any], str]:
     """Run the benchmark; ``file``: weights to time beside the paper's sizes (None: those that ship)."""
     threads = torch.get_num_threads()
@@ -105,6 +130,7 @@ def measure(
             row[f"ms_{batch}"] = round(per_pose(sampler, batch, frames if batch == 1 else max(frames // 4, 2)), 3)
         row["over_floor"] = round(row["ms_1"] / row["floor_ms"], 2)
         rows.append(row)
+    rows.insert(-1, samp_row(samp, frames, speed))
     torch.set_num_threads(threads)
     progress(1.0)
     ours = rows[0]["ms_1"]

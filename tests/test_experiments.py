@@ -92,9 +92,9 @@ def test_ratios_stand_beside_the_papers(monkeypatch: pytest.MonkeyPatch):
 def test_speed_of_every_system_beside_the_memory(tmp_path: Path):
     measure = runpy.run_path(str(BENCHMARKS / "speed.py"))["measure"]
     small = replace(TINY, width=32)
-    report, text = measure(None, lambda share: None, small, 4)
+    report, text = measure(None, lambda share: None, small, 4, TINY_SAMP)
     each = [name for name in ("DAFNet", "AP-P", "MoGlow") for _ in range(2)]
-    assert [row["system"] for row in report["rows"]] == [*each, "DAFNet, these weights"]
+    assert [row["system"] for row in report["rows"]] == [*each, "SAMP", "DAFNet, these weights"]
     assert all(row["ms_1"] > 0 and row["ms_64"] < row["ms_1"] for row in report["rows"]), "a batch shares what is read"
     sizes = {row["system"]: row["megabytes"] for row in report["rows"]}
     assert sizes["MoGlow"] > 2 * sizes["DAFNet"]
