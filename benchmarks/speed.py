@@ -3,9 +3,9 @@
     dafnet bench speed
 
 Random weights of the paper's sizes (width 512, environment code 512; MoGlow of 16 steps, AP-P of 6, DAFNet of 3 + 3; of SAMP's
-the decoder alone, without the features that it is fed), and the weights that ship, on one thread. At batch 1 every frame reads all
-recurrent matrices once, so their bytes over the bandwidth of a matrix-vector product is the time that no implementation goes
-under; where they fit a cache, they may.
+the decoder alone, without the features that it is fed), and the weights that ship, on one thread. At batch 1 every frame reads
+all recurrent matrices once, so their bytes over the bandwidth of a matrix-vector product is the time that no implementation
+goes under; where they fit a cache, they may.
 """
 
 from collections.abc import Callable
