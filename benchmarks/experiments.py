@@ -17,17 +17,18 @@ import os
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+import torch
+
+from dafnet_addon.baselines.flows import parts_of
 from dafnet_addon.baselines.samp import SMALL_SAMP, SampConfig
 from dafnet_addon.baselines.samp_evaluate import measured_samp
-from dafnet_addon.baselines.train import load_samp, train_samp
+from dafnet_addon.baselines.train import train_samp
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.weights import load_weights
 from dafnet_addon.data.held_out import HeldClip, held_out
@@ -35,6 +36,7 @@ from dafnet_addon.data.paper_test import paper_test
 from dafnet_addon.model.config import SMALL, ModelConfig
 from dafnet_addon.training.evaluate import Measured, captured, measured, row
 from dafnet_addon.training.export import export
+from dafnet_addon.training.processes import spread_out
 from dafnet_addon.training.spread import take_spread
 from dafnet_addon.training.train import Run, TrainingConfig, dataset_pool, train_part, trained
 
@@ -75,12 +77,9 @@ class Job:
     training: TrainingConfig
 
 
-def _each(task: Callable[[Any], Any], items: Sequence[Any], processes: int) -> list[Any]:
-    """``task`` of each item, in order of the items, in processes."""
-    if processes == 1:
-        return [task(item) for item in items]
-    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
-        return list(pool.map(task, items))
+def _at(runs: Path, budget: str) -> Path:
+    """The folder of the runs of a budget."""
+    return runs / budget.replace(" ", "_")
 
 
 def _train(dataset: Path, samp: SampConfig, job: Job) -> None:
@@ -96,12 +95,13 @@ def _jobs(runs: Path, budget: str, model: ModelConfig, training: TrainingConfig)
         of_it = replace(model, **changed)
         if budget == "equal steps" and name not in STEPPED:
             continue
-        for part in of_it.parts:
-            shared = replace(training, minutes_flow=training.minutes_flow / len(of_it.parts))
-            yield Job(runs / budget.replace(" ", "_") / of_it.system, part, of_it, shared)
+        parts = parts_of(of_it)
+        for part in parts:
+            shared = replace(training, minutes_flow=training.minutes_flow / len(parts))
+            yield Job(_at(runs, budget) / of_it.system, part, of_it, shared)
     if budget == "equal time":
         for kind in NETWORKS:
-            yield Job(runs / budget.replace(" ", "_") / kind, kind, model, training)
+            yield Job(_at(runs, budget) / kind, kind, model, training)
 
 
 def train(
@@ -115,14 +115,14 @@ def train(
     training = replace(training, minutes_flow=minutes)
     for budget in BUDGETS:
         if budget == "equal steps":
-            dearest = runs / BUDGETS[0].replace(" ", "_") / "moglow"
+            dearest = _at(runs, BUDGETS[0]) / "moglow"
             training = replace(training, steps_flow=Run.load("whole", dearest).step)
         jobs = list(_jobs(runs, budget, model, training))
         for job in jobs:
             job.folder.mkdir(parents=True, exist_ok=True)
             if job.model.predicts and not (job.folder / "predictor.pt").exists():
                 shutil.copy(first / "predictor.pt", job.folder)
-        _each(partial(_train, dataset, samp), jobs, processes)
+        list(spread_out(partial(_train, dataset, samp), jobs, processes))
         for folder in {job.folder for job in jobs if job.part not in NETWORKS}:
             flow, predictor, statistics = trained(folder)
             spread = take_spread(flow, predictor, dataset_pool(dataset), statistics)
@@ -131,9 +131,8 @@ def train(
 
 def steps_of(folder: Path) -> str:
     """How many steps each network in a run's folder took."""
-    flows = [Run.load(part, folder).step for part in ("upper", "lower", "whole") if (folder / f"{part}.pt").exists()]
-    samp = [load_samp(folder / f"{kind}.pt")[2] for kind in NETWORKS if (folder / f"{kind}.pt").exists()]
-    return " + ".join(map(str, [*flows, *samp])) or "–"
+    files = [file for part in ("upper", "lower", "whole", *NETWORKS) if (file := folder / f"{part}.pt").exists()]
+    return " + ".join(str(torch.load(file, weights_only=False, map_location="cpu")["step"]) for file in files) or "–"
 
 
 Measuring = Callable[[Sequence[HeldClip]], list[Measured]]
@@ -150,7 +149,7 @@ def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
     out: dict[str, tuple[str, Measuring]] = {}
     compared = {"DAFNet": FLOWS["DAFNet"]} if table == "table1" else FLOWS
     for budget in BUDGETS[:1] if table == "table1" else BUDGETS:
-        at = runs / budget.replace(" ", "_")
+        at = _at(runs, budget)
         for name, (network, kind) in SAMP.items() if table == "table1" else ():
             file = at / network / f"{network}.pt"
             out[f"{name}, {budget}"] = steps_of(file.parent), partial(measured_samp, file, kind)
@@ -158,7 +157,7 @@ def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
             if budget == BUDGETS[1] and name not in ("MoGlow", *STEPPED):
                 continue
             # MoGlow's run with equal time is that with equal steps too.
-            folder = (runs / BUDGETS[0].replace(" ", "_") if name == "MoGlow" else at) / changed["system"]
+            folder = (_at(runs, BUDGETS[0]) if name == "MoGlow" else at) / changed["system"]
             out[f"{name}, {budget}"] = steps_of(folder), flow(folder / "weights.safetensors")
     out[f"DAFNet, {SHIPPED}"] = "–", flow(None)
     return out

@@ -292,7 +292,7 @@ def _evaluate_samp(options: argparse.Namespace, clips: "list[HeldClip]") -> None
 
     if options.save or options.sheets or options.output:
         raise InputError("Of a checkpoint of SAMP's only the table is made; leave out --save, --sheets and --output.")
-    kind, _, _ = load_samp(options.weights)
+    kind, _ = load_samp(options.weights)
     found = {}
     for each in ("samp", "samp-a") if kind == "samp" else (kind,):
         with _Bar() as bar:
@@ -301,15 +301,13 @@ def _evaluate_samp(options: argparse.Namespace, clips: "list[HeldClip]") -> None
 
 
 def _bench(options: argparse.Namespace) -> None:
-    _require_checkout("../benchmarks")
-    script = Path(__file__).parents[1] / "benchmarks" / f"{options.name}.py"
+    measure = _benchmark(options.name)["measure"]
     with _Bar() as bar:
-        report, summary = runpy.run_path(str(script))["measure"](options.weights, bar)
+        report, summary = measure(options.weights, bar)
     print(json.dumps(report, indent=2) if options.json else summary)
 
 
 def _figures(options: argparse.Namespace) -> None:
-    _require_checkout("../benchmarks")
     _require_bpy()
     others = {}
     for each in options.other:
@@ -317,10 +315,16 @@ def _figures(options: argparse.Namespace) -> None:
         if not file:
             raise InputError(f"'{each}' names no weights; write it as NAME=FILE.")
         others[name] = Path(file)
-    draw = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "figures.py"))["draw"]
+    draw = _benchmark("figures")["draw"]
     with _only_our_output(), _Bar() as bar:
         files = draw(options.output, options.weights, others, options.only, bar)
     print(json.dumps([str(file) for file in files]) if options.json else "\n".join(str(file) for file in files))
+
+
+def _benchmark(name: str) -> dict[str, Any]:
+    """What a script of the folder of benchmarks defines."""
+    _require_checkout("../benchmarks")
+    return runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / f"{name}.py"))
 
 
 def _require_checkout(folder: str) -> None:

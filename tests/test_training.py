@@ -12,7 +12,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from dafnet_addon.baselines.flows import flow_of  # noqa: E402
+from dafnet_addon.baselines.flows import flow_of, parts_of  # noqa: E402
 from dafnet_addon.baselines.samplers import sampler_of  # noqa: E402
 from dafnet_addon.core.errors import InputError, WeightsError  # noqa: E402
 from dafnet_addon.core.progress import drained  # noqa: E402
@@ -324,7 +324,7 @@ def test_baselines_learn_and_their_weights_run(system: str, dataset: Path, tmp_p
     folder = tmp_path / "run"
     if model.predicts:
         _until("predictor", dataset, folder, steps=2, model=model)
-    for part in model.parts:
+    for part in parts_of(model):
         fresh = Run(part, tmp_path / "fresh", model, _config(10), _pool(dataset).statistics())
         before = _loss_at(fresh, dataset)
         assert _loss_at(_until(part, dataset, folder, steps=40, model=model), dataset) < before - 5.0

@@ -13,7 +13,7 @@ from ..model.config import ModelConfig
 from ..model.flow import BodyFlow, PartFlow, TwoPartFlow
 from .samplers import LowerFirstSampler, WholeBodySampler
 
-__all__ = ["LowerFirstFlow", "WholeFlow", "flow_of"]
+__all__ = ["LowerFirstFlow", "WholeFlow", "flow_of", "parts_of"]
 
 
 class WholeFlow(BodyFlow):
@@ -37,8 +37,17 @@ _FLOWS: dict[str, type[BodyFlow]] = {
 }
 
 
-def flow_of(config: ModelConfig) -> BodyFlow:
-    """The untrained flow of the configuration's system. Raises InputError where that is unknown."""
+def _kind_of(config: ModelConfig) -> type[BodyFlow]:
     if config.system not in _FLOWS:
         raise InputError(f"The system '{config.system}' is unknown; use one of {', '.join(_FLOWS)}.")
-    return _FLOWS[config.system](config)
+    return _FLOWS[config.system]
+
+
+def parts_of(config: ModelConfig) -> tuple[str, ...]:
+    """The parts of the configuration's system, in the order of sampling. Raises InputError where it is unknown."""
+    return tuple(_kind_of(config).places)
+
+
+def flow_of(config: ModelConfig) -> BodyFlow:
+    """The untrained flow of the configuration's system. Raises InputError where that is unknown."""
+    return _kind_of(config)(config)

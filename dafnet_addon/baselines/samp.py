@@ -16,9 +16,9 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from ..core.conditions import PREROLL, Shot
-from ..core.kinematics import fit, forward_kinematics
+from ..core.kinematics import on_bones
 from ..core.root import RootPath, to_world
-from ..core.sampler import Conditions, smpl_order
+from ..core.sampler import Conditions, smpl_order, velocities_up_to
 from ..data.held_out import HeldClip
 from ..model.config import POSE_SIZE, SENSOR_SIZE, ModelConfig
 from ..training.batches import Pool, Statistics, observation_for
@@ -294,7 +294,7 @@ def _walked(network: MotionNet, clip: HeldClip, path: RootPath, noise: Tensor, o
 
 
 @torch.no_grad()
-def run(network: MotionNet, conditions: Conditions, z: np.ndarray) -> tuple[np.ndarray, None]:
+def run(network: MotionNet, conditions: Conditions, z: np.ndarray) -> np.ndarray:
     """Poses (T, B, 66), SMPL order, metres, of samp-ob, each fed back: of ``z`` (B, latent) held, or (T, B, latent).
 
     The past is the mean pose at first.
@@ -303,10 +303,9 @@ def run(network: MotionNet, conditions: Conditions, z: np.ndarray) -> tuple[np.n
     noise = torch.from_numpy(np.broadcast_to(z, (frames, *z.shape[-2:])).copy()).float()
     given = np.repeat(conditions.given, 3, axis=-1)
     free = np.where(given > 0, conditions.observation, network.out_mean.numpy())
-    before = np.concatenate([np.repeat(conditions.velocity[:1], _LIKE.history, axis=0), conditions.velocity])
-    velocity = [before[k : k + frames] for k in range(_LIKE.history + 1)]
+    velocity = velocities_up_to(conditions.velocity, _LIKE.history)
     poses = np.tile(network.out_mean.numpy(), (frames, _LIKE.history))
-    told = torch.from_numpy(np.concatenate([free, conditions.given, poses, *velocity], axis=1)).float()
+    told = torch.from_numpy(np.concatenate([free, conditions.given, poses, velocity], axis=1)).float()
     told = (told - network.in_mean) / network.in_std
     seen = torch.from_numpy(conditions.occupancy).float()
     last = told[0].repeat(noise.shape[1], 1)
@@ -315,7 +314,7 @@ def run(network: MotionNet, conditions: Conditions, z: np.ndarray) -> tuple[np.n
         made = network.decode(noise[t], last, seen[t].expand(len(last), -1)).clamp(-_WIDE, _WIDE)
         out.append(made * network.out_std + network.out_mean)
         last = _remembered(told[min(t + 1, frames - 1)].expand(len(last), -1), last, made)
-    return smpl_order(torch.stack(out).double().numpy()), None
+    return smpl_order(torch.stack(out).double().numpy())
 
 
 def takes(network: MotionNet, clip: HeldClip, shot: Shot, seeds: Sequence[int | None], kind: str) -> np.ndarray:
@@ -329,12 +328,8 @@ def takes(network: MotionNet, clip: HeldClip, shot: Shot, seeds: Sequence[int | 
         if seed is not None:
             noise[s] = np.random.default_rng([abs(seed), int(seed < 0)]).standard_normal(noise[s].shape)
     if kind == "samp-ob":
-        poses, _ = run(network, shot.conditions, noise.swapaxes(0, 1))
+        poses = run(network, shot.conditions, noise.swapaxes(0, 1))
         joints = [to_world(shot.path, poses[PREROLL:, s].reshape(-1, 22, 3)) for s in range(len(seeds))]
     else:
         joints = list(_walked(network, clip, shot.path, torch.from_numpy(noise).float(), own_root=kind == "samp"))
-    out = []
-    for take in joints:
-        pelvis, axes = fit(take)
-        out.append(forward_kinematics(axes, pelvis))
-    return np.stack(out)
+    return np.stack([on_bones(take) for take in joints])

@@ -1,10 +1,7 @@
 """Measures SAMP's networks on held-out clips, as ``training.evaluate`` does flows."""
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 import torch
@@ -12,6 +9,7 @@ import torch
 from ..core.threads import one_thread
 from ..data.held_out import HeldClip
 from ..training.evaluate import SEEDS, Figures, Measured, figures, shot_of
+from ..training.processes import spread_out
 from .samp import takes
 from .train import load_samp
 
@@ -20,7 +18,7 @@ __all__ = ["measured_samp"]
 
 def _beside(file: Path, kind: str, clip: HeldClip) -> Measured:
     torch.set_num_threads(1)
-    _, network, _ = load_samp(file)
+    _, network = load_samp(file)
     runs: dict[str, Figures] = {"ground_truth": figures(clip, clip.joints[None])}
     with one_thread():
         for mode in ("FREE", "EE") if kind == "samp-ob" else ("FREE",):
@@ -37,12 +35,4 @@ def measured_samp(
 
     ``file`` is a checkpoint of ``train_samp``. "t0" is z at its mean, "t1" z drawn anew for each frame, with ``SEEDS`` seeds.
     """
-    task, out = partial(_beside, file, kind), []
-    processes = max(1, min(os.cpu_count() or 1, len(clips)))
-    if processes == 1:
-        return [task(clip) for clip in clips]
-    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
-        for each in pool.map(task, clips):
-            out.append(each)
-            progress(len(out) / len(clips))
-    return out
+    return list(spread_out(partial(_beside, file, kind), clips, progress=progress))

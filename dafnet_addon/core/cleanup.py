@@ -18,6 +18,7 @@ __all__ = ["CleanUp", "cleaned", "planted", "seated", "standing_still", "reachin
 
 _TOES, _ANKLES = [joint("left_foot"), joint("right_foot")], [joint("left_ankle"), joint("right_ankle")]
 _KNEES, _HIPS = [joint("left_knee"), joint("right_knee")], [joint("left_hip"), joint("right_hip")]
+_OVER_LEGS = [j for j in range(22) if j not in {*_KNEES, *_ANKLES, *_TOES}]
 _THIGH, _SHIN = (float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("knee", "ankle"))
 _ARMS = {f"hand_{side}": [joint(f"{side}_{n}") for n in ("shoulder", "elbow", "wrist")] for side in ("left", "right")}
 _UPPER_ARM, _FOREARM = (float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("elbow", "wrist"))
@@ -123,7 +124,6 @@ def planted(joints: np.ndarray, floor: np.ndarray | float = 0.0, strength: float
 
     Metres, world, 30 frames a second; ``floor``: its height, one or one for each frame.
     """
-    out = joints.copy()
     heights = np.broadcast_to(np.asarray(floor, float), len(joints))
     stands = standing_still(joints, floor)
     moved = np.zeros((len(joints), 2, 3))
@@ -140,10 +140,14 @@ def planted(joints: np.ndarray, floor: np.ndarray | float = 0.0, strength: float
         moved[:, foot] = _between(moved[:, foot], held[:, foot])
     ankles = joints[:, _ANKLES] + moved
     down = _lowered(joints[:, _HIPS], ankles, held)
-    rest = [j for j in range(22) if j not in {*_KNEES, *_ANKLES, *_TOES}]
-    out[:, rest, 2] -= down[:, None]
-    hips, poles = out[:, _HIPS], joints[:, _KNEES] + moved / 2
-    out[:, _KNEES], out[:, _ANKLES] = two_bone(hips, ankles, poles, _THIGH, _SHIN)
+    return _on_legs(joints, -down, ankles, joints[:, _KNEES] + moved / 2)
+
+
+def _on_legs(joints: np.ndarray, lift: np.ndarray, ankles: np.ndarray, poles: np.ndarray) -> np.ndarray:
+    """Joints (T, 22, 3) with all but the legs lifted (T,), and legs bent to ``poles`` that reach ``ankles`` (T, 2, 3)."""
+    out = joints.copy()
+    out[:, _OVER_LEGS, 2] += lift[:, None]
+    out[:, _KNEES], out[:, _ANKLES] = two_bone(out[:, _HIPS], ankles, poles, _THIGH, _SHIN)
     out[:, _TOES] = out[:, _ANKLES] + joints[:, _TOES] - joints[:, _ANKLES]
     return out
 
@@ -180,13 +184,7 @@ def seated(joints: np.ndarray, tops: np.ndarray, strength: float = 1.0) -> np.nd
     lift = strength * _covering(need)
     if not lift.any():
         return joints
-    out = joints.copy()
-    rest = [j for j in range(22) if j not in {*_KNEES, *_ANKLES, *_TOES}]
-    out[:, rest, 2] += lift[:, None]
-    poles = joints[:, _KNEES] + lift[:, None, None] * (0.0, 0.0, 0.5)
-    out[:, _KNEES], out[:, _ANKLES] = two_bone(out[:, _HIPS], joints[:, _ANKLES], poles, _THIGH, _SHIN)
-    out[:, _TOES] = out[:, _ANKLES] + joints[:, _TOES] - joints[:, _ANKLES]
-    return out
+    return _on_legs(joints, lift, joints[:, _ANKLES], joints[:, _KNEES] + lift[:, None, None] * (0.0, 0.0, 0.5))
 
 
 def _limited(vectors: np.ndarray, most: float) -> np.ndarray:

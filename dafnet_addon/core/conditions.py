@@ -7,7 +7,7 @@ import numpy as np
 
 from .distance import prepared, rigid_split, scaled
 from .errors import InputError
-from .occupancy import distance, occupancy, tops_under
+from .occupancy import distance, occupancy
 from .resampling import MODEL_FPS, covering_frames, frame_times, resample_nearest, resample_positions, resample_rigid
 from .root import RootPath, ahead, root_from_matrices, smoothed, to_root, velocities
 from .rotations import normalised
@@ -35,13 +35,13 @@ _SOLID = 0.3
 @dataclass(frozen=True)
 class Shot:
     """``conditions`` of ``PREROLL`` + N frames at 30 fps; ``path`` (N): R^τ, canonical metres; ``modes`` (N,) of MODES;
-    ``tops`` (N,): height of what one could sit on where the root is, NaN elsewhere; ``warnings``: sentences for the user.
+    ``scene``: the furniture at these frames, canonical metres; ``warnings``: sentences for the user.
     """
 
     conditions: Conditions
     path: RootPath
     modes: np.ndarray
-    tops: np.ndarray
+    scene: Scene
     warnings: tuple[str, ...]
 
 
@@ -207,4 +207,4 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
         velocities(whole), ahead(whole), rolled(occupied, before),
         rolled(observation, observation[:1]), rolled(given, given[:1]),
     )
-    return Shot(conditions, path, modes, tops_under(scene, path), tuple(warnings))
+    return Shot(conditions, path, modes, scene, tuple(warnings))

@@ -9,6 +9,7 @@ from .cleanup import CleanUp, cleaned
 from .conditions import PREROLL, Shot, shot_steps
 from .errors import InputError, WeightsError
 from .kinematics import blend_switches, fit, forward_kinematics, global_from_local, local_from_global
+from .occupancy import tops_under
 from .progress import drained, within
 from .resampling import (
     MODEL_FPS,
@@ -26,7 +27,7 @@ from .solids import Scene
 from .take import Controls, Take
 from .weights import Weights
 
-__all__ = ["RAW", "generate", "generate_steps", "targets_of"]
+__all__ = ["RAW", "cleaned_up", "generate", "generate_steps", "targets_of"]
 
 RAW = CleanUp()
 """The model's own motion."""
@@ -64,6 +65,12 @@ def targets_of(shot: Shot) -> dict[str, np.ndarray]:
     return {name: np.where(given[:, slot, None] > 0, places[:, slot], np.nan) for name, slot in slots.items()}
 
 
+def cleaned_up(joints: np.ndarray, shot: Shot, settings: CleanUp) -> np.ndarray:
+    """Joints (N, 22, 3) of a shot, canonical metres, on constant bones, after all that ``settings`` ask for."""
+    tops = tops_under(shot.scene, shot.path) if settings.seat else None
+    return cleaned(joints, targets_of(shot), settings, shot.path.position[:, 2], tops)
+
+
 def _onto_bones(
     poses: np.ndarray, shot: Shot, controls: Controls, switches: np.ndarray, clean_up: CleanUp
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -74,8 +81,7 @@ def _onto_bones(
     turned = [_rotation(controls, name, target) for name in names]
     pelvis, frames = fit(joints, 1.0, *turned)
     if clean_up.asked:
-        joints = forward_kinematics(frames, pelvis)
-        joints = cleaned(joints, targets_of(shot), clean_up, shot.path.position[:, 2], shot.tops)
+        joints = cleaned_up(forward_kinematics(frames, pelvis), shot, clean_up)
         pelvis, frames = fit(joints, 1.0, *turned)
     local = continuous_signs(quaternion_from_matrix(local_from_global(frames)))
     return blend_switches(local, pelvis, shot.path, switches) if len(switches) else (local, pelvis)

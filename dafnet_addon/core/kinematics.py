@@ -19,7 +19,7 @@ from .rotations import (
 )
 from .skeleton import OFFSETS, PARENTS, UPPER, joint
 
-__all__ = ["forward_kinematics", "global_from_local", "local_from_global", "two_bone", "fit", "blend_switches"]
+__all__ = ["forward_kinematics", "global_from_local", "local_from_global", "two_bone", "fit", "on_bones", "blend_switches"]
 
 # Limbs in one order: left and right arm, left and right leg. The rest pose is straight along _AXIS, and the middle
 # joint leaves that line along _BEND: elbows go backward, knees forward.
@@ -159,6 +159,12 @@ def fit(
         aim(ankle, toe, frame[:, PARENTS[ankle]])
         frame[:, toe] = frame[:, ankle]
     return position[:, 0], frame
+
+
+def on_bones(joints: np.ndarray) -> np.ndarray:
+    """World joints (T, 22, 3) of the canonical body whose bones ``fit`` these best."""
+    pelvis, frames = fit(joints)
+    return forward_kinematics(frames, pelvis)
 
 
 def _aligned(joints: np.ndarray, center: int, children: list[int]) -> np.ndarray:

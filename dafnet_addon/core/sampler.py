@@ -17,7 +17,7 @@ from .skeleton import LOWER, MODEL_ORDER, OFFSETS, UPPER
 from .threads import one_thread
 from .weights import Weights
 
-__all__ = ["Conditions", "Sampler", "model_order", "smpl_order"]
+__all__ = ["Conditions", "Sampler", "model_order", "smpl_order", "velocities_up_to"]
 
 Array = Any  # numpy.ndarray or torch.Tensor
 
@@ -37,6 +37,12 @@ def model_order(poses: np.ndarray) -> np.ndarray:
 def smpl_order(poses: np.ndarray) -> np.ndarray:
     """Inverse of ``model_order``."""
     return poses[..., _INVERSE]
+
+
+def velocities_up_to(velocity: np.ndarray, history: int) -> np.ndarray:
+    """The last ``history`` velocities and the present one (T, 3 history + 3) of each frame; the first was so before."""
+    padded = np.concatenate([np.repeat(velocity[:1], history, axis=0), velocity])
+    return np.concatenate([padded[k : k + len(velocity)] for k in range(history + 1)], axis=1)
 
 
 @dataclass(frozen=True)
@@ -280,9 +286,7 @@ class Sampler:
         """Bring in the conditions of a whole shot and forget all memory; the past is the mean pose."""
         xp, frames = self.xp, len(conditions)
         velocity = (conditions.velocity - self.velocity_mean) / self.velocity_std
-        before = np.repeat(velocity[:1], self.history, axis=0)
-        padded = np.concatenate([before, velocity])
-        window = np.concatenate([padded[k : k + frames] for k in range(self.history + 1)], axis=1)
+        window = velocities_up_to(velocity, self.history)
         occupancy = self._to(conditions.occupancy)
         way = (conditions.ahead[:, : self.ahead] - self.ahead_mean) / self.ahead_std
         moving = self._told_ahead(window, np.concatenate([velocity, way], axis=1), occupancy)

@@ -14,7 +14,7 @@ from .boxes import NO_BOXES, box, placed
 from .uses import Use, lying, reaching, runs, stroking, working
 
 __all__ = [
-    "Rest", "SeatKind", "resting", "probes", "seat_for", "desk_for", "board_for", "scattered", "fitted", "furnished",
+    "Rest", "SeatKind", "rest_of", "resting", "probes", "seat_for", "desk_for", "board_for", "scattered", "fitted", "furnished",
 ]
 
 _PROBES = [  # bone from, bone to, share of the way, radius of the flesh there
@@ -112,6 +112,11 @@ class Rest:
     yaw: float
 
 
+def rest_of(joints: np.ndarray, path: RootPath, start: int, end: int) -> Rest:
+    """The seated episode of a clip (T, 22, 3) in these frames."""
+    return Rest(start, end, np.median(joints[start:end, 0], axis=0), float(np.median(path.yaw[start:end])))
+
+
 def resting(joints: np.ndarray, path: RootPath) -> list[Rest]:
     """Seated episodes of a clip (T, 22, 3): the pelvis low and still, the trunk upright, for a quarter of a second or more."""
     pelvis = joints[:, 0]
@@ -122,11 +127,7 @@ def resting(joints: np.ndarray, path: RootPath) -> list[Rest]:
     ankles = (joints[:, joint("left_ankle")] + joints[:, joint("right_ankle")]) / 2
     ahead = np.linalg.norm((ankles - pelvis)[:, :2], axis=-1) > 0.15
     still = (pelvis[:, 2] < 0.88) & (speed < 0.12) & upright & ahead
-    episodes = []
-    for start, end in runs(still, _MIN_REST):
-        middle = np.median(pelvis[start:end], axis=0)
-        episodes.append(Rest(start, end, middle, float(np.median(path.yaw[start:end]))))
-    return episodes
+    return [rest_of(joints, path, start, end) for start, end in runs(still, _MIN_REST)]
 
 
 def probes(joints: np.ndarray, step: int = 3) -> np.ndarray:

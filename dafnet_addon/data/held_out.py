@@ -17,13 +17,13 @@ from ..core.root import RootPath, raw_root_from_joints
 from ..core.rotations import yaw_matrix
 from ..core.solids import Box, Scene
 from .canonical import calibrate, canonical
-from .furniture import Rest
+from .furniture import Rest, rest_of
 from .joins import joined
 from .mocap import Clip, read_clips
 from .prepare import load_motions
 from .windows import Motion, mirrored, motion_of
 
-__all__ = ["ACTIVITIES", "FROZEN", "HeldClip", "fingerprint", "held_out", "scene_of", "test_motions"]
+__all__ = ["ACTIVITIES", "FROZEN", "HeldClip", "fingerprint", "held_out", "is_frozen", "scene_of", "test_motions"]
 
 FROZEN = Path(__file__).with_name("held_out.json")
 ACTIVITIES = {
@@ -71,6 +71,13 @@ def fingerprint(joints: np.ndarray) -> list[float]:
     return [round(float(number), 4) for number in numbers]
 
 
+def is_frozen(joints: np.ndarray, frozen: dict[str, Any]) -> bool:
+    """Whether a motion (T, 22, 3) is the one whose number of frames and fingerprint a frozen clip holds."""
+    return len(joints) == frozen["frames"] and bool(
+        np.abs(np.subtract(fingerprint(joints), frozen["fingerprint"])).max() <= _SAME
+    )
+
+
 def scene_of(rows: np.ndarray) -> Scene:
     """Boxes (B, 7) as solids."""
     return Scene(tuple(Box(center=r[:3], half_size=r[3:6], rotation=yaw_matrix(r[6])) for r in rows))
@@ -102,15 +109,13 @@ def _clip(frozen: dict[str, Any], motion: Motion) -> HeldClip:
     start = frozen["start"]
     raised = frozen.get("raised", 0.0)
     joints = motion.joints[start : start + frozen["frames"]] + np.array([0.0, 0.0, raised])
-    if len(joints) < frozen["frames"] or np.abs(np.subtract(fingerprint(joints), frozen["fingerprint"])).max() > _SAME:
+    if not is_frozen(joints, frozen):
         raise InputError(
             f"The held-out clip '{frozen['name']}' is not the motion that the test's furniture was fitted to; "
             "use the motion files and the readers that 'held_out.json' was made with, or freeze the test anew."
         )
     path = raw_root_from_joints(joints)
-    rests = tuple(
-        Rest(a, b, np.median(joints[a:b, 0], axis=0), float(np.median(path.yaw[a:b]))) for a, b in frozen["rests"]
-    )
+    rests = tuple(rest_of(joints, path, a, b) for a, b in frozen["rests"])
     return HeldClip(
         frozen["name"], f"{motion.source}/{motion.subject}", _ACTIVITY[motion.category], frozen["unseen"],
         "composed" in frozen or raised > 0, frozen.get("room", ""), joints, path,

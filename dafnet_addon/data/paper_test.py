@@ -35,8 +35,8 @@ from ..core.skeleton import REST, SEAT_TO_PELVIS, joint
 from .boxes import distances
 from .compose import LEANS, at_board, at_top, seated_work
 from .contacts import contacts
-from .furniture import Rest, SeatKind, board_for, desk_for, probes, resting, seat_for
-from .held_out import HeldClip, fingerprint
+from .furniture import Rest, SeatKind, board_for, desk_for, probes, rest_of, resting, seat_for
+from .held_out import HeldClip, fingerprint, is_frozen
 from .joins import joined
 from .pieces import DIRECTIONS, TOELESS, Pool, features_of, fluent, matches_of, pool_of, sit_downs, upper_bodies
 from .prepare import TRAINED_ON_PARTLY, load_motions
@@ -96,7 +96,6 @@ _WHITEBOARD, _OFF_FLOOR = (0.5, 0.3), 0.4  # metres; half the width and height o
 _ONE_SEAT = 0.25  # metres
 _UNDER, _CUTS = -0.01, 0.01  # metres of toes over the floor at least, and of bones in furniture at most
 _SLIDES = 0.02  # metres that a standing foot moves in a frame at most
-_SAME = 0.01  # metres by which a fingerprint may be off
 _WRISTS = [joint("left_wrist"), joint("right_wrist")]
 _TOES = [joint("left_foot"), joint("right_foot")]
 _FEET = [*_TOES, joint("left_ankle"), joint("right_ankle")]
@@ -190,14 +189,9 @@ def _part(kind: str) -> str:
     return "sit" if _KINDS[kind].seat else "stand"
 
 
-def _rest(joints: np.ndarray, path: RootPath, start: int) -> Rest:
-    """The seated episode from ``start`` to the end."""
-    return Rest(start, len(joints), np.median(joints[start:, 0], axis=0), float(np.median(path.yaw[start:])))
-
-
 def _held(recipe: Recipe, motions: dict[str, Motion], joints: np.ndarray) -> HeldClip:
     path = raw_root_from_joints(joints)
-    rests = (_rest(joints, path, recipe["rests"][0][0]),) if recipe["rests"] else ()
+    rests = tuple(rest_of(joints, path, start, end) for start, end in recipe["rests"])
     return HeldClip(
         recipe["name"], _body(recipe, motions), _ACTIVITY[recipe["kind"]], True, True, recipe["kind"], joints, path,
         np.array(recipe["boxes"]).reshape(-1, 7), rests,
@@ -219,8 +213,7 @@ def paper_test(folder: Path) -> list[HeldClip]:
                     "give the folder with all files."
                 )
         joints = _replayed(recipe, motions)
-        same = len(joints) == recipe["frames"] and np.abs(np.subtract(fingerprint(joints), recipe["fingerprint"])).max() < _SAME
-        if not same:
+        if not is_frozen(joints, recipe):
             raise InputError(_changed(recipe["name"]))
         clips.append(_held(recipe, motions, joints))
     return clips
@@ -340,7 +333,7 @@ def _furnished(rng: np.random.Generator, recipe: Recipe, joints: np.ndarray, pat
         after = [r.start for r in resting(joints, path) if np.linalg.norm(r.position[:2] - path.position[-1, :2]) < _ONE_SEAT]
         if not after:
             return None
-        rest = _rest(joints, path, after[0])
+        rest = rest_of(joints, path, after[0], len(joints))
         works, rests = len(joints) - (_WORKS if about.top else _USES) + _SEATED_HANDS, [[rest.start, rest.end]]
         boxes = _chair_of(rng, about.chair, rest, points)
         if boxes is not None and about.top:

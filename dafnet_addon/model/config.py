@@ -39,11 +39,6 @@ class ModelConfig:
     ahead: int = 0
 
     @property
-    def parts(self) -> tuple[str, ...]:
-        """The flow's parts, in the order of sampling."""
-        return {"dafnet": ("upper", "lower"), "lower-first": ("lower", "upper")}.get(self.system, ("whole",))
-
-    @property
     def predicts(self) -> bool:
         """Whether the flow is told of actions by the predictor; MoGlow is told of past poses instead."""
         return self.system != "moglow"

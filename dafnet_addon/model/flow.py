@@ -11,7 +11,8 @@ from typing import cast
 import torch
 from torch import Tensor, nn
 
-from .config import POSE_SIZE, SENSOR_SIZE, UPPER_SIZE, ModelConfig
+from ..core.sampler import Sampler
+from .config import SENSOR_SIZE, ModelConfig
 
 __all__ = ["ActNorm", "InvertibleLinear", "Coupling", "PartFlow", "EnvironmentEncoder", "BodyFlow", "TwoPartFlow"]
 
@@ -261,7 +262,7 @@ class BodyFlow(nn.Module):
 class TwoPartFlow(BodyFlow):
     """The upper body's flow, then the lower's, whose observation is updated by the upper body (paper, figure 5)."""
 
-    places = {"upper": slice(0, UPPER_SIZE), "lower": slice(UPPER_SIZE, POSE_SIZE)}
+    places = Sampler.parts
     upper: PartFlow
     lower: PartFlow
 

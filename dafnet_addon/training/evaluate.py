@@ -5,10 +5,7 @@ head and hands in EE, the true upper body in FULL; nothing is cleaned up after t
 a ratio of sums over clips, its interval (95 %) a bootstrap over clips.
 """
 
-import multiprocessing
-import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -16,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from ..baselines.samplers import sampler_of
-from ..core.cleanup import CleanUp, cleaned
+from ..core.cleanup import CleanUp
 from ..core.conditions import PREROLL, Shot, shot_steps
-from ..core.generate import targets_of
-from ..core.kinematics import fit, forward_kinematics
+from ..core.generate import cleaned_up
+from ..core.kinematics import on_bones
 from ..core.metrics import (
     BAD_COLLISION_JOINTS,
     bad_collisions,
@@ -41,6 +38,7 @@ from ..core.take import MODES, Controls
 from ..core.threads import one_thread
 from ..core.weights import Weights
 from ..data.held_out import HeldClip
+from .processes import spread_out
 
 __all__ = [
     "SEEDS", "Figures", "Measured", "beside", "captured", "figures", "in_processes", "made", "measured", "row",
@@ -94,19 +92,13 @@ def made(sampler: Sampler, shot: Shot, noise: np.ndarray) -> np.ndarray:
     poses, _ = drained(sampler.run(shot.conditions, noise))
     takes = []
     for s in range(len(noise)):
-        pelvis, frames = fit(to_world(shot.path, poses[PREROLL:, s].reshape(-1, 22, 3)), 1.0, None, None, None)
-        takes.append(forward_kinematics(frames, pelvis))
+        takes.append(on_bones(to_world(shot.path, poses[PREROLL:, s].reshape(-1, 22, 3))))
     return np.stack(takes)
 
 
 def made_clean(takes: np.ndarray, shot: Shot) -> np.ndarray:
     """Takes (S, T, 22, 3) after the clean-up at full strength."""
-    out = []
-    for joints in takes:
-        clean = cleaned(joints, targets_of(shot), CleanUp(1.0, 1.0, 1.0), shot.path.position[:, 2], shot.tops)
-        pelvis, frames = fit(clean, 1.0, None, None, None)
-        out.append(forward_kinematics(frames, pelvis))
-    return np.stack(out)
+    return np.stack([on_bones(cleaned_up(joints, shot, CleanUp(1.0, 1.0, 1.0))) for joints in takes])
 
 
 def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
@@ -203,19 +195,7 @@ def in_processes(
     weights: Weights, task: Callable[[Sampler, Any], Any], items: Sequence[Any], progress: Callable[[float], None],
 ) -> Iterator[Any]:
     """``task`` of each item with a sampler of these weights, in as many processes as there are cores; in order."""
-    processes = max(1, min(os.cpu_count() or 1, len(items)))
-    if processes == 1:
-        sampler = sampler_of(weights)
-        for done, item in enumerate(items):
-            with one_thread():
-                result = task(sampler, item)
-            progress((done + 1) / len(items))
-            yield result
-        return
-    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _start, (weights,)) as pool:
-        for done, result in enumerate(pool.map(partial(_call, task), items)):
-            progress((done + 1) / len(items))
-            yield result
+    yield from spread_out(partial(_call, task), items, progress=progress, start=partial(_start, weights))
 
 
 def measured(

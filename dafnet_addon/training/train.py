@@ -20,7 +20,7 @@ from typing import Any
 import torch
 from torch import nn
 
-from ..baselines.flows import flow_of
+from ..baselines.flows import flow_of, parts_of
 from ..core.errors import InputError
 from ..core.weights import Weights
 from ..model.config import LOWER_SIZE, PAPER, POSE_SIZE, SMALL, UPPER_SIZE, ModelConfig
@@ -31,7 +31,10 @@ from .batches import Batch, Pool, Statistics, observation_for
 from .export import adopt_part, adopt_predictor, adopted_statistics
 from .free_run import lower_loss, upper_loss
 
-__all__ = ["TrainingConfig", "read_config", "Run", "account", "clock_of", "dataset_pool", "train", "train_part", "trained"]
+__all__ = [
+    "TrainingConfig", "read_config", "Run", "account", "checkpoint", "clock_of", "dataset_pool", "descend", "train",
+    "train_part", "trained",
+]
 
 
 @dataclass(frozen=True)
@@ -132,15 +135,12 @@ class Run:
         return self.config.share(self.step, self.seconds)
 
     def save(self) -> None:
-        self.folder.mkdir(parents=True, exist_ok=True)
         state = {
             "model": self.model.as_dict(), "config": asdict(self.config), "statistics": asdict(self.statistics),
             "network": self.network.state_dict(), "optimiser": self.optimiser.state_dict(), "step": self.step,
             "seconds": self.seconds, "adopted": self.adopted, "generators": _generators(self.device),
         }
-        part = self.folder / f"{self.part}.part"
-        torch.save(state, part)
-        part.rename(self.folder / f"{self.part}.pt")
+        checkpoint(self.folder / f"{self.part}.pt", state)
 
     @staticmethod
     def load(part: str, folder: Path, config: TrainingConfig | None = None, device: str = "cpu") -> "Run":
@@ -259,6 +259,29 @@ def clock_of(device: torch.device) -> Callable[[], float]:
     return time.monotonic if device.type != "cpu" else lambda: time.process_time() / torch.get_num_threads()
 
 
+def checkpoint(file: Path, state: dict[str, Any]) -> None:
+    """Save a trainer's own state, whole or not at all."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    part = file.with_suffix(".part")
+    torch.save(state, part)
+    part.rename(file)
+
+
+def descend(
+    network: nn.Module, optimiser: torch.optim.Optimizer, loss: torch.Tensor, config: TrainingConfig, step: int, share: float
+) -> None:
+    """One step down a loss, after ``step`` others, ``share`` of the budget being spent; the same on all ranks."""
+    for group in optimiser.param_groups:
+        group["lr"] = config.rate(step, share)
+    optimiser.zero_grad()
+    loss.backward()
+    if step == 0:
+        ranks.from_first(network)
+    ranks.average([p.grad for p in network.parameters() if p.grad is not None])
+    nn.utils.clip_grad_norm_(network.parameters(), config.clip_norm)
+    optimiser.step()
+
+
 def train_part(
     part: str, dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig, threads: int | None = None,
     progress: Callable[[str, float, float], None] = lambda part, share, loss: None, device: str = "cpu",
@@ -301,16 +324,8 @@ def train_part(
     while run.share < 1.0:
         begin = clock()
         rows = torch.randint(len(pool), (config.batch,))
-        for group in run.optimiser.param_groups:
-            group["lr"] = run.config.rate(run.step, run.share)
         loss = run.loss(pool.batch(rows, run.statistics, run.model), initialise=run.step == 0 and not run.adopted)
-        run.optimiser.zero_grad()
-        loss.backward()
-        if run.step == 0:
-            ranks.from_first(run.network)
-        ranks.average([p.grad for p in run.network.parameters() if p.grad is not None])
-        nn.utils.clip_grad_norm_(run.network.parameters(), config.clip_norm)
-        run.optimiser.step()
+        descend(run.network, run.optimiser, loss, run.config, run.step, run.share)
         recent.append(loss.detach())
         run.step += 1
         if run.step % config.save_every == 0:
@@ -350,18 +365,19 @@ def train(
     whole = max(config.minutes_predictor + config.minutes_flow, 1e-9)
     first = config.minutes_predictor / whole
     report = lambda part, share, loss: progress(first * share)  # noqa: E731
+    names = parts_of(model)
     if model.predicts:
         train_part("predictor", dataset, folder, model, config, progress=report, device=device, begin_with=begin_with)
     if ranks.joined():
-        for part in model.parts:
+        for part in names:
             train_part(part, dataset, folder, model, config, device=device, begin_with=begin_with)
         return
-    threads = max(1, (os.cpu_count() or 2) // len(model.parts))
-    with ProcessPoolExecutor(len(model.parts), mp_context=multiprocessing.get_context("spawn")) as pool:
+    threads = max(1, (os.cpu_count() or 2) // len(names))
+    with ProcessPoolExecutor(len(names), mp_context=multiprocessing.get_context("spawn")) as pool:
         begin = time.monotonic()
         parts = [
             pool.submit(train_part, part, dataset, folder, model, config, threads, device=device, begin_with=begin_with)
-            for part in model.parts
+            for part in names
         ]
         while wait(parts, timeout=2.0).not_done:
             spent = 0.0 if config.steps_flow else (time.monotonic() - begin) / max(60.0 * config.minutes_flow, 1e-9)

@@ -1,0 +1,35 @@
+"""A task of many items, shared out over the machine's cores."""
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from typing import Any
+
+__all__ = ["spread_out"]
+
+
+def _nothing() -> None:
+    pass
+
+
+def spread_out(
+    task: Callable[[Any], Any], items: Sequence[Any], processes: int | None = None,
+    progress: Callable[[float], None] = lambda share: None, start: Callable[[], None] = _nothing,
+) -> Iterator[Any]:
+    """``task`` of each item, in order, in ``processes`` (None: one for each core), each of which first calls ``start``.
+
+    Where one is enough it is this one, without what a new process costs.
+    """
+    processes = max(1, min(processes or os.cpu_count() or 1, len(items)))
+    if processes == 1:
+        start()
+        for done, item in enumerate(items):
+            result = task(item)
+            progress((done + 1) / len(items))
+            yield result
+        return
+    with ProcessPoolExecutor(processes, get_context("spawn"), start) as pool:
+        for done, result in enumerate(pool.map(task, items)):
+            progress((done + 1) / len(items))
+            yield result
