@@ -53,7 +53,7 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     description = {"model": config.as_dict(), "fps": 30, "offsets": OFFSETS.tolist()}
     weights = Weights(tensors, description, {"format": FORMAT}, tmp_path)
     conditions, z = _conditions(30), rng.normal(size=(2, 66))
-    made, actions = drained(Sampler(weights, dtype="float64").run(conditions, z))
+    made, actions, density = drained(Sampler(weights, dtype="float64").run(conditions, z))
 
     # The same, by the model's own forward: poses must go back to the noise that they were made from.
     poses = torch.from_numpy((model_order(made).transpose(1, 0, 2) - tensors["pose_mean"]) / tensors["pose_std"])
@@ -78,6 +78,8 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     assert max(np.abs(back - z).max() for back, _, _ in taken) < 1e-8
     log_det = np.stack([d for _, _, d in taken], axis=1)
     assert np.abs(log_det - (det_upper + det_lower).numpy()).max() < 1e-8
+    gaussian = -0.5 * (z**2).sum(-1) - 33.0 * np.log(2.0 * np.pi)
+    assert np.abs(density.T - gaussian[:, None] - log_det).max() < 1e-8, "what it says of itself as it makes it"
 
 
 @pytest.mark.parametrize("system", ["ap-p", "moglow", "lower-first"])
@@ -111,7 +113,7 @@ def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: 
     sampler = {"ap-p": WholeBodySampler, "moglow": MoGlowSampler, "lower-first": LowerFirstSampler}[system](
         Weights(tensors, description, {"format": FORMAT}, tmp_path), dtype="float64"
     )
-    made, actions = drained(sampler.run(conditions, z))
+    made, actions, density = drained(sampler.run(conditions, z))
     assert actions.shape == (30, 2, 0 if system == "moglow" else 10)
 
     # The same, by the model's own forward: poses must go back to the noise that they were made from.
@@ -134,6 +136,7 @@ def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: 
     sampler.start(conditions, takes=2)
     taken = [sampler.absorb(t, sampler.standardised(made[t])) for t in range(30)]
     assert np.abs(np.stack([d for _, _, d in taken], axis=1) - log_det.numpy()).max() < 1e-8
+    assert np.ptp(density.T - log_det.numpy(), axis=1).max() < 1e-8
 
 
 @pytest.fixture(scope="module")
@@ -144,15 +147,15 @@ def weights():
 def test_numpy_and_torch_agree_over_300_frames(weights):
     pytest.importorskip("torch")
     z = 0.7 * np.random.default_rng(1).normal(size=(1, 66))
-    ours, _ = drained(Sampler(weights).run(_conditions(300), z))
-    theirs, _ = drained(Sampler(weights, device="cpu").run(_conditions(300), z))
+    ours = drained(Sampler(weights).run(_conditions(300), z)).poses
+    theirs = drained(Sampler(weights, device="cpu").run(_conditions(300), z)).poses
     assert np.abs(ours - theirs).max() < 1e-4
 
 
 def test_shipped_weights_invert(weights):
     sampler = Sampler(weights)
     conditions, z = _conditions(100), 0.7 * np.random.default_rng(1).normal(size=(1, 66))
-    made, _ = drained(sampler.run(conditions, z))
+    made = drained(sampler.run(conditions, z)).poses
     again = Sampler(weights)
     again.start(conditions)
     standard = again.standardised(made).astype(np.float32)
@@ -162,22 +165,22 @@ def test_shipped_weights_invert(weights):
 
 def test_a_batch_is_its_single_takes(weights):
     z = np.random.default_rng(2).normal(size=(3, 66))
-    together, _ = drained(Sampler(weights).run(_conditions(40), z))
-    alone, _ = drained(Sampler(weights).run(_conditions(40), z[1:2]))
+    together = drained(Sampler(weights).run(_conditions(40), z)).poses
+    alone = drained(Sampler(weights).run(_conditions(40), z[1:2])).poses
     assert np.abs(together[:, 1] - alone[:, 0]).max() < 1e-4
 
 
 def test_resuming_goes_on_as_if_never_stopped(weights):
     conditions, z = _conditions(160), 0.5 * np.random.default_rng(4).normal(size=(1, 66))
-    whole, _ = drained(Sampler(weights).run(conditions, z))
-    resumed, _ = drained(Sampler(weights).run(conditions, z, kept=whole[:90]))
+    whole = drained(Sampler(weights).run(conditions, z)).poses
+    resumed = drained(Sampler(weights).run(conditions, z, kept=whole[:90])).poses
     assert np.abs(resumed - whole).max() < 1e-3
 
 
 def test_lower_noise_leaves_the_upper_body_alone_at_the_first_frame(weights):
     z = np.zeros((2, 66))
     z[1, 42:] = 1.0
-    made, _ = drained(Sampler(weights).run(_conditions(1), z))
+    made = drained(Sampler(weights).run(_conditions(1), z)).poses
     upper = model_order(made)[..., :42]
     assert np.abs(upper[0, 0] - upper[0, 1]).max() < 1e-5
     assert np.abs(made[0, 0] - made[0, 1]).max() > 1e-3

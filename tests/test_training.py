@@ -336,7 +336,7 @@ def test_baselines_learn_and_their_weights_run(system: str, dataset: Path, tmp_p
     sampler = sampler_of(weights)
     nothing = {"velocity": 3, "ahead": 18, "occupancy": 2640, "observation": 66, "given": 22}
     conditions = Conditions(**{name: np.zeros((20, size)) for name, size in nothing.items()})
-    made, _ = drained(sampler.run(conditions, sampler.noise(1)))
+    made = drained(sampler.run(conditions, sampler.noise(1))).poses
     assert made.shape == (20, 1, 66) and np.isfinite(made).all()
     with pytest.raises(WeightsError, match=f"'{system}'.*dafnet evaluate"):
         Sampler(weights)

@@ -1,20 +1,27 @@
-"""After the model: planted feet stay where they are, nobody sinks into a seat, head and hands reach their targets exactly.
+"""After the model: motion is smoothed, hands and feet come out of furniture, planted feet stay where they are, nobody sinks
+into a seat, head and hands reach their targets exactly.
 
 All is done on joint positions of a body with constant bones, 30 frames a second, and leaves them constant; the take's own poses
 are untouched, so that the strengths can be changed without sampling again. Corrections begin and end softly: what is added to a
-joint is held or faded where nothing asks for it. Feet first, since they may lower the pelvis; then the seat, then targets.
+joint is held or faded where nothing asks for it. What bends all of the motion comes first; feet before the seat, since they may
+lower the pelvis; targets last.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
 from .errors import InputError
-from .kinematics import two_bone
+from .kinematics import on_bones, two_bone
+from .root import gaussian
 from .rotations import matrix_from_vector
 from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, TOE_HEIGHT, joint
 
-__all__ = ["CleanUp", "cleaned", "planted", "seated", "standing_still", "reaching"]
+__all__ = ["CleanUp", "cleaned", "cleared", "planted", "seated", "smoothed_out", "standing_still", "reaching"]
+
+Distance = Callable[[np.ndarray], np.ndarray]
+"""Signed distances (T, N) of world points (T, N, 3) to the furniture, negative inside; metres."""
 
 _TOES, _ANKLES = [joint("left_foot"), joint("right_foot")], [joint("left_ankle"), joint("right_ankle")]
 _KNEES, _HIPS = [joint("left_knee"), joint("right_knee")], [joint("left_hip"), joint("right_hip")]
@@ -28,6 +35,10 @@ _PLANTS, _MENDS = 4, 3  # frames: the shortest stand; the longest gap in one
 _SLIPS = 0.12  # metres from its place at which a foot is let go
 _FADE = 10  # frames in which what is added dies away
 _SITS_OVER, _SINKS = 0.08, 0.15  # metres of a pelvis over a hard seat, at least; the most that it is lifted by
+_SMOOTHING = 2.5  # frames; deviation of the Gaussian at full strength
+_SKIN, _DEEPEST = 0.03, 0.20  # metres between a wrist or ankle and the surface that it must not sink into; the most it is moved
+_STEADY = 3.0  # frames; deviation of the Gaussian over what brings a hand or foot out
+_NUDGE = 0.01  # metres; for slopes of the distance
 _STRAIGHT = 0.999  # of a leg's or arm's length, which is how far they reach
 
 _FARTHEST_HEAD, _FARTHEST_LEAN = 0.20, 0.25  # metres that the trunk is bent by for a target, at most
@@ -43,22 +54,25 @@ _DAMPING, _ROUNDS, _STEP = 0.03, 15, 0.10  # metres; rounds of least squares; me
 @dataclass(frozen=True)
 class CleanUp:
     """Strengths from 0 (off) to 1 of what is done after the model: ``feet`` stand still where they are planted, head and hands
-    ``reach`` their targets, the pelvis is lifted out of the ``seat`` that it has sunk into.
+    ``reach`` their targets, the pelvis is lifted out of the ``seat`` that it has sunk into, hands and feet are kept ``clear`` of
+    furniture, and motion is made more ``smooth``.
     """
 
     feet: float = 0.0
     reach: float = 0.0
     seat: float = 0.0
+    clear: float = 0.0
+    smooth: float = 0.0
 
     def __post_init__(self) -> None:
-        strengths = (self.feet, self.reach, self.seat)
+        strengths = astuple(self)
         if not all(0.0 <= strength <= 1.0 for strength in strengths):
             raise InputError(f"The clean-up's strengths are {', '.join(map(str, strengths))}; give numbers from 0 to 1.")
 
     @property
     def asked(self) -> bool:
         """Whether anything is to be done."""
-        return self.feet > 0.0 or self.reach > 0.0 or self.seat > 0.0
+        return any(strength > 0.0 for strength in astuple(self))
 
 
 def _below() -> np.ndarray:
@@ -187,6 +201,42 @@ def seated(joints: np.ndarray, tops: np.ndarray, strength: float = 1.0) -> np.nd
     return _on_legs(joints, lift, joints[:, _ANKLES], joints[:, _KNEES] + lift[:, None, None] * (0.0, 0.0, 0.5))
 
 
+def smoothed_out(joints: np.ndarray, strength: float = 1.0) -> np.ndarray:
+    """Joints (T, 22, 3) as a Gaussian over time leaves them, on constant bones again."""
+    return on_bones(gaussian(joints, _SMOOTHING * strength))
+
+
+def _out_of(points: np.ndarray, distance: Distance) -> np.ndarray:
+    """How (T, N, 3) points (T, N, 3) have to move to be as far from furniture as skin keeps them, steady in time."""
+    depth = np.clip(_SKIN - distance(points), 0.0, _DEEPEST)
+    if not depth.any():
+        return np.zeros_like(points)
+    steps = _NUDGE * np.eye(3)
+    slope = np.stack([distance(points + step) - distance(points - step) for step in steps], axis=-1)
+    away = slope / np.maximum(np.linalg.norm(slope, axis=-1, keepdims=True), 1e-6)
+    return gaussian(depth[..., None] * away, _STEADY)
+
+
+def cleared(joints: np.ndarray, distance: Distance, targets: dict[str, np.ndarray], strength: float = 1.0) -> np.ndarray:
+    """Joints (T, 22, 3) whose wrists and ankles are out of the furniture, arms and legs following.
+
+    Hands are moved any way that is out, feet level; what has a target (``reaching``) is left to it. Sitting thighs and a back
+    that leans on something are not touched.
+    """
+    wrists = [chain[2] for chain in _ARMS.values()]
+    out_of = strength * _out_of(joints[:, [*wrists, *_ANKLES]], distance)
+    if not out_of.any():
+        return joints
+    for k, name in enumerate(_ARMS):
+        out_of[np.isfinite(targets.get(name, np.full((len(joints), 3), np.nan))).all(-1), k] = 0.0
+    out_of[:, 2:, 2] = 0.0
+    out = _on_legs(joints, np.zeros(len(joints)), joints[:, _ANKLES] + out_of[:, 2:], joints[:, _KNEES] + out_of[:, 2:] / 2)
+    for k, (shoulder, elbow, wrist) in enumerate(_ARMS.values()):
+        goal, pole = joints[:, wrist] + out_of[:, k], joints[:, elbow] + out_of[:, k] / 2
+        out[:, elbow], out[:, wrist] = two_bone(joints[:, shoulder], goal, pole, _UPPER_ARM, _FOREARM)
+    return out
+
+
 def _limited(vectors: np.ndarray, most: float) -> np.ndarray:
     return vectors * np.minimum(1.0, most / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9))
 
@@ -263,12 +313,16 @@ def _bend(joints: np.ndarray, wants: list[tuple[int, np.ndarray]]) -> None:
 
 def cleaned(
     joints: np.ndarray, targets: dict[str, np.ndarray], settings: CleanUp, floor: np.ndarray | float = 0.0,
-    tops: np.ndarray | None = None,
+    tops: np.ndarray | None = None, distance: Distance | None = None,
 ) -> np.ndarray:
     """Joints (T, 22, 3) after all that ``settings`` ask for; canonical metres, world, 30 frames a second, constant bones.
 
-    ``floor``: its height, one or one for each frame; ``tops``: see ``seated``.
+    ``floor``: its height, one or one for each frame; ``tops``: see ``seated``; ``distance``: to the furniture, if there is any.
     """
+    if settings.smooth > 0.0:
+        joints = smoothed_out(joints, settings.smooth)
+    if settings.clear > 0.0 and distance is not None:
+        joints = cleared(joints, distance, targets, settings.clear)
     if settings.feet > 0.0:
         joints = planted(joints, floor, settings.feet)
     if settings.seat > 0.0 and tops is not None:

@@ -35,13 +35,15 @@ _SOLID = 0.3
 @dataclass(frozen=True)
 class Shot:
     """``conditions`` of ``PREROLL`` + N frames at 30 fps; ``path`` (N): R^τ, canonical metres; ``modes`` (N,) of MODES;
-    ``scene``: the furniture at these frames, canonical metres; ``warnings``: sentences for the user.
+    ``scene``: the furniture at these frames, canonical metres; ``share`` (``PREROLL`` + N, 22): how far what is given counts;
+    ``warnings``: sentences for the user.
     """
 
     conditions: Conditions
     path: RootPath
     modes: np.ndarray
     scene: Scene
+    share: np.ndarray
     warnings: tuple[str, ...]
 
 
@@ -101,17 +103,26 @@ def _targets(controls: Controls, name: str, times: np.ndarray, target: np.ndarra
     return to_root(path, resample_positions(np.asarray(value, float) / controls.scale, times, target))
 
 
+def _influence(controls: Controls, name: str, times: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """How far a target counts at the model's frames (N,)."""
+    value = getattr(controls, f"{name}_influence")
+    if value is None:
+        return np.ones(len(target))
+    return np.clip(resample_positions(np.asarray(value, float)[:, None], times, target)[:, 0], 0.0, 1.0)
+
+
 def _observed(
     controls: Controls, modes: np.ndarray, times: np.ndarray, target: np.ndarray, path: RootPath, warnings: list[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """c_ob (N, 66), root frame, model order, and which joints are given (N, 22)."""
+    """c_ob (N, 66), root frame, model order, and how far each joint in it counts (N, 22), 0 where it is not given."""
     frames = len(path)
-    observation, given = np.zeros((frames, 22, 3)), np.zeros((frames, 22))
+    observation, share = np.zeros((frames, 22, 3)), np.zeros((frames, 22))
     for name, slot in _EFFECTORS.items():
         place = _targets(controls, name, times, target, path)
         if place is None:
             continue
-        used = (modes == "EE") & np.isfinite(place).all(-1)
+        influence = _influence(controls, name, times, target)
+        used = (modes == "EE") & np.isfinite(place).all(-1) & (influence > 0.0)
         far = np.linalg.norm(place - _REACH_FROM, axis=-1)
         if (used & (far > _REACH)).any():
             metres = float(np.nanmax(np.where(used, far, np.nan))) * controls.scale
@@ -119,7 +130,7 @@ def _observed(
             warnings.append(f"The target of '{words}' is up to {metres:.1f} m away; it is reached for, not reached.")
             within = _REACH_FROM + normalised(place - _REACH_FROM) * _REACH
             place = np.where((far > _REACH)[:, None], within, place)
-        observation[used, slot], given[used, slot] = place[used], 1.0
+        observation[used, slot], share[used, slot] = place[used], influence[used]
     full = modes == "FULL"
     if full.any():
         body = _targets(controls, "upper_body", times, target, path)
@@ -127,9 +138,9 @@ def _observed(
             raise InputError("The mode is FULL but there is no upper body to follow; choose a source, or use FREE or EE.")
         if not np.isfinite(body[full]).all():
             raise InputError("The upper body to follow has a joint that is not a number; fix its animation.")
-        observation[full, : len(UPPER)], given[full, : len(UPPER)] = body[full], 1.0
-        given[full, MODEL_ORDER.index(0)] = float(controls.pelvis_given)
-    return observation.reshape(frames, -1), given
+        observation[full, : len(UPPER)], share[full, : len(UPPER)] = body[full], 1.0
+        share[full, MODEL_ORDER.index(0)] = float(controls.pelvis_given)
+    return observation.reshape(frames, -1), share
 
 
 def _at_model_rate(scene: Scene, times: np.ndarray, target: np.ndarray) -> Scene:
@@ -184,7 +195,7 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     times, target = frame_times(len(controls), controls.fps), frame_times(frames, MODEL_FPS)
     path = _path_of(controls, times, target, warnings)
     modes = resample_nearest(modes, times, target)
-    observation, given = _observed(controls, modes, times, target, path, warnings)
+    observation, share = _observed(controls, modes, times, target, path, warnings)
 
     floor = float(np.median(path.position[:, 2])) * controls.scale
     solids: list[Box | Mesh] = []
@@ -205,6 +216,6 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     whole = RootPath(rolled(path.position, path.position[:1]), rolled(path.yaw, path.yaw[:1]))
     conditions = Conditions(
         velocities(whole), ahead(whole), rolled(occupied, before),
-        rolled(observation, observation[:1]), rolled(given, given[:1]),
+        rolled(observation, observation[:1]), rolled(share > 0.0, share[:1] > 0.0).astype(float),
     )
-    return Shot(conditions, path, modes, scene, tuple(warnings))
+    return Shot(conditions, path, modes, scene, rolled(share, share[:1]), tuple(warnings))

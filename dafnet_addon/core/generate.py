@@ -1,6 +1,8 @@
 """Scene and controls in, a take out: the one code path under the operator, the command line and the Python API."""
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -9,7 +11,8 @@ from .cleanup import CleanUp, cleaned
 from .conditions import PREROLL, Shot, shot_steps
 from .errors import InputError, WeightsError
 from .kinematics import blend_switches, fit, forward_kinematics, global_from_local, local_from_global
-from .occupancy import tops_under
+from .metrics import summary
+from .occupancy import distance, tops_under
 from .progress import drained, within
 from .resampling import (
     MODEL_FPS,
@@ -21,19 +24,32 @@ from .resampling import (
 )
 from .root import RootPath, to_root, to_world
 from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix
-from .sampler import Sampler
+from .sampler import Conditions, Sampler, model_order
 from .skeleton import END_EFFECTORS, MODEL_ORDER
 from .solids import Scene
 from .take import Controls, Take
 from .weights import Weights
 
-__all__ = ["RAW", "cleaned_up", "generate", "generate_steps", "targets_of"]
+__all__ = ["RAW", "Draw", "clean_again_steps", "cleaned_up", "generate", "generate_steps", "takes_steps", "targets_of"]
 
 RAW = CleanUp()
 """The model's own motion."""
 _HOTTEST = 10.0
 _CONDITIONED, _SAMPLED = 0.1, 0.97
 """Progress when the conditions are known and when the poses are made."""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """What one take is drawn with: ``seed``, ``lower_seed`` (the legs' own, None goes with ``seed``), ``temperature``."""
+
+    seed: int = 0
+    lower_seed: int | None = None
+    temperature: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.temperature <= _HOTTEST:
+            raise InputError(f"The temperature is {self.temperature}; give 0 or a small positive number such as 1.")
 
 
 def _kept(resume: Take, frame: int, path: RootPath) -> np.ndarray:
@@ -58,24 +74,31 @@ def _rotation(controls: Controls, name: str, target: np.ndarray) -> np.ndarray |
 
 
 def targets_of(shot: Shot) -> dict[str, np.ndarray]:
-    """What the model was told of head and wrists: world positions (N, 3), canonical metres, NaN where free."""
+    """Where head and wrists have to be: world positions (N, 3), canonical metres, NaN where they are free, even in part."""
     places = to_world(shot.path, shot.conditions.observation[PREROLL:].reshape(-1, 22, 3))
-    given = shot.conditions.given[PREROLL:]
+    given = shot.share[PREROLL:] >= 1.0
     slots = {name: MODEL_ORDER.index(j) for name, j in END_EFFECTORS.items()}
-    return {name: np.where(given[:, slot, None] > 0, places[:, slot], np.nan) for name, slot in slots.items()}
+    return {name: np.where(given[:, slot, None], places[:, slot], np.nan) for name, slot in slots.items()}
 
 
 def cleaned_up(joints: np.ndarray, shot: Shot, settings: CleanUp) -> np.ndarray:
     """Joints (N, 22, 3) of a shot, canonical metres, on constant bones, after all that ``settings`` ask for."""
     tops = tops_under(shot.scene, shot.path) if settings.seat else None
-    return cleaned(joints, targets_of(shot), settings, shot.path.position[:, 2], tops)
+    floor = shot.path.position[:, 2]
+    reach = partial(distance, shot.scene, floor=floor) if shot.scene.solids else None
+    return cleaned(joints, targets_of(shot), settings, floor, tops, reach)
+
+
+def _led_over(conditions: Conditions, share: np.ndarray, free: np.ndarray) -> Conditions:
+    """The conditions with targets that count in part on the way from where the joints are when ``free`` (T, 66) to the target."""
+    way = np.repeat(share, 3, axis=-1)
+    return replace(conditions, observation=(1.0 - way) * free + way * conditions.observation)
 
 
 def _onto_bones(
-    poses: np.ndarray, shot: Shot, controls: Controls, switches: np.ndarray, clean_up: CleanUp
+    joints: np.ndarray, shot: Shot, controls: Controls, clean_up: CleanUp
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Local quaternions (N, 22, 4) and pelvis (N, 3), canonical metres, of poses (N, 66): cleaned, eased over mode switches."""
-    joints = to_world(shot.path, poses.reshape(-1, 22, 3))
+    """Local quaternions (N, 22, 4) and pelvis (N, 3), canonical metres, of joints: cleaned, eased over mode switches."""
     target = frame_times(len(joints), MODEL_FPS)
     names = ("head_rotation", "hand_left_rotation", "hand_right_rotation")
     turned = [_rotation(controls, name, target) for name in names]
@@ -84,7 +107,99 @@ def _onto_bones(
         joints = cleaned_up(forward_kinematics(frames, pelvis), shot, clean_up)
         pelvis, frames = fit(joints, 1.0, *turned)
     local = continuous_signs(quaternion_from_matrix(local_from_global(frames)))
-    return blend_switches(local, pelvis, shot.path, switches) if len(switches) else (local, pelvis)
+    switches = np.flatnonzero(shot.modes[1:] != shot.modes[:-1]) + 1
+    length = round(controls.blend * MODEL_FPS)
+    return blend_switches(local, pelvis, shot.path, switches, length) if len(switches) and length > 0 else (local, pelvis)
+
+
+def _joints(rotations: np.ndarray, pelvis: np.ndarray) -> np.ndarray:
+    return forward_kinematics(global_from_local(matrix_from_quaternion(rotations)), pelvis)
+
+
+def _finished(
+    poses: np.ndarray, action: np.ndarray, shot: Shot, controls: Controls, clean_up: CleanUp, log_likelihood: float
+) -> Take:
+    """The take of the model's poses (PREROLL + N, 66), with ``action`` (T, K) at the controls' rate."""
+    started = perf_counter()
+    joints = to_world(shot.path, poses[PREROLL:].reshape(-1, 22, 3))
+    local, pelvis = _onto_bones(joints, shot, controls, clean_up)
+
+    floor = shot.path.position[:, 2]
+    reach = partial(distance, shot.scene, floor=floor) if shot.scene.solids else None
+    judged = partial(summary, fps=MODEL_FPS, floor=floor, targets=targets_of(shot), distance=reach)
+    metrics = judged(_joints(local, pelvis))
+    raw = judged(_joints(*_onto_bones(joints, shot, controls, RAW))) if clean_up.asked else metrics
+
+    # From 30 frames a second to the controls' own rate, and to the character's own size.
+    source, target = frame_times(len(shot.path), MODEL_FPS), frame_times(len(controls), controls.fps)
+    rotations = resample_rotations(local, source, target)
+    pelvis = resample_positions(pelvis, source, target)
+    root = resample_path(shot.path, MODEL_FPS, controls.fps, len(controls))
+    return Take(
+        controls.fps, _joints(rotations, pelvis) * controls.scale, rotations,
+        RootPath(root.position * controls.scale, root.yaw).matrices(), action, controls.scale, poses, shot.path,
+        log_likelihood, raw, metrics, {"fitting": perf_counter() - started}, shot.warnings,
+    )
+
+
+def takes_steps(
+    scene: Scene, controls: Controls, weights: Weights, draws: Sequence[Draw], *, resume: Take | None = None,
+    resume_frame: int = 0, device: str | None = None, clean_up: CleanUp = RAW,
+    watch: Callable[[int, np.ndarray], None] | None = None,
+) -> Generator[float, None, list[Take]]:
+    """Generate takes of one shot side by side, one for each of ``draws``; yields progress in [0, 1].
+
+    ``resume``: a take whose motion before ``resume_frame`` (a frame of the controls) is kept, and gone on from. ``device``:
+    None runs on NumPy, else on that torch device. ``clean_up``: what is done to the joints after the model; nothing by default.
+    ``watch`` is shown each frame of the first take as it is made: its index at 30 fps, and the joints (22, 3) in the world,
+    metres. Raises InputError for what cannot be used, WeightsError for weights that do not fit.
+    """
+    started = perf_counter()
+    yield 0.0
+    shot = yield from within(shot_steps(scene, controls), 0.0, _CONDITIONED)
+    conditioned = perf_counter()
+    sampler = Sampler(weights, device)
+    z = np.concatenate([sampler.noise(draw.seed, draw.lower_seed, draw.temperature) for draw in draws])
+    kept = None
+    if resume is not None and resume_frame > 0:
+        kept = np.repeat(_kept(resume, resume_frame, shot.path)[:, None], len(draws), axis=1)
+
+    def shown(frame: int, pose: np.ndarray) -> None:
+        if watch is not None and frame >= PREROLL:
+            at = RootPath(shot.path.position[frame - PREROLL, None], shot.path.yaw[frame - PREROLL, None])
+            watch(frame - PREROLL, to_world(at, pose.reshape(1, 22, 3))[0] * controls.scale)
+
+    conditions, sampling = shot.conditions, _CONDITIONED
+    if ((shot.share > 0.0) & (shot.share < 1.0)).any():
+        # Where a target counts in part, the calm take tells where the joint would be without it.
+        without = replace(conditions, given=(shot.share >= 1.0).astype(float))
+        sampling = (_CONDITIONED + _SAMPLED) / 2
+        calm = yield from within(sampler.run(without, np.zeros((1, 66))), _CONDITIONED, sampling)
+        conditions = _led_over(conditions, shot.share, model_order(calm.poses[:, 0]))
+    made = yield from within(sampler.run(conditions, z, kept, shown), sampling, _SAMPLED)
+    if not np.isfinite(made.poses).all():
+        raise WeightsError(f"The weights '{weights.path}' give poses that are no numbers; choose another file.")
+    seconds = {"conditions": conditioned - started, "sampling": perf_counter() - conditioned}
+
+    source, target = frame_times(len(shot.path), MODEL_FPS), frame_times(len(controls), controls.fps)
+    takes = []
+    for b in range(len(draws)):
+        action = resample_positions(made.actions[PREROLL:, b], source, target)
+        density = float(made.log_likelihood[PREROLL:, b].mean())
+        take = _finished(made.poses[:, b], action, shot, controls, clean_up, density)
+        takes.append(replace(take, seconds=seconds | take.seconds))
+        yield _SAMPLED + (1.0 - _SAMPLED) * (b + 1) / len(draws)
+    return takes
+
+
+def clean_again_steps(scene: Scene, controls: Controls, take: Take, clean_up: CleanUp) -> Generator[float, None, Take]:
+    """The take with another clean-up, without sampling again; ``scene`` and ``controls`` as it was generated with."""
+    shot = yield from within(shot_steps(scene, controls), 0.0, 0.9)
+    if len(shot.path) != len(take.path):
+        raise InputError("The take has other frames than the controls; generate it again.")
+    done = _finished(take.poses, take.action, shot, controls, clean_up, take.log_likelihood)
+    yield 1.0
+    return done
 
 
 def generate_steps(
@@ -95,44 +210,13 @@ def generate_steps(
     """Generate one take; yields progress in [0, 1] and returns the ``Take``.
 
     ``temperature`` scales the take's noise; 0 is the pose at z = 0, 1 the spread of captured takes. ``lower_seed``: another
-    seed for the legs. ``resume``: a take whose motion before ``resume_frame`` (a frame of the controls) is kept, and gone on
-    from. ``device``: None runs on NumPy, else on that torch device. ``clean_up``: what is done to the joints after the model;
-    nothing by default. Raises InputError for what cannot be used, WeightsError for weights that do not fit.
+    seed for the legs. The rest is as in ``takes_steps``.
     """
-    if not 0 <= temperature <= _HOTTEST:
-        raise InputError(f"The temperature is {temperature}; give 0 or a small positive number such as 1.")
-    started = perf_counter()
-    yield 0.0
-    shot = yield from within(shot_steps(scene, controls), 0.0, _CONDITIONED)
-    conditioned = perf_counter()
-    sampler = Sampler(weights, device)
-    z = sampler.noise(seed, lower_seed, temperature)
-    kept = None
-    if resume is not None and resume_frame > 0:
-        kept = _kept(resume, resume_frame, shot.path)[:, None]
-    made, actions = yield from within(sampler.run(shot.conditions, z, kept), _CONDITIONED, _SAMPLED)
-    if not np.isfinite(made).all():
-        raise WeightsError(f"The weights '{weights.path}' give poses that are no numbers; choose another file.")
-    sampled = perf_counter()
-
-    poses, actions = made[:, 0], actions[PREROLL:, 0]
-    switches = np.flatnonzero(shot.modes[1:] != shot.modes[:-1]) + 1
-    local, pelvis = _onto_bones(poses[PREROLL:], shot, controls, switches, clean_up)
-    # From 30 frames a second to the controls' own rate, and to the character's own size.
-    source, target = frame_times(len(shot.path), MODEL_FPS), frame_times(len(controls), controls.fps)
-    rotations = resample_rotations(local, source, target)
-    pelvis = resample_positions(pelvis, source, target)
-    root = resample_path(shot.path, MODEL_FPS, controls.fps, len(controls))
-    joints = forward_kinematics(global_from_local(matrix_from_quaternion(rotations)), pelvis) * controls.scale
-    matrices = RootPath(root.position * controls.scale, root.yaw).matrices()
-    seconds = {
-        "conditions": conditioned - started, "sampling": sampled - conditioned, "fitting": perf_counter() - sampled,
-    }
-    yield 1.0
-    return Take(
-        controls.fps, joints, rotations, matrices, resample_positions(actions, source, target), controls.scale, poses,
-        shot.path, seconds, shot.warnings,
+    takes = yield from takes_steps(
+        scene, controls, weights, [Draw(seed, lower_seed, temperature)], resume=resume, resume_frame=resume_frame,
+        device=device, clean_up=clean_up,
     )
+    return takes[0]
 
 
 def generate(

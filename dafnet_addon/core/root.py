@@ -12,7 +12,7 @@ from .rotations import normalised, rotate, transpose, yaw_matrix
 from .skeleton import joint
 
 __all__ = [
-    "RootPath", "raw_root_from_joints", "root_from_joints", "root_from_matrices", "smoothed", "velocities", "integrate",
+    "RootPath", "gaussian", "raw_root_from_joints", "root_from_joints", "root_from_matrices", "smoothed", "velocities", "integrate",
     "to_root", "to_world", "AHEAD", "ahead",
 ]
 
@@ -44,7 +44,7 @@ class RootPath:
         return m
 
 
-def _gaussian(values: np.ndarray, sigma: float) -> np.ndarray:
+def gaussian(values: np.ndarray, sigma: float) -> np.ndarray:
     """Gaussian smoothing along time; beyond its ends the path goes on as a point reflection, so straight lines stay."""
     n = len(values)
     if n < 2:
@@ -63,7 +63,7 @@ def _gaussian(values: np.ndarray, sigma: float) -> np.ndarray:
 
 def smoothed(path: RootPath, position_sigma: float = POSITION_SIGMA, yaw_sigma: float = YAW_SIGMA) -> RootPath:
     """The path smoothed once by Gaussians (standard deviations in 30-fps frames)."""
-    return RootPath(_gaussian(path.position, position_sigma), _gaussian(path.yaw, yaw_sigma))
+    return RootPath(gaussian(path.position, position_sigma), gaussian(path.yaw, yaw_sigma))
 
 
 def _held_yaw(forward: np.ndarray, certainty: np.ndarray) -> np.ndarray:

@@ -4,10 +4,10 @@ Everything that is known in advance (occupancy, velocity, observation) goes thro
 frames at once; only the recurrent part and the action predictor, which looks at the poses just made, are left per frame.
 """
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from .skeleton import LOWER, MODEL_ORDER, OFFSETS, UPPER
 from .threads import one_thread
 from .weights import Weights
 
-__all__ = ["Conditions", "Sampler", "model_order", "smpl_order", "velocities_up_to"]
+__all__ = ["Conditions", "Made", "Sampler", "model_order", "smpl_order", "velocities_up_to"]
 
 Array = Any  # numpy.ndarray or torch.Tensor
 
@@ -26,6 +26,7 @@ _POSE_SIZE = _UPPER_SIZE + _LOWER_SIZE
 _ORDER = np.array([3 * j + k for j in MODEL_ORDER for k in range(3)])
 _INVERSE = np.argsort(_ORDER)
 _SIZES = ("actions", "history", "predictor_code", "predictor_width", "width", "layers", "code")
+_LOG_TURN = float(np.log(2.0 * np.pi))
 _PASSING = 10  # frames in which a resumed take's noise becomes its own
 
 
@@ -62,6 +63,16 @@ class Conditions:
 
     def __len__(self) -> int:
         return len(self.velocity)
+
+
+class Made(NamedTuple):
+    """What a run makes of B takes: ``poses`` (T, B, 66) in SMPL order, metres; ``actions`` (T, B, K): probabilities;
+    ``log_likelihood`` (T, B): log p of each standardised pose after those before it, nats.
+    """
+
+    poses: np.ndarray
+    actions: np.ndarray
+    log_likelihood: np.ndarray
 
 
 def _unusable(weights: Weights, what: str) -> WeightsError:
@@ -334,13 +345,14 @@ class Sampler:
     def _remember(self, pose: Array) -> None:
         self._past = self.xp.concatenate([self._past[:, _POSE_SIZE:], pose], axis=-1)
 
-    def frame(self, index: int, noise: Array) -> tuple[Array, Array]:
-        """Standardised pose (B, 66) of the next frame, part after part, from ``noise`` (B, 66); and what the nets were told,
-        action probabilities (B, K).
+    def frame(self, index: int, noise: Array) -> tuple[Array, Array, Array]:
+        """Standardised pose (B, 66) of the next frame, part after part, from ``noise`` (B, 66); what the nets were told,
+        action probabilities (B, K); and the log-determinant (B,) of the way from pose to noise.
         """
         xp = self.xp
         told = self._told(index)
         made: list[Array] = []
+        log_det = 0.0 * noise.sum(-1)
         for part in self._parts:
             z = noise[:, part.columns]
             for step in reversed(part.steps):
@@ -348,10 +360,11 @@ class Sampler:
                 shift, scale = step.coupling(index, xp.concatenate([passed, told, *made], axis=-1))
                 changed = z[:, step.half :] / scale - shift
                 z = xp.concatenate([passed, changed], axis=-1) @ step.inverse + step.inverse_offset
+                log_det = log_det + xp.log(scale).sum(-1) + step.log_det
             made.append(z)
         pose = xp.concatenate([made[i] for i in self._as_pose], axis=-1)
         self._remember(pose)
-        return pose, told
+        return pose, told, log_det
 
     def absorb(self, index: int, pose: Array, told: Array | None = None) -> tuple[Array, Array, Array]:
         """Noise (B, 66), action probabilities (B, K) and log-determinant (B,) of a kept frame: pose to noise.
@@ -374,31 +387,40 @@ class Sampler:
         return xp.concatenate([noise[i] for i in self._as_pose], axis=-1), told, log_det
 
     def run(
-        self, conditions: Conditions, z: np.ndarray, kept: np.ndarray | None = None
-    ) -> Generator[float, None, tuple[np.ndarray, np.ndarray]]:
-        """Poses (T, B, 66) in SMPL order, metres, and action probabilities (T, B, K); yields progress in [0, 1].
+        self, conditions: Conditions, z: np.ndarray, kept: np.ndarray | None = None,
+        watch: Callable[[int, np.ndarray], None] | None = None,
+    ) -> Generator[float, None, Made]:
+        """Make every frame of B takes; yields progress in [0, 1].
 
         ``z`` (B, 66): one noise vector a take, upper part first, held constant. ``kept`` (N, B, 66), SMPL order, metres: the
         first N frames as they are to stay; the model goes on from them, its noise passing over ten frames from the one that
-        the last kept pose is made of to ``z``, so that nothing jumps.
+        the last kept pose is made of to ``z``, so that nothing jumps. ``watch`` is shown each frame of the first take as it
+        is made: its index and pose (66,) as above.
         """
         noise = self._to(z)
         self.start(conditions, takes=len(z))
         known = self._to(np.zeros((0, *z.shape)) if kept is None else self.standardised(kept))
         first, last = len(known), noise
-        poses, actions = [], []
+        poses, actions, densities = [], [], []
         for t in range(len(conditions)):
             with one_thread():  # frame by frame: whoever drains this generator has the threads back in between
                 if t < first:
                     pose = known[t]
-                    last, told, _ = self.absorb(t, pose)
+                    now, told, log_det = self.absorb(t, pose)
+                    last = now
                 else:
                     share = min(1.0, (t - first + 1) / _PASSING)
                     now = last + (noise - last) * (share * share * (3.0 - 2.0 * share))
-                    pose, told = self.frame(t, now)
+                    pose, told, log_det = self.frame(t, now)
+                densities.append(log_det - 0.5 * (now * now).sum(-1) - 0.5 * _POSE_SIZE * _LOG_TURN)
             poses.append(pose)
             actions.append(told[:, : self.actions])
+            if watch is not None:
+                watch(t, self._metres(self._from(pose[:1]))[0])
             yield (t + 1) / len(conditions)
-        stacked = self._from(self.xp.stack(poses)).astype(np.float64)
-        made = smpl_order(stacked * self.pose_std + self.pose_mean)
-        return made, self._from(self.xp.stack(actions)).astype(np.float64)
+        stacked, told, density = (self._from(self.xp.stack(each)).astype(np.float64) for each in (poses, actions, densities))
+        return Made(self._metres(stacked), told, density)
+
+    def _metres(self, poses: np.ndarray) -> np.ndarray:
+        """Inverse of ``standardised``."""
+        return smpl_order(poses * self.pose_std + self.pose_mean)

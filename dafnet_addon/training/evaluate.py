@@ -89,7 +89,7 @@ def shot_of(clip: HeldClip, mode: str, scene: Scene | None = None) -> Shot:
 
 def made(sampler: Sampler, shot: Shot, noise: np.ndarray) -> np.ndarray:
     """Takes (S, T, 22, 3) of noise vectors (S, 66): world joints on constant bones, as the model gives them."""
-    poses, _ = drained(sampler.run(shot.conditions, noise))
+    poses = drained(sampler.run(shot.conditions, noise)).poses
     takes = []
     for s in range(len(noise)):
         takes.append(on_bones(to_world(shot.path, poses[PREROLL:, s].reshape(-1, 22, 3))))
