@@ -89,6 +89,8 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     bake.add_argument("--plant-feet", type=float, metavar="SHARE", help="0 leaves feet as generated, 1 holds those that stand")
     bake.add_argument("--rest-on-seats", type=float, metavar="SHARE", help="0 leaves who sinks into a seat there")
     bake.add_argument("--reach-targets", type=float, metavar="SHARE", help="0 leaves hands as generated, 1 is exact")
+    bake.add_argument("--clear-furniture", type=float, metavar="SHARE", help="1 brings hands and feet out of furniture")
+    bake.add_argument("--smooth", type=float, metavar="SHARE", help="1 evens out quick changes")
     bake.add_argument("--takes", type=int, default=1, metavar="N", help="how many takes; the first one plays")
     sampling(bake, None)
 
@@ -170,11 +172,12 @@ def _bake(options: argparse.Namespace) -> None:
         "hand_right": options.hand_right, "upper_body_source": options.upper_body, "mode": options.mode,
         "temperature": options.temperature, "seed": options.seed,
         "plant_feet": options.plant_feet, "rest_on_seats": options.rest_on_seats, "reach_targets": options.reach_targets,
+        "clear_furniture": options.clear_furniture, "smooth": options.smooth,
     }
     if options.frames:
         changes["frame_start"], changes["frame_end"] = options.frames
     with _only_our_output(), _Bar() as bar:
-        results = bake_takes(
+        result = bake_takes(
             options.file, options.output, character=options.character, takes=options.takes, weights=weights, progress=bar,
             changes={name: value for name, value in changes.items() if value is not None},
         )
@@ -182,21 +185,23 @@ def _bake(options: argparse.Namespace) -> None:
         "output": str(options.output),
         "takes": [
             {
-                "action": result.action.name, "seed": settings.seed, "temperature": settings.temperature,
-                "frames": len(result.take), "warnings": list(result.warnings),
-                "seconds": {stage: round(spent, 4) for stage, spent in result.seconds.items()},
+                "action": action.name, "seed": draw.seed, "temperature": draw.temperature, "frames": len(take),
+                "log_likelihood": round(take.log_likelihood, 3), "metrics": take.metrics, "raw_metrics": take.raw_metrics,
             }
-            for settings, result in results
+            for action, draw, take in zip(result.actions, result.draws, result.takes, strict=True)
         ],
+        "warnings": list(result.warnings),
+        "seconds": {stage: round(spent, 4) for stage, spent in result.seconds.items()},
     }
     if options.json:
         print(json.dumps(report, indent=2))
         return
+    for warning in report["warnings"]:
+        print(f"Warning: {warning}")
     for take in report["takes"]:
-        for warning in take["warnings"]:
-            print(f"Warning: {warning}")
-        spent = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in take["seconds"].items())
-        print(f"{take['action']}: {take['frames']} frames; {spent}")
+        slides = take["metrics"]["foot_sliding_per_frame"]
+        print(f"{take['action']}: {take['frames']} frames, seed {take['seed']}, {slides:.2f} feet slide a frame")
+    print(", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in report["seconds"].items()))
     print(f"Written to {options.output}")
 
 

@@ -1,19 +1,25 @@
-"""Generate a take and bake it onto the character."""
+"""Generate takes and bake them onto the character."""
 
 from collections.abc import Generator
 from time import perf_counter
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import bpy
+import numpy as np
+from bpy.props import EnumProperty
 
 from ..dafnet_addon.blender import job
 from ..dafnet_addon.blender.armature import character_of
+from ..dafnet_addon.blender.takes import active_take, draw_of, frames_of
+from ..dafnet_addon.core.errors import InputError
 from .reporting import reported
 
-__all__ = ["DAFNET_OT_generate"]
+__all__ = ["DAFNET_OT_cancel", "DAFNET_OT_generate"]
 
 _TICK = 0.04
 """Seconds of work between two looks at the user's input."""
+_CALM_LEGS = 1.0
+"""Temperature of the legs of a take whose legs are varied though it is calm."""
 _LOOKING = {
     "MOUSEMOVE", "INBETWEEN_MOUSEMOVE", "MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "NDOF_MOTION",
     "TRACKPADPAN", "TRACKPADZOOM",
@@ -22,15 +28,31 @@ _LOOKING = {
 
 
 class DAFNET_OT_generate(bpy.types.Operator):
-    """Generate the character's motion from its root, targets and furniture, and bake it into a new action"""
+    """Generate the character's motion from its root, targets and furniture, and bake it into new actions"""
 
     bl_idname = "dafnet.generate"
     bl_label = "Generate"
     bl_options = {"UNDO"}
 
+    task: EnumProperty(
+        name="Task", default="NEW", options={"SKIP_SAVE"},
+        items=[
+            ("NEW", "Generate", "Generate new takes"),
+            ("LEGS", "Vary the Legs", "Generate another lower body under the upper body of the chosen take"),
+            ("ONWARD", "From Here On", "Keep the chosen take up to the current frame, and generate what follows anew"),
+        ],
+    )
+
     progress: ClassVar[float | None] = None
     """How far the running job is, None where none runs; for the panel."""
+    growing: ClassVar[np.ndarray | None] = None
+    """The joints (22, 3) of the frame just made, world, metres; for the viewport."""
+    left: ClassVar[float] = 0.0
+    """Seconds that the running job will still take."""
+    stopping: ClassVar[bool] = False
+    """Whether the Cancel button was pressed."""
 
+    _started: float
     _steps: Generator[float, None, job.Result]
     _timer: bpy.types.Timer
 
@@ -50,22 +72,48 @@ class DAFNET_OT_generate(bpy.types.Operator):
             return True
         return False
 
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: Any) -> str:
+        """The task's own tooltip."""
+        return "" if properties.task == "NEW" else cls.bl_rna.properties["task"].enum_items[properties.task].description
+
+    def _settings(self, context: bpy.types.Context) -> job.Settings:
+        """The character's settings, and what the task changes in them."""
+        character = character_of(context)
+        if self.task == "NEW":
+            return job.settings_of(character, context.scene)
+        take = active_take(character)
+        if take is None:
+            raise InputError("Choose a take in the list of takes first.")
+        first, last = frames_of(take)
+        if self.task == "ONWARD":
+            return job.settings_of(
+                character, context.scene, kept=take.name_full, kept_until=context.scene.frame_current, frame_start=first,
+            )
+        draw = draw_of(take)
+        return job.settings_of(
+            character, context.scene, take_count=1, seed=draw.seed, temperature=draw.temperature, frame_start=first,
+            frame_end=last, lower_seed=(draw.lower_seed or 0) + 1, lower_temperature=draw.lower_temperature or _CALM_LEGS,
+        )
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Generate without showing progress."""
         with reported(self):
-            self._tell(job.run(context, job.settings_of(character_of(context), context.scene)))
+            self._tell(job.run(context, self._settings(context)))
             return {"FINISHED"}
         return {"CANCELLED"}
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Start the job; ``modal`` goes on with it."""
         with reported(self):
-            self._steps = job.steps(context, job.settings_of(character_of(context), context.scene))
+            self._steps = job.steps(context, self._settings(context), watch=self._watch)
+            self._started = perf_counter()
             manager = context.window_manager
             self._timer = manager.event_timer_add(0.01, window=context.window)
             manager.progress_begin(0, 100)
             manager.modal_handler_add(self)
-            type(self).progress = 0.0
+            own = type(self)
+            own.progress, own.left, own.stopping, own.growing = 0.0, 0.0, False, None
             return {"RUNNING_MODAL"}
         return {"CANCELLED"}
 
@@ -74,12 +122,13 @@ class DAFNET_OT_generate(bpy.types.Operator):
 
         Until the end only looking around is let through, so the scene stays as it was read.
         """
-        if event.type == "ESC":
+        if event.type == "ESC" or self.stopping:
             self.cancel(context)
             self.report({"INFO"}, "Cancelled; the scene is as it was")
             return {"CANCELLED"}
         if event.type != "TIMER":
-            return {"PASS_THROUGH"} if event.type in _LOOKING else {"RUNNING_MODAL"}
+            allowed = event.type in _LOOKING or (event.type == "LEFTMOUSE" and _over_sidebar(context, event))
+            return {"PASS_THROUGH"} if allowed else {"RUNNING_MODAL"}
         result = None
         running = False
         try:
@@ -99,10 +148,16 @@ class DAFNET_OT_generate(bpy.types.Operator):
     def cancel(self, context: bpy.types.Context) -> None:
         """End the job, which leaves the scene untouched unless it has finished."""
         self._steps.close()
+        own = type(self)
+        own.progress, own.growing, own.stopping = None, None, False
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
-        type(self).progress = None
+        if context.workspace:
+            context.workspace.status_text_set(None)
         _redraw(context)
+
+    def _watch(self, _frame: int, joints: np.ndarray) -> None:
+        type(self).growing = joints
 
     def _pump(self, context: bpy.types.Context) -> job.Result | None:
         """Work for a tick; the result once it is there."""
@@ -112,7 +167,10 @@ class DAFNET_OT_generate(bpy.types.Operator):
                 type(self).progress = next(self._steps)
             except StopIteration as done:
                 return done.value
-        context.window_manager.progress_update(100 * (self.progress or 0.0))
+        share, spent = self.progress or 0.0, perf_counter() - self._started
+        type(self).left = spent * (1.0 - share) / max(share, 0.01)
+        context.window_manager.progress_update(100 * share)
+        context.workspace.status_text_set(f"DAFNet: {100 * share:.0f} %, {self.left:.0f} s left. Esc cancels")
         _redraw(context)
         return None
 
@@ -120,7 +178,35 @@ class DAFNET_OT_generate(bpy.types.Operator):
         for warning in result.warnings:
             self.report({"WARNING"}, warning)
         seconds = sum(result.seconds.values())
-        self.report({"INFO"}, f"{len(result.take)} frames in {seconds:.1f} s: '{result.action.name}'")
+        takes = f"'{result.action.name}'" if len(result.takes) == 1 else f"{len(result.takes)} takes"
+        self.report({"INFO"}, f"{len(result.take)} frames in {seconds:.1f} s: {takes}")
+
+
+class DAFNET_OT_cancel(bpy.types.Operator):
+    """Stop generating; the scene stays as it was"""
+
+    bl_idname = "dafnet.cancel"
+    bl_label = "Cancel"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Something is being generated."""
+        cls.poll_message_set("Nothing is being generated")
+        return DAFNET_OT_generate.progress is not None
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        """Let the running job end itself at its next tick."""
+        DAFNET_OT_generate.stopping = True
+        return {"FINISHED"}
+
+
+def _over_sidebar(context: bpy.types.Context, event: bpy.types.Event) -> bool:
+    """Whether the mouse is over a 3D view's sidebar, where Cancel is."""
+    return any(
+        region.type == "UI" and 0 <= event.mouse_x - region.x < region.width and 0 <= event.mouse_y - region.y < region.height
+        for area in context.screen.areas if area.type == "VIEW_3D" for region in area.regions
+    )
 
 
 def _redraw(context: bpy.types.Context) -> None:

@@ -1,7 +1,11 @@
 """What the animator sees. Panels draw and change nothing."""
 
 from .main import DAFNET_PT_character
+from .takes import DAFNET_PT_clean_up, DAFNET_PT_takes, DAFNET_UL_takes
 
 __all__ = ["CLASSES"]
 
-CLASSES = (DAFNET_PT_character,)
+CLASSES = (
+    DAFNET_PT_character,
+    DAFNET_UL_takes, DAFNET_PT_takes, DAFNET_PT_clean_up,
+)

@@ -1,14 +1,28 @@
-"""The one tab in the 3D view's sidebar."""
+"""The head of the one tab in the 3D view's sidebar: the active character, its mode and targets, and Generate."""
 
 import bpy
 
 from ..dafnet_addon.blender.armature import character_of, sent
 from ..dafnet_addon.blender.compat import action_curves
 from ..operators.add_character import DAFNET_OT_add_character
-from ..operators.generate import DAFNET_OT_generate
+from ..operators.generate import DAFNET_OT_cancel, DAFNET_OT_generate
 from ..operators.walk_to import DAFNET_OT_walk_to
 
-__all__ = ["DAFNET_PT_character"]
+__all__ = ["CharacterPanel", "DAFNET_PT_character"]
+
+
+class CharacterPanel:
+    """Part of the tab that is there for a character, while none is being generated."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "DAFNet"
+    bl_parent_id = "DAFNET_PT_character"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """A character is active."""
+        return DAFNET_OT_generate.progress is None and character_of(context) is not None
 
 
 class DAFNET_PT_character(bpy.types.Panel):
@@ -23,6 +37,13 @@ class DAFNET_PT_character(bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the settings of the active character, or the way to get one."""
         layout = self.layout
+        if DAFNET_OT_generate.progress is not None:
+            layout.progress(
+                factor=DAFNET_OT_generate.progress,
+                text=f"{100 * DAFNET_OT_generate.progress:.0f} %, {DAFNET_OT_generate.left:.0f} s left",
+            )
+            layout.operator(DAFNET_OT_cancel.bl_idname, icon="CANCEL")
+            return
         character = character_of(context)
         if character is None:
             directed, goal = sent(context)
@@ -35,7 +56,9 @@ class DAFNET_PT_character(bpy.types.Panel):
             return
 
         settings = character.dafnet
-        layout.label(text=character.name, icon="ARMATURE_DATA")
+        row = layout.row()
+        row.label(text=character.name, icon="ARMATURE_DATA")
+        row.operator(DAFNET_OT_add_character.bl_idname, text="", icon="ADD")
         layout.row(align=True).prop(settings, "mode", expand=True)
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -44,16 +67,18 @@ class DAFNET_PT_character(bpy.types.Panel):
         column = layout.column()
         column.prop(settings, "furniture")
         column.prop(settings, "root", icon="EMPTY_ARROWS")
-        row = column.row(align=True)
-        row.operator(DAFNET_OT_walk_to.bl_idname, text="Sit on Selected", icon="TRACKING_FORWARDS").goal = "SEAT"
-        row.operator(DAFNET_OT_walk_to.bl_idname, text="Walk to Cursor", icon="CURSOR").goal = "CURSOR"
         if settings.mode == "EE" or animated:
             column = layout.column()
-            column.prop(settings, "head")
-            column.prop(settings, "hand_left")
-            column.prop(settings, "hand_right")
+            for role in ("head", "hand_left", "hand_right"):
+                column.prop(settings, role)
+                row = column.row()
+                row.use_property_decorate = True
+                row.active = getattr(settings, role) is not None
+                row.prop(settings, f"{role}_influence", text="Influence", slider=True)
         if settings.mode == "FULL" or animated:
             layout.prop(settings, "upper_body_source", icon="ARMATURE_DATA")
+        if animated:
+            layout.prop(settings, "blend_frames")
 
         column = layout.column(align=True)
         column.prop(settings, "use_scene_range")
@@ -64,23 +89,7 @@ class DAFNET_PT_character(bpy.types.Panel):
         column = layout.column()
         column.prop(settings, "temperature", slider=True)
         column.prop(settings, "seed")
-        row = column.row(heading="Vary the Legs")
-        row.prop(settings, "use_lower_seed", text="")
-        legs = row.row()
-        legs.active = settings.use_lower_seed
-        legs.prop(settings, "lower_seed", text="")
-
-        column = layout.column()
-        column.prop(settings, "plant_feet", slider=True)
-        column.prop(settings, "rest_on_seats", slider=True)
-        if settings.mode == "EE" or animated:
-            column.prop(settings, "reach_targets", slider=True)
-
-        if DAFNET_OT_generate.progress is None:
-            row = layout.row()
-            row.scale_y = 1.5
-            row.operator(DAFNET_OT_generate.bl_idname, icon="PLAY")
-            layout.operator(DAFNET_OT_add_character.bl_idname, icon="ADD")
-        else:
-            percent = f"{100 * DAFNET_OT_generate.progress:.0f} %, Esc cancels"
-            layout.progress(factor=DAFNET_OT_generate.progress, text=percent)
+        column.prop(settings, "take_count")
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator(DAFNET_OT_generate.bl_idname, icon="PLAY").task = "NEW"

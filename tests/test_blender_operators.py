@@ -223,7 +223,7 @@ def test_the_panel_draws(shot: Shot, addon) -> None:
     assert {"upper_body_source", "head"} <= set(drawn())
     operator.progress = 0.5
     try:
-        assert "50 %, Esc cancels" in drawn() and "dafnet.generate" not in drawn()
+        assert "50 %, 0 s left" in drawn() and "dafnet.cancel" in drawn() and "dafnet.generate" not in drawn()
         assert not shot.bpy.ops.dafnet.generate.poll()
     finally:
         operator.progress = None

@@ -4,15 +4,19 @@ import numpy as np
 import pytest
 
 from dafnet_addon import Box, CleanUp, Controls, InputError, Scene, generate, load_weights
-from dafnet_addon.core.cleanup import cleaned, planted, reaching, seated, standing_still
-from dafnet_addon.core.kinematics import two_bone
+from dafnet_addon.core.cleanup import cleaned, cleared, planted, reaching, seated, smoothed_out, standing_still
+from dafnet_addon.core.generate import clean_again_steps
+from dafnet_addon.core.kinematics import on_bones, two_bone
 from dafnet_addon.core.metrics import foot_sliding, jerk
 from dafnet_addon.core.paths import Stop, route
+from dafnet_addon.core.progress import drained
 from dafnet_addon.core.skeleton import END_EFFECTORS, JOINTS, OFFSETS, PARENTS, REST, TOE_HEIGHT, joint
+from dafnet_addon.core.solids import box_distance
+from dafnet_addon.core.storage import packed, unpacked
 
 BONES = np.linalg.norm(OFFSETS[1:], axis=1)
 TOES = [joint("left_foot"), joint("right_foot")]
-ALL = CleanUp(1.0, 1.0, 1.0)
+ALL = CleanUp(feet=1.0, reach=1.0, seat=1.0)
 
 
 def _lengths(joints: np.ndarray) -> np.ndarray:
@@ -164,3 +168,55 @@ def test_takes_are_cleaned_at_any_rate(fps):
     assert np.abs(_lengths(clean.joints) - BONES).max() < 1e-5
     assert jerk(clean.joints, fps) < 2.5 * jerk(raw.joints, fps) + 60.0
     assert np.array_equal(raw.poses, clean.poses), "the take's own poses are untouched"
+
+
+def _box(low: tuple[float, float, float], high: tuple[float, float, float]):
+    """Distance to a box between two corners."""
+    middle, half = np.add(low, high) / 2, np.subtract(high, low) / 2
+    return lambda points: box_distance(points - middle, half)
+
+
+def test_hands_and_feet_come_out_of_furniture_and_the_rest_stays():
+    joints = on_bones(np.repeat(_hanging()[None], 60, axis=0))
+    hand, foot = END_EFFECTORS["hand_left"], joint("right_ankle")
+    reach = _box(joints[0, hand] + (-0.2, -0.05, -0.5), joints[0, hand] + (0.2, 0.5, 0.06))
+    out = cleared(joints, reach, {})
+    assert reach(joints[:, [hand]]).max() < -0.04 and reach(out[20:40, [hand]]).min() > 0.025
+    assert np.abs(_lengths(out) - BONES).max() < 1e-6
+    moved = {JOINTS[j] for j in range(22) if np.abs(out[:, j] - joints[:, j]).max() > 1e-6}
+    assert moved == {"left_elbow", "left_wrist"}
+    target = {"hand_left": joints[:, hand]}
+    assert np.allclose(cleared(joints, reach, target), joints, atol=1e-6), "what has a target is left to it"
+    low = _box(joints[0, foot] - (0.02, 0.08, 0.08), joints[0, foot] + (0.08, 0.08, 0.08))
+    out = cleared(joints, low, {})
+    assert np.allclose(out[:, foot, 2], joints[:, foot, 2], atol=3e-3) and low(out[20:40, [foot]]).min() > 0.01
+    far = _box((5.0, 5.0, 0.0), (6.0, 6.0, 1.0))
+    assert cleared(joints, far, {}) is joints
+    half, whole = ((each - joints)[30, foot] for each in (cleared(joints, low, {}, 0.5), out))
+    assert np.allclose(half, whole / 2, atol=1e-3)
+
+
+def test_smoothing_evens_out_and_keeps_bones_and_straight_ways():
+    rng = np.random.default_rng(0)
+    still = np.repeat(_hanging()[None], 60, axis=0) + np.arange(60)[:, None, None] * (0.0, 0.03, 0.0)
+    shaking = on_bones(still + 0.01 * rng.normal(size=still.shape))
+    out = smoothed_out(shaking)
+    assert jerk(out, 30.0) < 0.1 * jerk(shaking, 30.0) and np.abs(out - still).mean() < np.abs(shaking - still).mean()
+    assert np.abs(_lengths(out) - BONES).max() < 1e-6
+    assert np.allclose(smoothed_out(on_bones(still)), on_bones(still), atol=1e-6)
+
+
+def test_cleaned_again_is_as_if_generated_so():
+    weights, scene = load_weights(), Scene([Box(center=np.array([0.0, 0.0, 0.225]), half_size=np.array([0.22, 0.22, 0.225]))])
+    path = route(Stop((1.6, 0.9), np.pi / 2), Stop((0.0, 0.0), 0.0, seconds=1.0, seated=True)).path
+    controls = Controls(30.0, path.matrices())
+    raw, clean = (generate(scene, controls, weights, clean_up=c) for c in (CleanUp(), ALL))
+    kept, asked = unpacked(packed(raw, controls))
+    again = drained(clean_again_steps(scene, asked, kept, ALL))
+    assert np.abs(again.joints - clean.joints).max() < 1e-4 and np.array_equal(again.poses, kept.poses)
+    assert clean.metrics["foot_sliding_per_frame"] < clean.raw_metrics["foot_sliding_per_frame"]
+    assert clean.raw_metrics == raw.metrics and again.log_likelihood == raw.log_likelihood
+    with pytest.raises(InputError, match="other frames"):
+        drained(clean_again_steps(scene, Controls(30.0, path.matrices()[:40]), kept, ALL))
+    with pytest.raises(InputError, match="generate it again"):
+        unpacked(b"no take")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from dafnet_addon import Box, Controls, InputError, Mesh, Scene, Take, generate, generate_steps, load_weights
+from dafnet_addon.core.generate import Draw, takes_steps
 from dafnet_addon.core.metrics import bone_length_variation, end_effector_distance
 from dafnet_addon.core.paths import Stop, route
 from dafnet_addon.core.progress import drained
@@ -244,3 +245,45 @@ def test_who_starts_beside_a_seat_stands_and_who_starts_over_it_sits(weights, be
     seat = Box(center=np.array([0.0, -behind, 0.225]), half_size=np.array([0.22, 0.22, 0.225]))
     take = generate(Scene([seat]), Controls(30.0, np.tile(np.eye(4), (45, 1, 1))), weights)
     assert (take.joints[0, 0, 2] > 0.86) == stands
+
+
+def test_takes_side_by_side_are_those_made_alone(weights):
+    scene, controls = _seated()
+    draws = [Draw(), Draw(3, None, 1.0), Draw(3, 4, 0.0, 1.0)]
+    seen: list[np.ndarray] = []
+    steps = takes_steps(scene, controls, weights, draws, watch=lambda frame, joints: seen.append(joints))
+    takes = drained(steps)
+    assert len(takes) == 3 and len(seen) == len(controls)
+    for take, draw in zip(takes[:2], draws, strict=False):
+        alone = generate(scene, controls, weights, seed=draw.seed, temperature=draw.temperature)
+        assert np.abs(take.joints - alone.joints).max() < 2e-3
+        assert abs(take.log_likelihood - alone.log_likelihood) < 0.1
+    assert takes[0].log_likelihood > takes[1].log_likelihood, "the calm take is the likeliest"
+    hands, feet = (np.abs(takes[2].joints[:, j] - takes[0].joints[:, j]).mean() for j in ([20, 21], [7, 8]))
+    assert feet > hands, "only the legs were drawn anew"
+    assert np.abs(seen[20] - takes[0].joints[20]).max() < 0.05, "what is shown is the first take"
+
+
+def test_influence_leads_a_hand_to_its_target_and_off_it(weights):
+    controls = _walk()
+    free = generate(Scene(), controls, weights)
+    target = free.joints[:, 20] + [0.0, 0.25, 0.30]
+    share = np.clip((np.arange(len(controls)) - 30) / 30.0, 0.0, 1.0)
+    asked = generate(Scene(), replace(controls, mode="EE", hand_left=target, hand_left_influence=share), weights)
+    whole = generate(Scene(), replace(controls, mode="EE", hand_left=target), weights)
+    gap = np.linalg.norm(asked.joints[:, 20] - target, axis=-1)
+    assert np.abs(asked.joints[:28] - free.joints[:28]).max() < 1e-3, "nothing before it begins"
+    assert gap[:28].mean() > 3 * gap[80:].mean() and gap[20] > gap[45] > gap[70]
+    assert np.abs(asked.joints[90:, 20] - whole.joints[90:, 20]).max() < 0.03
+    none = generate(Scene(), replace(controls, mode="EE", hand_left=target, hand_left_influence=0 * share), weights)
+    assert np.abs(none.joints - free.joints).max() < 1e-3
+
+
+def test_the_change_of_mode_is_blended_as_long_as_asked(weights):
+    controls = _walk()
+    free = generate(Scene(), controls, weights)
+    modes = ["FREE"] * 60 + ["EE"] * (len(controls) - 60)
+    asked = replace(controls, mode=modes, hand_left=free.joints[:, 20] + [0.0, 0.3, 0.4])
+    takes = [generate(Scene(), replace(asked, blend=blend), weights) for blend in (0.0, 1 / 3, 0.8)]
+    jump = [np.linalg.norm(np.diff(take.joints[55:85, 20], axis=0), axis=-1).max() for take in takes]
+    assert jump[0] > jump[1] > jump[2]

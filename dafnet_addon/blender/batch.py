@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 from ..core.errors import InputError
-from ..core.progress import drained, within
+from ..core.progress import drained
 from . import job
 from .armature import missing_bones
-from .compat import assign_action
 from .properties import ensure_registered
 
 if TYPE_CHECKING:
@@ -18,18 +17,16 @@ if TYPE_CHECKING:
 
 __all__ = ["bake_takes"]
 
-_FURTHER_TAKES = 1.0  # temperature of every take but the first, where none is asked for
-
-
 def bake_takes(
     file: Path | None, output: Path, *, character: str | None = None, changes: dict[str, Any] | None = None, takes: int = 1,
     weights: "Weights | None" = None, progress: Callable[[float], None] = lambda share: None,
-) -> list[tuple[job.Settings, job.Result]]:
+) -> job.Result:
     """Bake ``takes`` takes of one character and save; the first plays, the others are Actions of the file too.
 
     ``file`` None stands for the file that is open, of which ``output`` then becomes a copy. ``character`` names the armature
     where the scene has several. ``changes`` overrule the character's own settings (fields of ``Settings``). Each further take
-    has the next seed. Raises InputError where a file cannot be opened or written, or there is nothing to bake onto.
+    has the next seed, and temperature 1 where none is set. Raises InputError where a file cannot be opened or written, or there
+    is nothing to bake onto.
     """
     if output.is_dir():  # which some Blenders would move out of the way
         raise InputError(f"'{output}' is a folder; give the output another name.")
@@ -39,18 +36,10 @@ def bake_takes(
     scene = bpy.context.scene
     armature = _character(scene, character)
     output.parent.mkdir(parents=True, exist_ok=True)
-    results = []
-    for index in range(takes):
-        own = dict(changes or {})
-        if index:
-            own["seed"] = own.get("seed", armature.dafnet.seed) + index
-            own.setdefault("temperature", armature.dafnet.temperature or _FURTHER_TAKES)
-        settings = job.settings_of(armature, scene, **own)
-        whole = within(job.steps(bpy.context, settings, weights), index / takes, (index + 1) / takes)
-        results.append((settings, drained(whole, progress)))
-    assign_action(armature, results[0][1].action)
+    settings = job.settings_of(armature, scene, **{"take_count": takes, **(changes or {})})
+    result = drained(job.steps(bpy.context, settings, weights), progress)
     _save(output, copy=file is None)
-    return results
+    return result
 
 
 def _open(file: Path) -> None:

@@ -3,84 +3,159 @@
 A job knows objects by name only and looks them up at each stage, since they may be deleted or undone while it runs.
 """
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 import bpy
+import numpy as np
 
-from .. import generate_steps, load_weights
+from .. import load_weights
 from ..core.cleanup import CleanUp
 from ..core.errors import InputError
+from ..core.generate import Draw, clean_again_steps, takes_steps
 from ..core.progress import drained, within
-from ..core.take import Take
+from ..core.take import Controls, Take
 from .armature import metres_per_unit
 from .baker import bake
-from .properties import Settings, find_object, find_scene, names_in_use, settings_of, weights_path
+from .compat import assign_action
+from .properties import (
+    CLEAN_UP,
+    Settings,
+    device_of,
+    find_action,
+    find_object,
+    find_scene,
+    names_in_use,
+    settings_of,
+    weights_path,
+)
 from .scene_reader import read_steps
+from .takes import add_take, draw_of, stored
 
 if TYPE_CHECKING:
     from ..core.weights import Weights
 
-__all__ = ["Result", "Settings", "settings_of", "steps", "run"]
+__all__ = ["Result", "Settings", "clean_again_of", "draws_of", "settings_of", "steps", "run"]
 
 _READ, _GENERATED = 0.1, 0.98
-"""Progress after the scene is read and after the take is generated."""
+"""Progress after the scene is read and after the takes are generated."""
+_FURTHER_TAKES = 1.0
+"""Temperature of every take but the first where none is set: at 0 all would be the same."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """A baked take.
+    """Baked takes of one shot.
 
-    ``action``: new, and played by the armature. ``warnings``: sentences for the user. ``seconds`` by stage:
-    ``reading``, those of ``Take.seconds`` (``conditions``, ``sampling``, …) and ``baking``.
+    ``actions``: new, the first one played by the armature; ``takes``, ``draws``: of each. ``warnings``: sentences for the user.
+    ``seconds`` by stage: ``reading``, those of ``Take.seconds`` (``conditions``, ``sampling``, …) and ``baking``.
     """
 
-    action: bpy.types.Action
-    take: Take
+    actions: tuple[bpy.types.Action, ...]
+    takes: tuple[Take, ...]
+    draws: tuple[Draw, ...]
     warnings: tuple[str, ...]
     seconds: dict[str, float]
+
+    @property
+    def action(self) -> bpy.types.Action:
+        """The first one's."""
+        return self.actions[0]
+
+    @property
+    def take(self) -> Take:
+        """The first one."""
+        return self.takes[0]
+
+
+def draws_of(settings: Settings) -> list[Draw]:
+    """What the takes are drawn with: each further one with the next seed."""
+    first = Draw(settings.seed, settings.lower_seed, settings.temperature, settings.lower_temperature)
+    further = settings.temperature or _FURTHER_TAKES
+    return [first, *(Draw(settings.seed + k, None, further) for k in range(1, settings.take_count))]
+
+
+def _clean_up(settings: Settings) -> CleanUp:
+    return CleanUp(**{strength: getattr(settings, name) for name, strength in CLEAN_UP.items()})
 
 
 def steps(
     context: bpy.types.Context, settings: Settings, weights: "Weights | None" = None,
+    watch: Callable[[int, np.ndarray], None] | None = None,
 ) -> Generator[float, None, Result]:
     """Read the scene, generate, bake; yields progress in [0, 1] and returns the ``Result``.
 
     ``settings`` comes from ``settings_of(armature, scene, **overrides)``. Without ``weights`` those of the
-    preferences, else the shipped ones, are loaded. The current frame is as it was at every yield, and until the last
-    stage nothing in the scene is changed: an error (``InputError``, ``WeightsError``) or ``close()`` leaves it
-    untouched.
+    preferences, else the shipped ones, are loaded. ``watch``: see ``takes_steps``. The current frame is as it was at every
+    yield, and until the last stage nothing in the scene is changed: an error (``InputError``, ``WeightsError``) or ``close()``
+    leaves it untouched.
     """
     if weights is None:
         weights = load_weights(weights_path(context))
     started = perf_counter()
     used = names_in_use(settings)
+    resume, at = None, 0
+    if settings.kept is not None:
+        action = find_action(settings.kept)
+        resume, at = stored(action)[0], settings.kept_until - settings.frame_start
+        if action.dafnet.frame_start != settings.frame_start:
+            raise InputError(f"The take '{action.name}' begins at another frame than the range; set the range's start to its.")
+        if not 0 < at < len(resume):
+            raise InputError(f"Frame {settings.kept_until} is not inside the take '{action.name}'; go to a frame in it.")
     try:
         read = yield from within(read_steps(context, settings), 0.0, _READ)
     except ReferenceError as error:
         raise InputError("Something was deleted while the scene was read; generate again.") from error
     seconds = {"reading": perf_counter() - started}
 
-    take = yield from within(
-        generate_steps(
-            read.scene, read.controls, weights,
-            seed=settings.seed, lower_seed=settings.lower_seed, temperature=settings.temperature,
-            clean_up=CleanUp(settings.plant_feet, settings.reach_targets, settings.rest_on_seats),
+    draws = draws_of(settings)
+    takes = yield from within(
+        takes_steps(
+            read.scene, read.controls, weights, draws, resume=resume, resume_frame=at, device=device_of(context),
+            clean_up=_clean_up(settings), watch=watch,
         ),
         _READ, _GENERATED,
     )
     started = perf_counter()
     if gone := used - names_in_use(settings):
         raise InputError(f"'{min(gone)}' is not in the scene any more; generate again.")
-    armature = find_object(settings, settings.armature, "character")
-    action = bake(take, armature, settings.frame_start, f"{armature.name} take", metres_per_unit(find_scene(settings)))
-    seconds |= take.seconds | {"baking": perf_counter() - started}
+    actions = _baked(settings, takes, read.controls, draws)
+    seconds |= takes[0].seconds | {"fitting": sum(take.seconds["fitting"] for take in takes)}
+    seconds["baking"] = perf_counter() - started
     yield 1.0
-    return Result(action, take, read.warnings + take.warnings, seconds)
+    return Result(tuple(actions), tuple(takes), tuple(draws), read.warnings + takes[0].warnings, seconds)
+
+
+def _baked(settings: Settings, takes: list[Take], controls: Controls, draws: list[Draw]) -> list[bpy.types.Action]:
+    """An action for each take, listed; the first one plays."""
+    armature, unit = find_object(settings, settings.armature, "character"), metres_per_unit(find_scene(settings))
+    actions = []
+    for take, draw in zip(takes, draws, strict=True):
+        actions.append(bake(take, armature, settings.frame_start, f"{armature.name} take", unit))
+        add_take(armature, actions[-1], take, controls, draw, settings.frame_start)
+    assign_action(armature, actions[0])
+    armature.dafnet.active_take -= len(actions) - 1
+    return actions
 
 
 def run(context: bpy.types.Context, settings: Settings, weights: "Weights | None" = None) -> Result:
     """``steps`` drained."""
     return drained(steps(context, settings, weights))
+
+
+def clean_again_of(context: bpy.types.Context, armature: bpy.types.Object, action: bpy.types.Action) -> Result:
+    """The take of ``action`` with the character's present clean-up as a new action, without sampling again.
+
+    Targets, root and mode count as they were when it was generated, furniture as it is now. ``InputError`` as for ``steps``,
+    and where the action holds no take; nothing is changed then.
+    """
+    take, controls = stored(action)
+    start = action.dafnet.frame_start
+    settings = settings_of(armature, context.scene, frame_start=start, frame_end=start + len(take) - 1, mode="FREE")
+    read = drained(read_steps(context, settings))
+    again = drained(clean_again_steps(read.scene, controls, take, _clean_up(settings)))
+    draw = draw_of(action)
+    actions = _baked(settings, [again], controls, [draw])
+    return Result(tuple(actions), (again,), (draw,), again.warnings, again.seconds)

@@ -1,18 +1,28 @@
 """What the animator sets, kept on the character's armature (``Object.dafnet``), and the add-on's preferences."""
 
 import atexit
+import importlib.util
 from dataclasses import dataclass
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 
 from ..core.errors import InputError
 from ..core.take import MODES
 
 __all__ = [
-    "ADDON", "CharacterSettings", "Preferences", "Settings", "settings_of", "find_scene", "find_object",
-    "find_collection", "names_in_use", "register", "unregister", "ensure_registered", "weights_path",
+    "ADDON", "CLEAN_UP", "CharacterSettings", "Preferences", "Settings", "TakeSettings", "settings_of", "find_scene",
+    "find_object", "find_action", "find_collection", "names_in_use", "device_of", "register", "unregister",
+    "ensure_registered", "weights_path",
 ]
 
 ADDON = (__package__ or "").removesuffix(".dafnet_addon.blender")
@@ -25,6 +35,44 @@ def _is_armature(_settings: "CharacterSettings", candidate: bpy.types.Object) ->
 
 def _is_not_the_character(settings: "CharacterSettings", candidate: bpy.types.Object) -> bool:
     return candidate != settings.id_data
+
+
+CLEAN_UP = {
+    "plant_feet": "feet", "reach_targets": "reach", "rest_on_seats": "seat", "clear_furniture": "clear", "smooth": "smooth",
+}
+"""The strengths of ``core.cleanup.CleanUp`` by the names of the settings."""
+
+
+class TakeSettings(bpy.types.PropertyGroup):
+    """What is known of an action that holds a take (``Action.dafnet``); the motion itself is packed beside it (``takes``)."""
+
+    seed: IntProperty(name="Seed", options=set(), description="Seed that it was drawn with")
+    lower_seed: IntProperty(name="Legs' Seed", options=set(), description="Seed that its legs were drawn with")
+    temperature: FloatProperty(name="Temperature", options=set(), description="How far from the calm take it was drawn")
+    lower_temperature: FloatProperty(name="Legs' Temperature", options=set(), description="How far its legs were")
+    frame_start: IntProperty(name="Start", options=set(), description="Its first frame")
+    accepted: BoolProperty(name="Accepted", options=set(), description="A take to keep")
+    ghost: BoolProperty(name="Ghost", options=set(), description="Show this take as a figure of lines beside what plays")
+    log_likelihood: FloatProperty(
+        name="Likelihood", options=set(),
+        description="How likely the model finds its poses, in nats a frame: more is more usual",
+    )
+    sliding: FloatProperty(name="Sliding", options=set(), description="Feet that slide in a frame, 0 to 2")
+    collisions: FloatProperty(name="Collisions", options=set(), description="Joints that touch furniture in a frame")
+    miss: FloatProperty(
+        name="Miss", options=set(), subtype="DISTANCE", description="Mean distance of head and hands from their targets",
+    )
+    jerk: FloatProperty(name="Jerk", options=set(), description="How abrupt it moves, in m/s\u00b3")
+    raw_sliding: FloatProperty(name="Sliding before", options=set(), description="Feet that slide before the clean-up")
+    raw_collisions: FloatProperty(name="Collisions before", options=set(), description="Joints that touch furniture before it")
+    raw_miss: FloatProperty(name="Miss before", options=set(), subtype="DISTANCE", description="The distance before it")
+    raw_jerk: FloatProperty(name="Jerk before", options=set(), description="How abrupt it moved before it")
+
+
+class TakeLink(bpy.types.PropertyGroup):
+    """A row in a character's list of takes."""
+
+    action: PointerProperty(type=bpy.types.Action, options=set())
 
 
 class CharacterSettings(bpy.types.PropertyGroup):
@@ -73,12 +121,27 @@ class CharacterSettings(bpy.types.PropertyGroup):
         name="Seed", default=0, min=0, options=set(),
         description="Another number gives another take. It matters where the temperature is above zero",
     )
-    use_lower_seed: BoolProperty(
-        name="Vary the Legs", default=False, options=set(),
-        description="Give the legs a seed of their own, so that they change while the upper body stays",
+    take_count: IntProperty(
+        name="Takes", default=1, min=1, max=64, soft_max=16, options=set(),
+        description="How many takes to generate at once; each further one has the next seed, and temperature 1 where it is 0",
     )
-    lower_seed: IntProperty(
-        name="Legs' Seed", default=0, min=0, options=set(), description="Seed of the legs alone",
+    takes: CollectionProperty(type=TakeLink, options=set(), description="Takes of this character")
+    active_take: IntProperty(name="Take", options=set(), description="The take that the buttons below are for")
+    blend_frames: IntProperty(
+        name="Blend", default=10, min=0, max=120, options=set(),
+        description="Frames in which the body comes over to the new mode where it changes",
+    )
+    head_influence: FloatProperty(
+        name="Head Influence", default=1.0, min=0.0, max=1.0, subtype="FACTOR",
+        description="How far the head's target counts; at 0 the head is free. Keyframe it to come to a target and leave it",
+    )
+    hand_left_influence: FloatProperty(
+        name="Left Hand Influence", default=1.0, min=0.0, max=1.0, subtype="FACTOR",
+        description="How far the left hand's target counts; at 0 the hand is free. Keyframe it to come to it and leave it",
+    )
+    hand_right_influence: FloatProperty(
+        name="Right Hand Influence", default=1.0, min=0.0, max=1.0, subtype="FACTOR",
+        description="How far the right hand's target counts; at 0 the hand is free. Keyframe it to come to it and leave it",
     )
     temperature: FloatProperty(
         name="Temperature", default=0.0, min=0.0, max=2.5, step=10, precision=2, options=set(),
@@ -96,6 +159,14 @@ class CharacterSettings(bpy.types.PropertyGroup):
         name="Reach Targets", default=1.0, min=0.0, max=1.0, subtype="FACTOR", options=set(),
         description="How exactly head and hands are put onto their targets, as far as arms and back allow; 0 is the raw motion",
     )
+    clear_furniture: FloatProperty(
+        name="Clear Furniture", default=0.0, min=0.0, max=1.0, subtype="FACTOR", options=set(),
+        description="How far hands and feet that have got into furniture are brought out of it; 0 is the raw motion",
+    )
+    smooth: FloatProperty(
+        name="Smooth", default=0.0, min=0.0, max=1.0, subtype="FACTOR", options=set(),
+        description="How much quick changes of the motion are evened out, before feet and hands are put in place; 0 is none",
+    )
 
 
 class Preferences(bpy.types.AddonPreferences):
@@ -108,18 +179,31 @@ class Preferences(bpy.types.AddonPreferences):
         description="File of trained weights; leave it empty for the weights that ship",
     )
 
+    engine: EnumProperty(
+        name="Engine", default="NUMPY", description="What runs the network",
+        items=[
+            ("NUMPY", "NumPy", "Comes with Blender, and as fast as anything for one take"),
+            ("cpu", "PyTorch on the CPU", "Where PyTorch is installed in Blender's Python"),
+            ("cuda", "PyTorch on a GPU (CUDA)", "For many takes at once, where PyTorch is installed in Blender's Python"),
+            ("mps", "PyTorch on a GPU (Metal)", "For many takes at once, where PyTorch is installed in Blender's Python"),
+        ],
+    )
+
     def draw(self, _context: bpy.types.Context) -> None:
-        """Show the one preference."""
+        """Show them."""
+        self.layout.use_property_split = True
         self.layout.prop(self, "weights")
+        self.layout.prop(self, "engine")
 
 
 @dataclass(frozen=True)
 class Settings:
-    """A plain copy of what one generation needs; objects and the collection by ``name_full``, None where unset.
+    """A plain copy of what one generation needs; objects, actions and the collection by ``name_full``, None where unset.
 
     ``mode``: None takes the armature's property frame by frame, a word overrules it. ``frame_start`` and ``frame_end``
-    are both generated. ``lower_seed``: None goes with ``seed``. ``plant_feet`` and those
-    below it: strengths of the clean-up.
+    are both generated. ``take_count``: takes to make; ``lower_seed``, ``lower_temperature``: the legs' own, None as the body's.
+    ``kept``: the action of a take whose motion stays before the scene's frame ``kept_until``. ``plant_feet`` and those below
+    it: strengths of the clean-up.
     """
 
     armature: str
@@ -136,9 +220,16 @@ class Settings:
     seed: int = 0
     lower_seed: int | None = None
     temperature: float = 0.0
+    lower_temperature: float | None = None
+    take_count: int = 1
+    kept: str | None = None
+    kept_until: int = 0
+    blend_frames: int = 10
     plant_feet: float = 1.0
     rest_on_seats: float = 1.0
     reach_targets: float = 1.0
+    clear_furniture: float = 0.0
+    smooth: float = 0.0
 
     def __post_init__(self) -> None:
         if self.mode is not None and self.mode not in MODES:
@@ -158,8 +249,7 @@ def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides:
     values |= {
         "frame_start": scene.frame_start if own.use_scene_range else own.frame_start,
         "frame_end": scene.frame_end if own.use_scene_range else own.frame_end,
-        "seed": own.seed, "lower_seed": own.lower_seed if own.use_lower_seed else None, "temperature": own.temperature,
-        "plant_feet": own.plant_feet, "rest_on_seats": own.rest_on_seats, "reach_targets": own.reach_targets,
+        **{name: getattr(own, name) for name in ("seed", "temperature", "take_count", "blend_frames", *CLEAN_UP)},
     }
     return Settings(armature=armature.name_full, scene=scene.name_full, **(values | overrides))
 
@@ -180,6 +270,14 @@ def find_object(settings: Settings, name: str, role: str) -> bpy.types.Object:
     found = next((o for o in find_scene(settings).objects if o.name_full == name), None)
     if found is None:
         raise InputError(f"The {role} '{name}' is not in the scene; choose another one in the DAFNet panel.")
+    return found
+
+
+def find_action(name: str) -> bpy.types.Action:
+    """The action of this ``name_full``; ``InputError`` where it is gone."""
+    found = next((a for a in bpy.data.actions if a.name_full == name), None)
+    if found is None:
+        raise InputError(f"The take '{name}' is not in this file any more; choose another one in the list.")
     return found
 
 
@@ -208,28 +306,53 @@ def weights_path(context: bpy.types.Context) -> str | None:
     return bpy.path.abspath(addon.preferences.weights) or None if addon else None
 
 
+_GROUPS = (TakeSettings, TakeLink, CharacterSettings)
+
+
+def device_of(context: bpy.types.Context) -> str | None:
+    """The torch device chosen in the preferences, or None for NumPy. ``InputError`` where there is no torch, or not for it."""
+    addon = context.preferences.addons.get(ADDON)
+    engine = addon.preferences.engine if addon else "NUMPY"
+    if engine == "NUMPY":
+        return None
+    if importlib.util.find_spec("torch") is None:
+        raise InputError("PyTorch is not installed in Blender's Python; set the engine in the add-on's preferences to NumPy.")
+    import torch
+
+    there = {"cpu": True, "cuda": torch.cuda.is_available(), "mps": torch.backends.mps.is_available()}
+    if not there[engine]:
+        raise InputError(f"PyTorch finds no device '{engine}'; choose another engine in the add-on's preferences.")
+    return engine
+
+
 def register() -> None:
     """Add the settings to every object and the preferences to the add-on."""
-    bpy.utils.register_class(CharacterSettings)
     bpy.utils.register_class(Preferences)
+    _register_settings()
+
+
+def _register_settings() -> None:
+    for cls in _GROUPS:
+        bpy.utils.register_class(cls)
     bpy.types.Object.dafnet = PointerProperty(type=CharacterSettings, name="DAFNet")
+    bpy.types.Action.dafnet = PointerProperty(type=TakeSettings, name="DAFNet")
+
+
+def _unregister_settings() -> None:
+    del bpy.types.Action.dafnet
+    del bpy.types.Object.dafnet
+    for cls in reversed(_GROUPS):
+        bpy.utils.unregister_class(cls)
 
 
 def unregister() -> None:
     """Undo ``register``."""
-    del bpy.types.Object.dafnet
+    _unregister_settings()
     bpy.utils.unregister_class(Preferences)
-    bpy.utils.unregister_class(CharacterSettings)
 
 
 def ensure_registered() -> None:
     """Register the settings where no add-on has done so, as with the ``bpy`` module outside Blender; undone at exit."""
     if not hasattr(bpy.types.Object, "dafnet"):
-        bpy.utils.register_class(CharacterSettings)
-        bpy.types.Object.dafnet = PointerProperty(type=CharacterSettings, name="DAFNet")
-        atexit.register(_forget)
-
-
-def _forget() -> None:
-    del bpy.types.Object.dafnet
-    bpy.utils.unregister_class(CharacterSettings)
+        _register_settings()
+        atexit.register(_unregister_settings)

@@ -100,6 +100,7 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     frames = range(settings.frame_start, settings.frame_end + 1)
     pieces: list[_Piece] = []
     modes: list[str] = []
+    influences: dict[str, list[float]] = defaultdict(list)
     tracks = defaultdict(list)
     bones: list[np.ndarray] = []
     bodies: list[np.ndarray] = []
@@ -113,6 +114,8 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
                     pieces = furniture.pieces(depsgraph) if furniture else []
                 _follow(depsgraph, pieces)
                 modes.append(settings.mode or armature.dafnet.mode)
+                for role in targets:
+                    influences[role].append(getattr(armature.dafnet, f"{role}_influence"))
                 tracks["root"].append(_array(root.evaluated_get(depsgraph).matrix_world))
                 for role, target in targets.items():
                     evaluated = target.evaluated_get(depsgraph)
@@ -140,8 +143,11 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
         given["upper_body"] = _carried(source, np.array(bones), np.array(bodies), unit, root_matrices, size, fps)
     elif "FULL" in modes:
         raise InputError(f"The mode of '{armature.name}' is FULL but no source is set; choose one to copy from.")
+    for role in targets:
+        if min(influences[role]) < 1.0:
+            given[f"{role}_influence"] = np.array(influences[role])
     mode = modes[0] if len(set(modes)) == 1 else tuple(modes)
-    controls = Controls(fps=fps, root=root_matrices, mode=mode, scale=size, **given)
+    controls = Controls(fps=fps, root=root_matrices, mode=mode, blend=settings.blend_frames / fps, scale=size, **given)
 
     solids = tuple(_solid(piece, unit) for piece in pieces)
     yield 1.0

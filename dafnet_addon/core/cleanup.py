@@ -54,8 +54,8 @@ _DAMPING, _ROUNDS, _STEP = 0.03, 15, 0.10  # metres; rounds of least squares; me
 @dataclass(frozen=True)
 class CleanUp:
     """Strengths from 0 (off) to 1 of what is done after the model: ``feet`` stand still where they are planted, head and hands
-    ``reach`` their targets, the pelvis is lifted out of the ``seat`` that it has sunk into, hands and feet are kept ``clear`` of
-    furniture, and motion is made more ``smooth``.
+    ``reach`` their targets, the pelvis is lifted out of the ``seat`` that it has sunk into, hands and feet are kept ``clear``
+    of furniture, and motion is made more ``smooth``.
     """
 
     feet: float = 0.0

@@ -41,15 +41,17 @@ _CONDITIONED, _SAMPLED = 0.1, 0.97
 
 @dataclass(frozen=True)
 class Draw:
-    """What one take is drawn with: ``seed``, ``lower_seed`` (the legs' own, None goes with ``seed``), ``temperature``."""
+    """What one take is drawn with: ``seed`` and ``temperature``; the legs may have their own, None goes with the body's."""
 
     seed: int = 0
     lower_seed: int | None = None
     temperature: float = 0.0
+    lower_temperature: float | None = None
 
     def __post_init__(self) -> None:
-        if not 0 <= self.temperature <= _HOTTEST:
-            raise InputError(f"The temperature is {self.temperature}; give 0 or a small positive number such as 1.")
+        for temperature in (self.temperature, self.lower_temperature):
+            if temperature is not None and not 0 <= temperature <= _HOTTEST:
+                raise InputError(f"The temperature is {temperature}; give 0 or a small positive number such as 1.")
 
 
 def _kept(resume: Take, frame: int, path: RootPath) -> np.ndarray:
@@ -90,7 +92,7 @@ def cleaned_up(joints: np.ndarray, shot: Shot, settings: CleanUp) -> np.ndarray:
 
 
 def _led_over(conditions: Conditions, share: np.ndarray, free: np.ndarray) -> Conditions:
-    """The conditions with targets that count in part on the way from where the joints are when ``free`` (T, 66) to the target."""
+    """The conditions with targets that count in part moved towards where the joints are when they are ``free`` (T, 66)."""
     way = np.repeat(share, 3, axis=-1)
     return replace(conditions, observation=(1.0 - way) * free + way * conditions.observation)
 
@@ -159,7 +161,7 @@ def takes_steps(
     shot = yield from within(shot_steps(scene, controls), 0.0, _CONDITIONED)
     conditioned = perf_counter()
     sampler = Sampler(weights, device)
-    z = np.concatenate([sampler.noise(draw.seed, draw.lower_seed, draw.temperature) for draw in draws])
+    z = np.concatenate([sampler.noise(d.seed, d.lower_seed, d.temperature, d.lower_temperature) for d in draws])
     kept = None
     if resume is not None and resume_frame > 0:
         kept = np.repeat(_kept(resume, resume_frame, shot.path)[:, None], len(draws), axis=1)

@@ -12,8 +12,8 @@ from .rotations import normalised, rotate, transpose, yaw_matrix
 from .skeleton import joint
 
 __all__ = [
-    "RootPath", "gaussian", "raw_root_from_joints", "root_from_joints", "root_from_matrices", "smoothed", "velocities", "integrate",
-    "to_root", "to_world", "AHEAD", "ahead",
+    "RootPath", "gaussian", "raw_root_from_joints", "root_from_joints", "root_from_matrices", "smoothed", "velocities",
+    "integrate", "to_root", "to_world", "AHEAD", "ahead",
 ]
 
 POSITION_SIGMA, YAW_SIGMA = 3.0, 6.0

@@ -281,13 +281,18 @@ class Sampler:
             self._to(inverse.T / exponent), self._to(-bias), float(log_scale.sum() + np.linalg.slogdet(weight)[1]), half,
         )
 
-    def noise(self, seed: int, lower_seed: int | None = None, temperature: float = 1.0) -> np.ndarray:
-        """A take's noise vector (1, 66), upper part first, held constant; each part has a seed of its own, so legs vary under
-        one trunk. At temperature 1 takes differ as captured ones do, where the weights say how far those do.
+    def noise(
+        self, seed: int, lower_seed: int | None = None, temperature: float = 1.0, lower_temperature: float | None = None,
+    ) -> np.ndarray:
+        """A take's noise vector (1, 66), upper part first, held constant; each part has a seed and, if wished, a temperature of
+        its own, so legs vary under one trunk. At temperature 1 takes differ as captured ones do, where the weights say how far
+        those do.
         """
         seeds = (seed, 0, _UPPER_SIZE), (seed if lower_seed is None else lower_seed, 1, _LOWER_SIZE)
         drawn = [np.random.default_rng([abs(s), part]).standard_normal(size) for s, part, size in seeds]
-        return temperature * (self._spread @ np.concatenate(drawn))[None]
+        heat = np.full(_POSE_SIZE, temperature)
+        heat[_UPPER_SIZE:] = temperature if lower_temperature is None else lower_temperature
+        return heat * (self._spread @ np.concatenate(drawn))[None]
 
     def standardised(self, poses: np.ndarray) -> np.ndarray:
         """Poses (…, 66) in SMPL order, metres, as the model holds them."""

@@ -1,0 +1,101 @@
+"""A character's takes: actions that carry what they were made of, listed on the armature, found again in a reopened file.
+
+An action's ``dafnet`` settings say how it was drawn and how good it is; the motion before the clean-up and what was asked for
+are packed beside them, so a take that is copied or appended to another file keeps them.
+"""
+
+import bpy
+
+from ..core.errors import InputError
+from ..core.generate import Draw
+from ..core.storage import packed, unpacked
+from ..core.take import Controls, Take
+from .compat import assign_action
+
+__all__ = ["PACKED", "active_take", "add_take", "draw_of", "drop_take", "frames_of", "play_take", "stored", "takes_of"]
+
+PACKED = "dafnet_take"
+"""The action's property that holds ``core.storage.packed``."""
+
+_STATURE = 1.7  # metres, by which ``end_effector_error`` was divided
+_FIGURES = {
+    "sliding": "foot_sliding_per_frame", "collisions": "bad_collisions_per_frame", "miss": "end_effector_error", "jerk": "jerk",
+}
+_unpacked: dict[int, tuple[int, tuple[Take, Controls]]] = {}
+
+
+def add_take(
+    armature: bpy.types.Object, action: bpy.types.Action, take: Take, controls: Controls, draw: Draw, frame_start: int
+) -> None:
+    """Keep with ``action`` what it was made of, and list it as the armature's active take."""
+    action[PACKED] = packed(take, controls)
+    kept = action.dafnet
+    kept.seed, kept.temperature, kept.frame_start = draw.seed, draw.temperature, frame_start
+    kept.lower_seed = draw.seed if draw.lower_seed is None else draw.lower_seed
+    kept.lower_temperature = draw.temperature if draw.lower_temperature is None else draw.lower_temperature
+    kept.log_likelihood = take.log_likelihood
+    for before, figures in (("", take.metrics), ("raw_", take.raw_metrics)):
+        for name, figure in _FIGURES.items():
+            value = figures.get(figure)
+            setattr(kept, before + name, -1.0 if value is None else value * (_STATURE if name == "miss" else 1.0))
+    own = armature.dafnet
+    own.takes.add().action = action
+    own.active_take = len(own.takes) - 1
+
+
+def draw_of(action: bpy.types.Action) -> Draw:
+    """What the take was drawn with."""
+    kept = action.dafnet
+    return Draw(kept.seed, kept.lower_seed, kept.temperature, kept.lower_temperature)
+
+
+def takes_of(armature: bpy.types.Object) -> list[bpy.types.Action]:
+    """The actions in the armature's list, without rows whose action was deleted."""
+    return [row.action for row in armature.dafnet.takes if row.action is not None]
+
+
+def active_take(armature: bpy.types.Object) -> bpy.types.Action | None:
+    """The take of the row that is chosen in the list."""
+    own = armature.dafnet
+    return own.takes[own.active_take].action if 0 <= own.active_take < len(own.takes) else None
+
+
+def stored(action: bpy.types.Action) -> tuple[Take, Controls]:
+    """The take and its controls. ``InputError`` where the action holds none."""
+    data = action.get(PACKED)
+    if not isinstance(data, bytes):
+        raise InputError(f"The action '{action.name}' is no take, or its motion was removed; generate one.")
+    key, mark = action.as_pointer(), hash(data)
+    if key not in _unpacked or _unpacked[key][0] != mark:
+        _unpacked.clear()  # one is enough: what asks again asks for the same
+        _unpacked[key] = mark, unpacked(data)
+    return _unpacked[key][1]
+
+
+def frames_of(action: bpy.types.Action) -> tuple[int, int]:
+    """The take's first and last frame in the scene."""
+    take, _ = stored(action)
+    return action.dafnet.frame_start, action.dafnet.frame_start + len(take) - 1
+
+
+def play_take(armature: bpy.types.Object, action: bpy.types.Action) -> None:
+    """Let the armature play one of its takes; what it plays now is kept by a fake user."""
+    data = armature.animation_data
+    if data and data.action and data.action != action:
+        data.action.use_fake_user = True
+    assign_action(armature, action)
+    armature.dafnet.active_take = [row.action for row in armature.dafnet.takes].index(action)
+
+
+def drop_take(armature: bpy.types.Object, index: int) -> None:
+    """Take a row out of the list; another take plays instead, and Blender forgets the action with the file, if unused."""
+    own = armature.dafnet
+    action = own.takes[index].action
+    own.takes.remove(index)
+    own.active_take = max(0, min(own.active_take, len(own.takes) - 1))
+    if action is None or action in takes_of(armature):
+        return
+    action.use_fake_user = action.dafnet.accepted = action.dafnet.ghost = False
+    playing = armature.animation_data and armature.animation_data.action == action
+    if playing and (others := takes_of(armature)):
+        play_take(armature, others[min(index, len(others) - 1)])

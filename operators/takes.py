@@ -1,0 +1,127 @@
+"""What is done with the takes in a character's list; each of these is one line of ``blender.takes`` or ``blender.job``."""
+
+from typing import Any
+
+import bpy
+from bpy.props import EnumProperty, IntProperty
+
+from ..dafnet_addon.blender import job
+from ..dafnet_addon.blender.armature import character_of
+from ..dafnet_addon.blender.takes import active_take, drop_take, play_take, takes_of
+from .generate import DAFNET_OT_generate
+from .reporting import reported
+
+__all__ = ["DAFNET_OT_clean_again", "DAFNET_OT_keep_accepted", "DAFNET_OT_play_take", "DAFNET_OT_reject_take"]
+
+
+def _character(context: bpy.types.Context) -> Any:
+    """The character, which poll has seen to."""
+    return character_of(context)
+
+
+class _OfTakes:
+    """For a character that has takes, while none is being generated."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a take, and time for it."""
+        character = character_of(context)
+        if DAFNET_OT_generate.progress is not None:
+            cls.poll_message_set("Wait for the take to be generated, or cancel it with Esc")  # type: ignore[attr-defined]
+            return False
+        cls.poll_message_set("Generate a take first")  # type: ignore[attr-defined]
+        return character is not None and bool(takes_of(character))
+
+
+class DAFNET_OT_play_take(_OfTakes, bpy.types.Operator):
+    """Let the character play this take"""
+
+    bl_idname = "dafnet.play_take"
+    bl_label = "Play Take"
+    bl_options = {"REGISTER", "UNDO"}
+
+    index: IntProperty(name="Row", options={"SKIP_SAVE"})
+    step: EnumProperty(
+        name="Step", default="NONE", options={"SKIP_SAVE"},
+        items=[
+            ("NONE", "This", "The take of the row"), ("NEXT", "Next", "The take below the one that plays"),
+            ("PREVIOUS", "Previous", "The take above the one that plays"),
+        ],
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Play it."""
+        character = _character(context)
+        rows = [row.action for row in character.dafnet.takes]
+        index = self.index
+        if self.step != "NONE":
+            data = character.animation_data
+            playing = rows.index(data.action) if data and data.action in rows else 0
+            index = (playing + (1 if self.step == "NEXT" else -1)) % len(rows)
+        if not 0 <= index < len(rows) or rows[index] is None:
+            self.report({"ERROR"}, "This take's action was deleted; remove its row.")
+            return {"CANCELLED"}
+        play_take(character, rows[index])
+        return {"FINISHED"}
+
+
+class DAFNET_OT_reject_take(_OfTakes, bpy.types.Operator):
+    """Take the chosen take out of the list; its action goes when the file is saved and opened again, unless it is used"""
+
+    bl_idname = "dafnet.reject_take"
+    bl_label = "Reject Take"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a row, be its action there or not."""
+        character = character_of(context)
+        cls.poll_message_set("There is no take in the list")
+        return DAFNET_OT_generate.progress is None and character is not None and len(character.dafnet.takes) > 0
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Drop it."""
+        own = _character(context).dafnet
+        drop_take(own.id_data, max(0, min(own.active_take, len(own.takes) - 1)))
+        return {"FINISHED"}
+
+
+class DAFNET_OT_keep_accepted(_OfTakes, bpy.types.Operator):
+    """Reject every take that is not accepted"""
+
+    bl_idname = "dafnet.keep_accepted"
+    bl_label = "Keep Accepted Only"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Drop the others."""
+        character = _character(context)
+        if not any(action.dafnet.accepted for action in takes_of(character)):
+            self.report({"ERROR"}, "No take is accepted; mark those to keep first.")
+            return {"CANCELLED"}
+        rows = character.dafnet.takes
+        for index in range(len(rows) - 1, -1, -1):
+            if rows[index].action is None or not rows[index].action.dafnet.accepted:
+                drop_take(character, index)
+        return {"FINISHED"}
+
+
+class DAFNET_OT_clean_again(_OfTakes, bpy.types.Operator):
+    """Make a new take of the chosen one with the clean-up as it is set now, without generating again"""
+
+    bl_idname = "dafnet.clean_again"
+    bl_label = "Clean Up Again"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Clean it."""
+        character = _character(context)
+        take = active_take(character)
+        if take is None:
+            self.report({"ERROR"}, "Choose a take in the list of takes first.")
+            return {"CANCELLED"}
+        with reported(self):
+            result = job.clean_again_of(context, character, take)
+            self.report({"INFO"}, f"'{result.action.name}'")
+            return {"FINISHED"}
+        return {"CANCELLED"}

@@ -1,0 +1,231 @@
+"""Takes in Blender: listed, judged, varied, gone on from, cleaned again, and found when the file is opened again."""
+
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+
+class Shot:
+    """A character that walks 1.2 m in a second and a half past a box."""
+
+    def __init__(self, bpy: ModuleType, addon) -> None:
+        self.bpy, self.addon, self.scene = bpy, addon, bpy.context.scene
+        self.scene.render.fps = 30
+        self.scene.frame_start, self.scene.frame_end = 11, 55
+        bpy.ops.dafnet.add_character(name="Ann")
+        self.ann = bpy.context.object
+        furniture = bpy.data.collections.new("Furniture")
+        self.scene.collection.children.link(furniture)
+        bpy.ops.mesh.primitive_cube_add(size=0.5, location=(0.7, 0.6, 0.25))
+        box = bpy.context.object
+        self.scene.collection.objects.unlink(box)
+        furniture.objects.link(box)
+        self.ann.dafnet.furniture = furniture
+        for frame, y in ((11, 0.0), (55, 1.2)):
+            self.ann.dafnet.root.location.y = y
+            self.ann.dafnet.root.keyframe_insert("location", frame=frame)
+        self.choose()
+
+    @property
+    def takes(self):
+        return self.addon("dafnet_addon.blender.takes")
+
+    def choose(self) -> None:
+        self.bpy.context.view_layer.objects.active = self.ann
+
+    def listed(self) -> list:
+        return self.takes.takes_of(self.ann)
+
+    def motion(self, action) -> np.ndarray:
+        """Joints (T, 22, 3) that the stored take has."""
+        return self.takes.stored(action)[0].joints
+
+    def played(self) -> np.ndarray:
+        """Bone heads (T, 22, 3) in the world, as the armature plays them."""
+        names = self.addon("dafnet_addon.core.skeleton").JOINTS
+        frames = []
+        for frame in range(self.scene.frame_start, self.scene.frame_end + 1):
+            self.scene.frame_set(frame)
+            ann = self.ann.evaluated_get(self.bpy.context.evaluated_depsgraph_get())
+            frames.append([ann.matrix_world @ ann.pose.bones[name].head for name in names])
+        return np.array(frames)
+
+
+@pytest.fixture
+def shot(blender, addon) -> Shot:
+    return Shot(blender, addon)
+
+
+def test_several_takes_in_one_go_are_listed_and_the_first_plays(shot: Shot) -> None:
+    own = shot.ann.dafnet
+    own.take_count, own.seed = 3, 7
+    assert shot.bpy.ops.dafnet.generate() == {"FINISHED"}
+    takes = shot.listed()
+    assert [(a.dafnet.seed, a.dafnet.temperature) for a in takes] == [(7, 0.0), (8, 1.0), (9, 1.0)]
+    assert shot.ann.animation_data.action == takes[0] and own.active_take == 0
+    assert all(a.use_fake_user and a.dafnet.frame_start == 11 and shot.takes.frames_of(a) == (11, 55) for a in takes)
+    assert takes[0].dafnet.log_likelihood > takes[1].dafnet.log_likelihood
+    assert takes[0].dafnet.sliding <= takes[0].dafnet.raw_sliding and takes[0].dafnet.miss == -1.0, "there are no targets"
+    assert np.abs(shot.played() - shot.motion(takes[0])).max() < 2e-3
+    assert np.abs(shot.motion(takes[1]) - shot.motion(takes[2])).max() > 0.02
+
+
+def test_takes_are_played_judged_and_renamed_and_none_is_lost(shot: Shot) -> None:
+    ops, own = shot.bpy.ops.dafnet, shot.ann.dafnet
+    mine = shot.bpy.data.actions.new("Mine")
+    shot.ann.animation_data_create().action = mine
+    own.take_count = 3
+    ops.generate()
+    one, two, three = shot.listed()
+    assert mine.use_fake_user and "Mine" in shot.bpy.data.actions
+    ops.play_take(index=2)
+    assert shot.ann.animation_data.action == three and own.active_take == 2
+    assert np.abs(shot.played() - shot.motion(three)).max() < 2e-3
+    ops.play_take(step="NEXT")
+    assert shot.ann.animation_data.action == one
+    ops.play_take(step="PREVIOUS")
+    assert shot.ann.animation_data.action == three
+    three.name, three.dafnet.accepted = "The one", True
+    own.active_take = 1
+    ops.reject_take()
+    assert shot.listed() == [one, three] and not two.use_fake_user and two.name in shot.bpy.data.actions
+    ops.keep_accepted()
+    assert shot.listed() == [three] and shot.ann.animation_data.action == three and three.name == "The one"
+    three.dafnet.accepted = False
+    with pytest.raises(RuntimeError, match="No take is accepted"):
+        ops.keep_accepted()
+    ops.reject_take()
+    assert not shot.listed() and not ops.play_take.poll() and not ops.reject_take.poll()
+
+
+def test_rejecting_the_take_that_plays_plays_another(shot: Shot) -> None:
+    shot.ann.dafnet.take_count = 2
+    shot.bpy.ops.dafnet.generate()
+    one, two = shot.listed()
+    shot.bpy.ops.dafnet.reject_take()
+    assert shot.ann.animation_data.action == two and shot.listed() == [two] and one.name in shot.bpy.data.actions
+
+
+def test_a_deleted_action_leaves_a_row_that_can_be_removed(shot: Shot) -> None:
+    shot.ann.dafnet.take_count = 2
+    shot.bpy.ops.dafnet.generate()
+    shot.bpy.data.actions.remove(shot.listed()[1])
+    assert len(shot.listed()) == 1 and len(shot.ann.dafnet.takes) == 2
+    with pytest.raises(RuntimeError, match="was deleted"):
+        shot.bpy.ops.dafnet.play_take(index=1)
+    shot.ann.dafnet.active_take = 1
+    for task in ("LEGS", "ONWARD"):
+        with pytest.raises(RuntimeError, match="Choose a take"):
+            shot.bpy.ops.dafnet.generate(task=task)
+    shot.bpy.ops.dafnet.reject_take()
+    assert len(shot.ann.dafnet.takes) == 1
+
+
+def test_legs_vary_under_the_same_upper_body(shot: Shot) -> None:
+    shot.ann.dafnet.seed, shot.ann.dafnet.temperature = 4, 0.6
+    shot.bpy.ops.dafnet.generate()
+    shot.ann.dafnet.seed, shot.ann.dafnet.temperature = 9, 0.0
+    shot.bpy.ops.dafnet.generate(task="LEGS")
+    first, second = shot.listed()
+    assert (second.dafnet.seed, second.dafnet.lower_seed, round(second.dafnet.temperature, 3)) == (4, 5, 0.6)
+    apart = np.abs(shot.motion(first) - shot.motion(second)).mean(axis=(0, 2))
+    assert apart[[4, 5, 7, 8]].mean() > apart[[9, 12, 15]].mean() > 0
+    shot.bpy.ops.dafnet.generate(task="LEGS")
+    assert shot.listed()[2].dafnet.lower_seed == 6
+
+
+def test_from_here_on_keeps_what_comes_before(shot: Shot) -> None:
+    shot.bpy.ops.dafnet.generate()
+    first = shot.listed()[0]
+    shot.ann.dafnet.seed, shot.ann.dafnet.temperature = 3, 1.5
+    shot.scene.frame_set(40)
+    shot.bpy.ops.dafnet.generate(task="ONWARD")
+    second = shot.listed()[1]
+    apart = np.abs(shot.takes.stored(first)[0].poses - shot.takes.stored(second)[0].poses).max(axis=1)[70:]
+    assert apart[:28].max() < 1e-5 and apart[-3:].max() > 0.01 and shot.scene.frame_current == 40
+    shot.scene.frame_set(200)
+    with pytest.raises(RuntimeError, match="go to a frame in it"):
+        shot.bpy.ops.dafnet.generate(task="ONWARD")
+
+
+def test_cleaned_again_makes_a_new_take_and_leaves_the_old(shot: Shot) -> None:
+    own = shot.ann.dafnet
+    own.plant_feet = 0.0
+    shot.bpy.ops.dafnet.generate()
+    own.plant_feet = 1.0
+    before = {name: np.array([p.co for p in c.keyframe_points]) for name, c in _curves(shot).items()}
+    assert shot.bpy.ops.dafnet.clean_again() == {"FINISHED"}
+    raw, clean = shot.listed()
+    assert shot.ann.animation_data.action == clean and clean.dafnet.sliding < raw.dafnet.sliding
+    assert clean.dafnet.raw_sliding == pytest.approx(raw.dafnet.sliding)
+    assert np.abs(shot.takes.stored(raw)[0].poses - shot.takes.stored(clean)[0].poses).max() == 0
+    shot.bpy.ops.dafnet.play_take(index=0)
+    after = {name: np.array([p.co for p in c.keyframe_points]) for name, c in _curves(shot).items()}
+    assert all(np.array_equal(before[name], after[name]) for name in before)
+
+
+def test_takes_are_there_when_the_file_is_opened_again(shot: Shot, tmp_path: Path) -> None:
+    shot.ann.dafnet.take_count = 2
+    shot.bpy.ops.dafnet.generate()
+    motion = [shot.motion(action) for action in shot.listed()]
+    shot.bpy.ops.dafnet.play_take(index=1)
+    file = str(tmp_path / "takes.blend")
+    shot.bpy.ops.wm.save_as_mainfile(filepath=file)
+    shot.bpy.ops.wm.open_mainfile(filepath=file)
+    ann = shot.bpy.data.objects["Ann"]
+    takes = shot.takes.takes_of(ann)
+    assert len(takes) == 2 and ann.animation_data.action == takes[1]
+    for action, joints in zip(takes, motion, strict=True):
+        assert np.abs(shot.motion(action) - joints).max() < 1e-6
+    shot.bpy.context.view_layer.objects.active = ann
+    assert shot.bpy.ops.dafnet.clean_again() == {"FINISHED"}, "what is needed to go on is in the file"
+
+
+def test_all_takes_are_one_undo_step(shot: Shot) -> None:
+    shot.ann.dafnet.take_count = 3
+    shot.bpy.ops.ed.undo_push(message="Before")
+    shot.bpy.ops.dafnet.generate("EXEC_DEFAULT", True)
+    assert len(shot.bpy.data.objects["Ann"].dafnet.takes) == 3
+    shot.bpy.ops.ed.undo()
+    assert len(shot.bpy.data.objects["Ann"].dafnet.takes) == 0 and not shot.bpy.data.actions.get("Ann take")
+    shot.bpy.ops.ed.redo()
+    assert len(shot.takes.takes_of(shot.bpy.data.objects["Ann"])) == 3
+
+
+def test_influence_and_blend_are_read_from_the_scene(shot: Shot) -> None:
+    own = shot.ann.dafnet
+    own.mode, own.blend_frames = "EE", 6
+    own.hand_left.location = (-0.3, 0.9, 1.3)
+    for frame, share in ((20, 0.0), (30, 1.0)):
+        own.hand_left_influence = share
+        own.keyframe_insert("hand_left_influence", frame=frame)
+    job, reader = shot.addon("dafnet_addon.blender.job"), shot.addon("dafnet_addon.blender.scene_reader")
+    read = reader.read_scene(shot.bpy.context, job.settings_of(shot.ann, shot.scene)).controls
+    assert read.hand_left_influence[[0, 9, 19, 44]].tolist() == [0, 0, 1, 1] and 0 < read.hand_left_influence[14] < 1
+    assert read.head_influence is None and read.blend == pytest.approx(0.2)
+    shot.bpy.ops.dafnet.generate()
+    shot.bpy.ops.dafnet.generate()
+    assert any(c.data_path == "dafnet.hand_left_influence" for c in _curves(shot).values()), "keys come along to the new action"
+
+
+def test_an_engine_that_is_not_there_is_said(shot: Shot, monkeypatch: pytest.MonkeyPatch) -> None:
+    preferences = shot.bpy.context.preferences.addons["bl_ext.user_default.dafnet"].preferences
+    properties = shot.addon("dafnet_addon.blender.properties")
+    try:
+        preferences.engine = "mps"
+        with pytest.raises(RuntimeError, match="preferences"):
+            shot.bpy.ops.dafnet.generate()
+        preferences.engine = "cpu"
+        monkeypatch.setattr(properties.importlib.util, "find_spec", lambda name: None)
+        with pytest.raises(RuntimeError, match="PyTorch is not installed"):
+            shot.bpy.ops.dafnet.generate()
+    finally:
+        preferences.engine = "NUMPY"
+    assert not shot.listed()
+
+
+def _curves(shot: Shot) -> dict:
+    curves = shot.addon("dafnet_addon.blender.compat").action_curves(shot.ann)
+    return {(c.data_path, c.array_index): c for c in curves}
