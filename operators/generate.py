@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ..dafnet_addon.blender import job
+from ..dafnet_addon.blender import job, overlays
 from ..dafnet_addon.blender.armature import character_of
 from ..dafnet_addon.blender.takes import active_take, draw_of, frames_of
 from ..dafnet_addon.core.errors import InputError
@@ -16,7 +16,7 @@ from .reporting import reported
 
 __all__ = ["DAFNET_OT_cancel", "DAFNET_OT_generate"]
 
-_TICK = 0.04
+_TICK = 0.02
 """Seconds of work between two looks at the user's input."""
 _CALM_LEGS = 1.0
 """Temperature of the legs of a take whose legs are varied though it is calm."""
@@ -114,6 +114,7 @@ class DAFNET_OT_generate(bpy.types.Operator):
             manager.modal_handler_add(self)
             own = type(self)
             own.progress, own.left, own.stopping, own.growing = 0.0, 0.0, False, None
+            overlays.show_growing(lambda: own.growing)
             return {"RUNNING_MODAL"}
         return {"CANCELLED"}
 
@@ -150,6 +151,7 @@ class DAFNET_OT_generate(bpy.types.Operator):
         self._steps.close()
         own = type(self)
         own.progress, own.growing, own.stopping = None, None, False
+        overlays.hide_growing()
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
         if context.workspace:

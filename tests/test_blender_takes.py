@@ -229,3 +229,31 @@ def test_an_engine_that_is_not_there_is_said(shot: Shot, monkeypatch: pytest.Mon
 def _curves(shot: Shot) -> dict:
     curves = shot.addon("dafnet_addon.blender.compat").action_curves(shot.ann)
     return {(c.data_path, c.array_index): c for c in curves}
+
+
+@pytest.mark.parametrize("before", [True, False])
+def test_cancelled_between_two_bakes_none_is_left(shot: Shot, before: bool) -> None:
+    if before:
+        shot.bpy.ops.dafnet.generate()
+    listed, actions = shot.listed(), {action.name for action in shot.bpy.data.actions}
+    job = shot.addon("dafnet_addon.blender.job")
+    steps = job.steps(shot.bpy.context, job.settings_of(shot.ann, shot.scene, take_count=4))
+    while {action.name for action in shot.bpy.data.actions} == actions:
+        next(steps)
+    next(steps)
+    assert len(shot.listed()) == len(listed) + 2
+    steps.close()
+    assert shot.listed() == listed and {action.name for action in shot.bpy.data.actions} == actions
+    assert (shot.ann.animation_data.action in listed) if before else not shot.ann.animation_data.action
+
+
+def test_deleted_between_two_bakes_none_is_left(shot: Shot) -> None:
+    actions = {action.name for action in shot.bpy.data.actions}
+    job = shot.addon("dafnet_addon.blender.job")
+    steps = job.steps(shot.bpy.context, job.settings_of(shot.ann, shot.scene, take_count=4))
+    while {action.name for action in shot.bpy.data.actions} == actions:
+        next(steps)
+    shot.bpy.data.objects.remove(shot.ann)
+    with pytest.raises(shot.addon("dafnet_addon.core.errors").InputError, match="not in the scene"):
+        next(steps)
+    assert {action.name for action in shot.bpy.data.actions} == actions

@@ -32,14 +32,14 @@ from .properties import (
     weights_path,
 )
 from .scene_reader import read_steps
-from .takes import add_take, draw_of, stored
+from .takes import add_take, draw_of, drop_take, play_take, stored
 
 if TYPE_CHECKING:
     from ..core.weights import Weights
 
 __all__ = ["Result", "Settings", "clean_again_of", "draws_of", "settings_of", "steps", "run"]
 
-_READ, _GENERATED = 0.1, 0.98
+_READ, _GENERATED = 0.1, 0.95
 """Progress after the scene is read and after the takes are generated."""
 _FURTHER_TAKES = 1.0
 """Temperature of every take but the first where none is set: at 0 all would be the same."""
@@ -121,23 +121,51 @@ def steps(
     started = perf_counter()
     if gone := used - names_in_use(settings):
         raise InputError(f"'{min(gone)}' is not in the scene any more; generate again.")
-    actions = _baked(settings, takes, read.controls, draws)
+    actions = yield from within(_bake_steps(settings, takes, read.controls, draws), _GENERATED, 1.0)
     seconds |= takes[0].seconds | {"fitting": sum(take.seconds["fitting"] for take in takes)}
     seconds["baking"] = perf_counter() - started
     yield 1.0
     return Result(tuple(actions), tuple(takes), tuple(draws), read.warnings + takes[0].warnings, seconds)
 
 
-def _baked(settings: Settings, takes: list[Take], controls: Controls, draws: list[Draw]) -> list[bpy.types.Action]:
-    """An action for each take, listed; the first one plays."""
-    armature, unit = find_object(settings, settings.armature, "character"), metres_per_unit(find_scene(settings))
-    actions = []
-    for take, draw in zip(takes, draws, strict=True):
-        actions.append(bake(take, armature, settings.frame_start, f"{armature.name} take", unit))
-        add_take(armature, actions[-1], take, controls, draw, settings.frame_start)
-    assign_action(armature, actions[0])
-    armature.dafnet.active_take -= len(actions) - 1
+def _bake_steps(
+    settings: Settings, takes: list[Take], controls: Controls, draws: list[Draw]
+) -> Generator[float, None, list[bpy.types.Action]]:
+    """An action for each take, listed; the first one plays. All are made, or none: what came of a cancelled job goes again."""
+    names: list[str] = []
+    played = _playing(settings)
+    try:
+        for take, draw in zip(takes, draws, strict=True):
+            armature, unit = find_object(settings, settings.armature, "character"), metres_per_unit(find_scene(settings))
+            action = bake(take, armature, settings.frame_start, f"{armature.name} take", unit)
+            names.append(action.name_full)
+            add_take(armature, action, take, controls, draw, settings.frame_start)
+            if len(names) < len(takes):
+                yield len(names) / len(takes)
+        actions = [find_action(name) for name in names]
+    except (GeneratorExit, InputError):
+        _unbake(settings, names, played)
+        raise
+    play_take(armature, actions[0])
     return actions
+
+
+def _playing(settings: Settings) -> str | None:
+    """The action that the character plays."""
+    data = find_object(settings, settings.armature, "character").animation_data
+    return data.action.name_full if data and data.action else None
+
+
+def _unbake(settings: Settings, names: list[str], played: str | None) -> None:
+    """Remove the actions of these names again, and let the character play what it did."""
+    made = [action for action in bpy.data.actions if action.name_full in names]
+    for armature in (o for o in find_scene(settings).objects if o.name_full == settings.armature):
+        for action in made:
+            drop_take(armature, [row.action for row in armature.dafnet.takes].index(action))
+        if played is not None:
+            assign_action(armature, find_action(played))
+    for action in made:
+        bpy.data.actions.remove(action)
 
 
 def run(context: bpy.types.Context, settings: Settings, weights: "Weights | None" = None) -> Result:
@@ -157,5 +185,5 @@ def clean_again_of(context: bpy.types.Context, armature: bpy.types.Object, actio
     read = drained(read_steps(context, settings))
     again = drained(clean_again_steps(read.scene, controls, take, _clean_up(settings)))
     draw = draw_of(action)
-    actions = _baked(settings, [again], controls, [draw])
+    actions = drained(_bake_steps(settings, [again], controls, [draw]))
     return Result(tuple(actions), (again,), (draw,), again.warnings, again.seconds)

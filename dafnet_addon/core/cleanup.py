@@ -7,18 +7,19 @@ joint is held or faded where nothing asks for it. What bends all of the motion c
 lower the pelvis; targets last.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import astuple, dataclass
 
 import numpy as np
 
 from .errors import InputError
 from .kinematics import on_bones, two_bone
+from .progress import drained
 from .root import gaussian
 from .rotations import matrix_from_vector
 from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, TOE_HEIGHT, joint
 
-__all__ = ["CleanUp", "cleaned", "cleared", "planted", "seated", "smoothed_out", "standing_still", "reaching"]
+__all__ = ["CleanUp", "cleaned", "cleaning_steps", "cleared", "planted", "seated", "smoothed_out", "standing_still", "reaching"]
 
 Distance = Callable[[np.ndarray], np.ndarray]
 """Signed distances (T, N) of world points (T, N, 3) to the furniture, negative inside; metres."""
@@ -315,18 +316,31 @@ def cleaned(
     joints: np.ndarray, targets: dict[str, np.ndarray], settings: CleanUp, floor: np.ndarray | float = 0.0,
     tops: np.ndarray | None = None, distance: Distance | None = None,
 ) -> np.ndarray:
+    """``cleaning_steps`` drained."""
+    return drained(cleaning_steps(joints, targets, settings, floor, tops, distance))
+
+
+def cleaning_steps(
+    joints: np.ndarray, targets: dict[str, np.ndarray], settings: CleanUp, floor: np.ndarray | float = 0.0,
+    tops: np.ndarray | None = None, distance: Distance | None = None,
+) -> Generator[float, None, np.ndarray]:
     """Joints (T, 22, 3) after all that ``settings`` ask for; canonical metres, world, 30 frames a second, constant bones.
 
     ``floor``: its height, one or one for each frame; ``tops``: see ``seated``; ``distance``: to the furniture, if there is any.
+    Yields progress.
     """
     if settings.smooth > 0.0:
         joints = smoothed_out(joints, settings.smooth)
+        yield 0.2
     if settings.clear > 0.0 and distance is not None:
         joints = cleared(joints, distance, targets, settings.clear)
+        yield 0.4
     if settings.feet > 0.0:
         joints = planted(joints, floor, settings.feet)
+        yield 0.6
     if settings.seat > 0.0 and tops is not None:
         joints = seated(joints, tops, settings.seat)
+        yield 0.8
     if settings.reach > 0.0:
         joints = reaching(joints, targets, settings.reach)
     return joints

@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .distance import prepared, rigid_split, scaled
+from .distance import prepared_steps, rigid_split, scaled
 from .errors import InputError
-from .occupancy import distance, occupancy
+from .occupancy import distance, occupancy_steps
+from .progress import within
 from .resampling import MODEL_FPS, covering_frames, frame_times, resample_nearest, resample_positions, resample_rigid
 from .root import RootPath, ahead, root_from_matrices, smoothed, to_root, velocities
 from .rotations import normalised
@@ -198,14 +199,10 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     observation, share = _observed(controls, modes, times, target, path, warnings)
 
     floor = float(np.median(path.position[:, 2])) * controls.scale
-    solids: list[Box | Mesh] = []
-    for solid in _at_model_rate(scene, times, target).solids:
-        known, said = prepared(Scene((solid,)), floor)
-        solids += known.solids
-        warnings += said
-        yield len(solids) / len(scene.solids)
-    scene = scaled(Scene(tuple(solids)), 1.0 / controls.scale)
-    occupied = occupancy(scene, path)
+    moved, said = yield from within(prepared_steps(_at_model_rate(scene, times, target), floor), 0.0, 0.5)
+    warnings += said
+    scene = scaled(moved, 1.0 / controls.scale)
+    occupied = yield from within(occupancy_steps(scene, path), 0.5, 1.0)
     _look_around(scene, path, occupied, warnings)
 
     def rolled(values: np.ndarray, before: np.ndarray) -> np.ndarray:

@@ -12,13 +12,17 @@ is a thin shell, whose distance has no sign.
 
 import hashlib
 from collections import OrderedDict
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .progress import drained, within
 from .solids import Box, Mesh, Scene
 
-__all__ = ["BAND", "FLOOR", "DistanceGrid", "rigid_split", "build_grid", "grid_of", "prepared", "scaled"]
+__all__ = [
+    "BAND", "FLOOR", "DistanceGrid", "rigid_split", "build_grid", "grid_of", "prepared", "prepared_steps", "scaled",
+]
 
 BAND = 0.15
 """Distances are truncated here (metres)."""
@@ -32,7 +36,7 @@ _MAX_BAND_NODES = 2_000_000
 _ROOM = (1.4, 1.9)
 _FLAT = np.cos(np.radians(15.0))
 _CHUNK = 8192
-_SEEDS = 1 << 18
+_SEEDS = 1 << 15
 _CACHED_GRIDS = 64
 
 
@@ -163,8 +167,10 @@ def _triangle_distance(points: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(np.where(on_face, height * height, edge), 0.0))
 
 
-def _unsigned(corners: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, int, int]) -> np.ndarray:
-    """Distance (nx, ny, nz) float32 to the nearest of the triangles (F, 3, 3), truncated at ``BAND``.
+def _unsigned(
+    corners: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, int, int]
+) -> Generator[float, None, np.ndarray]:
+    """Distance (nx, ny, nz) float32 to the nearest of the triangles (F, 3, 3), truncated at ``BAND``; yields progress.
 
     Points strewn over each triangle name it to the nodes around them; then every node names its nearest triangle to its
     six neighbours, until none finds a nearer one. Every distance is an exact one to a triangle; that it is the nearest
@@ -208,23 +214,30 @@ def _unsigned(corners: np.ndarray, origin: np.ndarray, spacing: float, shape: tu
     pairs = np.unique((triangle * len(distance)) + (x * ny + y) * nz + z)
     triangle, node = np.divmod(pairs, len(distance))
     corner = np.array([(dx * ny + dy) * nz + dz for dx in (0, 1) for dy in (0, 1) for dz in (0, 1)])
-    for k in range(0, len(node), _SEEDS):
-        offer((node[k : k + _SEEDS, None] + corner).reshape(-1), np.repeat(triangle[k : k + _SEEDS], 8))
+    for k in range(0, len(node), _SEEDS // 8):
+        part = slice(k, k + _SEEDS // 8)
+        offer((node[part, None] + corner).reshape(-1), np.repeat(triangle[part], 8))
+        yield 0.5 * k / len(node)
 
     active = np.flatnonzero(nearest >= 0)
     steps = np.array([ny * nz, -ny * nz, nz, -nz, 1, -1])
     while len(active):
-        nodes, named = (active[:, None] + steps).reshape(-1), np.repeat(nearest[active], 6)
-        news = nearest[nodes] != named
-        active = offer(nodes[news], named[news])
+        better = []
+        for k in range(0, len(active), _SEEDS // 6):
+            wave = active[k : k + _SEEDS // 6]
+            nodes, named = (wave[:, None] + steps).reshape(-1), np.repeat(nearest[wave], 6)
+            news = nearest[nodes] != named
+            better.append(offer(nodes[news], named[news]))
+            yield 0.5
+        active = np.unique(np.concatenate(better))
     return distance.reshape(shape)
 
 
 def _inside(
     corners: np.ndarray, parts: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, int, int]
-) -> np.ndarray:
+) -> Generator[float, None, np.ndarray]:
     """Nodes (nx, ny, nz) that at least two of the three axes' grid lines find inside a loose part, by parity of
-    crossings.
+    crossings; yields progress.
 
     A line that crosses a part an odd number of times says nothing about it. Edges belong to one of their two triangles
     (half-open intervals), so a closed part is crossed an even number of times by every line.
@@ -267,6 +280,7 @@ def _inside(
         np.add.at(layers, node[even], np.where(place[even] % 2 == 0, 1, -1).astype(np.int16))
         found = np.cumsum(layers.reshape(-1, shape[u], shape[v])[:-1], axis=0, dtype=np.int16) > 0
         votes += np.moveaxis(found, (0, 1, 2), (axis, u, v))
+        yield 0.5 + axis / 6
     return votes >= 2
 
 
@@ -293,6 +307,13 @@ def _furniture(corners: np.ndarray, part: np.ndarray, floor: np.ndarray | None) 
 
 
 def build_grid(vertices: np.ndarray, triangles: np.ndarray, floor: np.ndarray | None = None) -> DistanceGrid:
+    """``_grid_steps`` drained."""
+    return drained(_grid_steps(vertices, triangles, floor))
+
+
+def _grid_steps(
+    vertices: np.ndarray, triangles: np.ndarray, floor: np.ndarray | None
+) -> Generator[float, None, DistanceGrid]:
     """Distance grid of a mesh, ``vertices`` (V, 3) in its rigid space, metres; ``triangles`` (F, 3).
 
     ``floor`` (4,): upward unit normal and offset of the root's plane, so that a point's height over it is
@@ -311,6 +332,7 @@ def build_grid(vertices: np.ndarray, triangles: np.ndarray, floor: np.ndarray | 
     vertices, triangles = _welded(np.asarray(vertices, float), triangles)
     if not len(triangles):
         return empty
+    yield 0.0
     part, corners = _parts(triangles, len(vertices)), vertices[triangles]
     kept, room = _furniture(corners, part, floor)
     solid, corners, part = ~room[kept], corners[kept], part[kept]
@@ -323,8 +345,8 @@ def build_grid(vertices: np.ndarray, triangles: np.ndarray, floor: np.ndarray | 
     spacing = max(_FINEST, (2 * BAND * area / _MAX_BAND_NODES) ** (1 / 3), (size.prod() / _MAX_NODES) ** (1 / 3))
     origin = first - (BAND + spacing)
     nx, ny, nz = (np.ceil((last + BAND + spacing - origin) / spacing).astype(int) + 1).tolist()
-    values = _unsigned(corners, origin, spacing, (nx, ny, nz))
-    inside = _inside(corners[solid], part[solid], origin, spacing, (nx, ny, nz))
+    values = yield from _unsigned(corners, origin, spacing, (nx, ny, nz))
+    inside = yield from _inside(corners[solid], part[solid], origin, spacing, (nx, ny, nz))
     return DistanceGrid(origin, float(spacing), np.where(inside, -values, values))
 
 
@@ -341,6 +363,11 @@ def _floor_plane(rigid: np.ndarray, floor: float) -> np.ndarray | None:
 
 
 def grid_of(mesh: Mesh, floor: float) -> DistanceGrid:
+    """``_grid_of_steps`` drained."""
+    return drained(_grid_of_steps(mesh, floor))
+
+
+def _grid_of_steps(mesh: Mesh, floor: float) -> Generator[float, None, DistanceGrid]:
     """The mesh's distance grid: its own, one made before for the same geometry, or a new one.
 
     ``floor``: height of the root's plane in the world (metres). The scale of the first frame counts. Grids are kept in
@@ -356,7 +383,7 @@ def grid_of(mesh: Mesh, floor: float) -> DistanceGrid:
     key.update(b"" if plane is None else np.rint(plane * 1e4).astype(np.int64).tobytes())
     name = key.digest()
     if name not in _cache:
-        _cache[name] = build_grid(vertices, mesh.triangles, plane)
+        _cache[name] = yield from _grid_steps(vertices, np.asarray(mesh.triangles), plane)
     _cache.move_to_end(name)
     while len(_cache) > _CACHED_GRIDS:
         _cache.popitem(last=False)
@@ -364,12 +391,19 @@ def grid_of(mesh: Mesh, floor: float) -> DistanceGrid:
 
 
 def prepared(scene: Scene, floor: float) -> tuple[Scene, tuple[str, ...]]:
-    """The scene with every mesh's grid filled, and warnings for the user, one sentence each."""
+    """``prepared_steps`` drained."""
+    return drained(prepared_steps(scene, floor))
+
+
+def prepared_steps(scene: Scene, floor: float) -> Generator[float, None, tuple[Scene, tuple[str, ...]]]:
+    """The scene with every mesh's grid filled, and warnings for the user, one sentence each; yields progress."""
     solids: list[Box | Mesh] = []
     warnings = []
     for solid in scene.solids:
         if isinstance(solid, Mesh):
-            solid = replace(solid, grid=grid_of(solid, floor))
+            done, one = len(solids) / len(scene.solids), 1 / len(scene.solids)
+            grid = yield from within(_grid_of_steps(solid, floor), done, done + one)
+            solid = replace(solid, grid=grid)
             linear = rigid_split(solid.matrix)[1].reshape(-1, 3, 3)
             if np.abs(linear - linear[0]).max() > 0.01 * max(np.abs(linear[0]).max(), 1e-6):
                 warnings.append(f"The scale of '{solid.name}' is animated; its size on the first frame is used.")

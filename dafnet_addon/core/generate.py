@@ -7,7 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
-from .cleanup import CleanUp, cleaned
+from .cleanup import CleanUp, cleaning_steps
 from .conditions import PREROLL, Shot, shot_steps
 from .errors import InputError, WeightsError
 from .kinematics import blend_switches, fit, forward_kinematics, global_from_local, local_from_global
@@ -35,7 +35,7 @@ __all__ = ["RAW", "Draw", "clean_again_steps", "cleaned_up", "generate", "genera
 RAW = CleanUp()
 """The model's own motion."""
 _HOTTEST = 10.0
-_CONDITIONED, _SAMPLED = 0.1, 0.97
+_CONDITIONED, _SAMPLED = 0.15, 0.85
 """Progress when the conditions are known and when the poses are made."""
 
 
@@ -84,11 +84,17 @@ def targets_of(shot: Shot) -> dict[str, np.ndarray]:
 
 
 def cleaned_up(joints: np.ndarray, shot: Shot, settings: CleanUp) -> np.ndarray:
+    """``_clean_up_steps`` drained."""
+    return drained(_clean_up_steps(joints, shot, settings))
+
+
+def _clean_up_steps(joints: np.ndarray, shot: Shot, settings: CleanUp) -> Generator[float, None, np.ndarray]:
     """Joints (N, 22, 3) of a shot, canonical metres, on constant bones, after all that ``settings`` ask for."""
     tops = tops_under(shot.scene, shot.path) if settings.seat else None
     floor = shot.path.position[:, 2]
     reach = partial(distance, shot.scene, floor=floor) if shot.scene.solids else None
-    return cleaned(joints, targets_of(shot), settings, floor, tops, reach)
+    yield 0.2
+    return (yield from within(cleaning_steps(joints, targets_of(shot), settings, floor, tops, reach), 0.2, 1.0))
 
 
 def _led_over(conditions: Conditions, share: np.ndarray, free: np.ndarray) -> Conditions:
@@ -97,43 +103,43 @@ def _led_over(conditions: Conditions, share: np.ndarray, free: np.ndarray) -> Co
     return replace(conditions, observation=(1.0 - way) * free + way * conditions.observation)
 
 
-def _onto_bones(
-    joints: np.ndarray, shot: Shot, controls: Controls, clean_up: CleanUp
-) -> tuple[np.ndarray, np.ndarray]:
-    """Local quaternions (N, 22, 4) and pelvis (N, 3), canonical metres, of joints: cleaned, eased over mode switches."""
-    target = frame_times(len(joints), MODEL_FPS)
-    names = ("head_rotation", "hand_left_rotation", "hand_right_rotation")
-    turned = [_rotation(controls, name, target) for name in names]
-    pelvis, frames = fit(joints, 1.0, *turned)
-    if clean_up.asked:
-        joints = cleaned_up(forward_kinematics(frames, pelvis), shot, clean_up)
-        pelvis, frames = fit(joints, 1.0, *turned)
-    local = continuous_signs(quaternion_from_matrix(local_from_global(frames)))
-    switches = np.flatnonzero(shot.modes[1:] != shot.modes[:-1]) + 1
-    length = round(controls.blend * MODEL_FPS)
-    return blend_switches(local, pelvis, shot.path, switches, length) if len(switches) and length > 0 else (local, pelvis)
-
-
 def _joints(rotations: np.ndarray, pelvis: np.ndarray) -> np.ndarray:
     return forward_kinematics(global_from_local(matrix_from_quaternion(rotations)), pelvis)
 
 
-def _finished(
+def _finished_steps(
     poses: np.ndarray, action: np.ndarray, shot: Shot, controls: Controls, clean_up: CleanUp, log_likelihood: float
-) -> Take:
-    """The take of the model's poses (PREROLL + N, 66), with ``action`` (T, K) at the controls' rate."""
+) -> Generator[float, None, Take]:
+    """The take of the model's poses (PREROLL + N, 66), with ``action`` (T, K) at the controls' rate; yields progress."""
     started = perf_counter()
-    joints = to_world(shot.path, poses[PREROLL:].reshape(-1, 22, 3))
-    local, pelvis = _onto_bones(joints, shot, controls, clean_up)
-
+    source, target = frame_times(len(shot.path), MODEL_FPS), frame_times(len(controls), controls.fps)
+    turned = [_rotation(controls, name, source) for name in ("head_rotation", "hand_left_rotation", "hand_right_rotation")]
+    switches = np.flatnonzero(shot.modes[1:] != shot.modes[:-1]) + 1
+    length = round(controls.blend * MODEL_FPS)
     floor = shot.path.position[:, 2]
     reach = partial(distance, shot.scene, floor=floor) if shot.scene.solids else None
     judged = partial(summary, fps=MODEL_FPS, floor=floor, targets=targets_of(shot), distance=reach)
-    metrics = judged(_joints(local, pelvis))
-    raw = judged(_joints(*_onto_bones(joints, shot, controls, RAW))) if clean_up.asked else metrics
+
+    def eased(pelvis: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Local quaternions and pelvis, eased over mode switches."""
+        local = continuous_signs(quaternion_from_matrix(local_from_global(frames)))
+        return blend_switches(local, pelvis, shot.path, switches, length) if len(switches) and length else (local, pelvis)
+
+    pelvis, frames = fit(to_world(shot.path, poses[PREROLL:].reshape(-1, 22, 3)), 1.0, *turned)
+    yield 0.2
+    joints = forward_kinematics(frames, pelvis)
+    local, pelvis = eased(pelvis, frames)
+    metrics = raw = judged(_joints(local, pelvis))
+    yield 0.4
+    if clean_up.asked:
+        joints = yield from within(_clean_up_steps(joints, shot, clean_up), 0.4, 0.6)
+        yield 0.6
+        local, pelvis = eased(*fit(joints, 1.0, *turned))
+        yield 0.8
+        metrics = judged(_joints(local, pelvis))
+    yield 1.0
 
     # From 30 frames a second to the controls' own rate, and to the character's own size.
-    source, target = frame_times(len(shot.path), MODEL_FPS), frame_times(len(controls), controls.fps)
     rotations = resample_rotations(local, source, target)
     pelvis = resample_positions(pelvis, source, target)
     root = resample_path(shot.path, MODEL_FPS, controls.fps, len(controls))
@@ -188,20 +194,22 @@ def takes_steps(
     for b in range(len(draws)):
         action = resample_positions(made.actions[PREROLL:, b], source, target)
         density = float(made.log_likelihood[PREROLL:, b].mean())
-        take = _finished(made.poses[:, b], action, shot, controls, clean_up, density)
+        take = yield from within(
+            _finished_steps(made.poses[:, b], action, shot, controls, clean_up, density),
+            _SAMPLED + (1.0 - _SAMPLED) * b / len(draws), _SAMPLED + (1.0 - _SAMPLED) * (b + 1) / len(draws),
+        )
         takes.append(replace(take, seconds=seconds | take.seconds))
-        yield _SAMPLED + (1.0 - _SAMPLED) * (b + 1) / len(draws)
     return takes
 
 
 def clean_again_steps(scene: Scene, controls: Controls, take: Take, clean_up: CleanUp) -> Generator[float, None, Take]:
     """The take with another clean-up, without sampling again; ``scene`` and ``controls`` as it was generated with."""
-    shot = yield from within(shot_steps(scene, controls), 0.0, 0.9)
+    shot = yield from within(shot_steps(scene, controls), 0.0, 0.5)
     if len(shot.path) != len(take.path):
         raise InputError("The take has other frames than the controls; generate it again.")
-    done = _finished(take.poses, take.action, shot, controls, clean_up, take.log_likelihood)
-    yield 1.0
-    return done
+    return (yield from within(
+        _finished_steps(take.poses, take.action, shot, controls, clean_up, take.log_likelihood), 0.5, 1.0,
+    ))
 
 
 def generate_steps(

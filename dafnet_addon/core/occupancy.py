@@ -4,7 +4,7 @@ Paper, section 4.1: a sphere's occupancy is 0 where nothing is within it, 1 wher
 between it falls with the distance from its centre to the solid.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -12,12 +12,13 @@ import numpy as np
 
 from .distance import BAND, FLOOR, grid_of, rigid_split
 from .errors import InputError
+from .progress import drained
 from .root import RootPath
 from .rotations import rotate, transpose
 from .sensor import HEIGHT, RADIUS, REACH, SPHERES, occupancy_of_distance
 from .solids import Box, Scene, box_distance
 
-__all__ = ["occupancy", "distance", "tops_under"]
+__all__ = ["occupancy", "occupancy_steps", "distance", "tops_under"]
 
 _FRAMES_AT_ONCE = 32
 _LOWEST, _HIGHEST, _APART = 0.15, 0.925, 0.025  # metres over the floor between which tops are looked for, and how finely
@@ -64,15 +65,20 @@ def _fields(scene: Scene, floor: np.ndarray, reach: float) -> Iterator[_Field]:
 
 
 def occupancy(scene: Scene, path: RootPath) -> np.ndarray:
+    """``occupancy_steps`` drained."""
+    return drained(occupancy_steps(scene, path))
+
+
+def occupancy_steps(scene: Scene, path: RootPath) -> Generator[float, None, np.ndarray]:
     """Occupancy (T, 2640) float32 of the sensor on every frame of ``path``, the largest over all solids.
 
     Solids are static or have one matrix for each frame of the path. The sensor has the canonical body's size: for
     another body, scale scene (``distance.scaled``) and path first. Surfaces within 5 cm of the floor are not seen
-    (``distance.build_grid``). Raises InputError where a solid's frames are not the path's.
+    (``distance.build_grid``). Yields progress. Raises InputError where a solid's frames are not the path's.
     """
     out = np.zeros((len(path), len(SPHERES)), np.float32)
     centres = SPHERES.T.astype(np.float32)
-    for field in _fields(scene, path.position[:, 2], RADIUS):
+    for count, field in enumerate(_fields(scene, path.position[:, 2], RADIUS)):
         inverse = transpose(field.rotation)
         turn, shift = inverse @ path.rotation, rotate(inverse, path.position - field.position)
         middle = shift + turn[:, :, 2] * (HEIGHT / 2) - (field.low + field.high) / 2
@@ -88,6 +94,7 @@ def occupancy(scene: Scene, path: RootPath) -> np.ndarray:
             row, sphere = np.nonzero(near)
             at = frames[row], sphere
             out[at] = np.maximum(out[at], found)
+            yield (count + k / len(seen)) / len(scene.solids)
     return out
 
 

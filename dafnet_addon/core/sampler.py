@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .errors import WeightsError
+from .progress import drained, within
 from .root import AHEAD
 from .skeleton import LOWER, MODEL_ORDER, OFFSETS, UPPER
 from .threads import one_thread
@@ -299,13 +300,18 @@ class Sampler:
         return (model_order(poses) - self.pose_mean) / self.pose_std
 
     def start(self, conditions: Conditions, takes: int = 1) -> None:
-        """Bring in the conditions of a whole shot and forget all memory; the past is the mean pose."""
+        """``start_steps`` drained."""
+        drained(self.start_steps(conditions, takes))
+
+    def start_steps(self, conditions: Conditions, takes: int = 1) -> Generator[float, None, None]:
+        """Bring in the conditions of a whole shot and forget all memory; the past is the mean pose. Yields progress."""
         xp, frames = self.xp, len(conditions)
         velocity = (conditions.velocity - self.velocity_mean) / self.velocity_std
         window = velocities_up_to(velocity, self.history)
         occupancy = self._to(conditions.occupancy)
         way = (conditions.ahead[:, : self.ahead] - self.ahead_mean) / self.ahead_std
         moving = self._told_ahead(window, np.concatenate([velocity, way], axis=1), occupancy)
+        yield 0.0
 
         given = np.repeat(conditions.given, 3, axis=-1)
         observation = np.where(given > 0, (conditions.observation - self.pose_mean) / self.pose_std, 0.0)
@@ -321,10 +327,12 @@ class Sampler:
             for first, second in part.encoders:
                 hidden = occupancy @ first[0] + first[1]
                 codes.append((hidden * (hidden > 0)) @ second[0] + second[1])
+                yield 0.5
             for k, step in enumerate(part.steps):
                 known = xp.concatenate([moving, seen, codes[k % len(codes)], one], axis=-1)
                 step.coupling.known = known @ step.coupling.static
                 step.coupling.state = [(empty, empty) for _ in step.coupling.layers]
+                yield 1.0
         self._past = self._to(np.zeros((takes, self.history * _POSE_SIZE)))
 
     def _told_ahead(self, window: np.ndarray, moving: np.ndarray, occupancy: Array) -> Array:
@@ -403,7 +411,7 @@ class Sampler:
         is made: its index and pose (66,) as above.
         """
         noise = self._to(z)
-        self.start(conditions, takes=len(z))
+        yield from within(self.start_steps(conditions, takes=len(z)), 0.0, 0.0)
         known = self._to(np.zeros((0, *z.shape)) if kept is None else self.standardised(kept))
         first, last = len(known), noise
         poses, actions, densities = [], [], []

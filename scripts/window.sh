@@ -1,0 +1,29 @@
+#!/usr/bin/env bash
+# Drives a real Blender in a window under a virtual screen with mouse and keys, as tests/window/drive.py says, in a fresh profile.
+# Its pictures go to a folder. The Blender is one on the PATH, or lies in a Debian made by scripts/debian_blender.sh.
+#
+#     scripts/window.sh PICTURES [DEBIAN]
+set -euo pipefail
+
+cd "$(dirname "$0")/.."
+pictures=$(realpath -m "$1") debian=${2:-}
+scripts/build_zip.sh .venv/bin/python >/dev/null
+work=$(mktemp -d "${debian:-}/tmp/dafnet.XXXXXX")
+trap 'rm -rf "$work"; [[ -z ${mounted:-} ]] || umount "$debian/proc"' EXIT
+cp build/dafnet-*.zip "$work/dafnet.zip"
+cp -r tests/window "$work/drive"
+cp tests/rig_builders.py "$work/drive/" 2>/dev/null || true
+mkdir -p "$work/profile/extensions/user_default" "$work/pictures"
+inside=${work#"$debian"}
+run=(env HOME="$inside" BLENDER_USER_RESOURCES="$inside/profile" LIBGL_ALWAYS_SOFTWARE=1)
+if [[ -n $debian ]]; then
+    mountpoint -q "$debian/proc" || { mount -t proc proc "$debian/proc"; mounted=1; }
+    run=(chroot "$debian" "${run[@]}")
+fi
+"${run[@]}" blender --command extension install-file -r user_default -e "$inside/dafnet.zip" >/dev/null
+"${run[@]}" xvfb-run -a -s "-screen 0 1600x1000x24 +extension GLX" blender --enable-event-simulate --no-window-focus \
+    --python-exit-code 1 --window-geometry 0 0 1600 1000 --python "$inside/drive/drive.py" -- "$inside/pictures" 2>&1 |
+    tee "$work/log"
+mkdir -p "$pictures"
+cp "$work"/pictures/*.png "$pictures/"
+grep -q "^Driven to the end" "$work/log"
