@@ -7,6 +7,7 @@ from ..dafnet_addon.blender.compat import action_curves
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.generate import DAFNET_OT_cancel, DAFNET_OT_generate
 from ..operators.walk_to import DAFNET_OT_walk_to
+from .presets import DAFNET_PT_presets
 
 __all__ = ["CharacterPanel", "DAFNET_PT_character"]
 
@@ -33,6 +34,11 @@ class DAFNET_PT_character(bpy.types.Panel):
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "DAFNet"
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        """Draw the menu of presets, which go to the active object."""
+        if character_of(context) is not None and character_of(context) == context.object:
+            DAFNET_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the settings of the active character, or the way to get one."""

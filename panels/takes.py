@@ -18,6 +18,23 @@ from .main import CharacterPanel
 __all__ = ["DAFNET_PT_clean_up", "DAFNET_PT_takes", "DAFNET_UL_takes"]
 
 
+_NAME = 0.45
+"""Share of a row that is a take's name, or a figure's."""
+
+
+def _said(figure: float, times: float = 1.0) -> str:
+    """A figure that is less than 0 where it cannot be said."""
+    return "–" if figure < 0 else f"{times * figure:.2f}"
+
+
+def _tell(layout: bpy.types.UILayout, name: str, *values: str) -> None:
+    split = layout.split(factor=_NAME, align=True)
+    split.label(text=name)
+    row = split.row(align=True)
+    for value in values:
+        row.label(text=value)
+
+
 class DAFNET_UL_takes(bpy.types.UIList):
     """Takes of a character"""
 
@@ -27,7 +44,7 @@ class DAFNET_UL_takes(bpy.types.UIList):
         self, _context: bpy.types.Context, layout: bpy.types.UILayout, data: Any, item: Any, _icon: int, _active: Any,
         _name: str, index: int = 0, _flag: int = 0,
     ) -> None:
-        """A row: play, name, seed, sliding, collisions, ghost, accepted."""
+        """A row: play, name, sliding feet and collisions a frame, ghost, accepted."""
         action = item.action
         if action is None:
             layout.label(text="Deleted", icon="ERROR")
@@ -36,12 +53,11 @@ class DAFNET_UL_takes(bpy.types.UIList):
         plays = animation is not None and animation.action == action
         row = layout.row(align=True)
         row.operator(DAFNET_OT_play_take.bl_idname, text="", icon="PAUSE" if plays else "PLAY", emboss=False).index = index
-        row.prop(action, "name", text="", emboss=False)
-        figures = row.row(align=True)
-        figures.alignment = "RIGHT"
-        figures.label(text=f"{action.dafnet.seed}")
-        figures.label(text=f"{action.dafnet.sliding:.2f}")
-        figures.label(text="–" if action.dafnet.collisions < 0 else f"{action.dafnet.collisions:.2f}")
+        split = row.split(factor=0.55, align=True)
+        split.prop(action, "name", text="", emboss=False)
+        figures = split.row(align=True)
+        figures.label(text=f"{action.dafnet.sliding:.1f}")
+        figures.label(text="–" if action.dafnet.collisions < 0 else f"{action.dafnet.collisions:.1f}")
         own = action.dafnet
         row.prop(own, "ghost", text="", icon="GHOST_ENABLED" if own.ghost else "GHOST_DISABLED", emboss=False)
         row.prop(own, "accepted", text="", icon="CHECKBOX_HLT" if own.accepted else "CHECKBOX_DEHLT", emboss=False)
@@ -61,11 +77,6 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
         if not len(own.takes):
             layout.label(text="Generate lists its takes here", icon="INFO")
             return
-        head = layout.row()
-        head.label(text="Name")
-        right = head.row()
-        right.alignment = "RIGHT"
-        right.label(text="Seed, Sliding, Collisions")
         row = layout.row()
         row.template_list(DAFNET_UL_takes.bl_idname, "", own, "takes", own, "active_take", rows=4)
         column = row.column(align=True)
@@ -79,14 +90,14 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
         if take is None:
             return
         figures = take.dafnet
-        layout.label(text=f"Likelihood {figures.log_likelihood:.0f} nats a frame, temperature {figures.temperature:.2f}")
+        layout.label(text=f"Seed {figures.seed}, legs {figures.lower_seed}, temperature {figures.temperature:.2f}")
+        layout.label(text=f"Likelihood {figures.log_likelihood:.0f} nats a frame")
         table = layout.column(align=True)
-        for name, before, after in (
-            ("Sliding feet", figures.raw_sliding, figures.sliding), ("Collisions", figures.raw_collisions, figures.collisions),
-            ("Miss, cm", 100 * figures.raw_miss, 100 * figures.miss), ("Jerk, m/s³", figures.raw_jerk, figures.jerk),
-        ):
-            if after >= 0:
-                table.label(text=f"{name}: {before:.2f}, {after:.2f} cleaned")
+        _tell(table, "", "Raw", "Cleaned")
+        _tell(table, "Sliding feet", _said(figures.raw_sliding), _said(figures.sliding))
+        _tell(table, "Collisions", _said(figures.raw_collisions), _said(figures.collisions))
+        _tell(table, "Miss, cm", _said(figures.raw_miss, 100), _said(figures.miss, 100))
+        _tell(table, "Jerk, m/s³", _said(figures.raw_jerk), _said(figures.jerk))
         row = layout.row(align=True)
         row.operator(DAFNET_OT_generate.bl_idname, text="Vary the Legs", icon="MOD_DYNAMICPAINT").task = "LEGS"
         row.operator(DAFNET_OT_generate.bl_idname, text="From Here On", icon="FRAME_NEXT").task = "ONWARD"

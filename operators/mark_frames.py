@@ -1,0 +1,49 @@
+"""Show where takes are at fault, in the timeline."""
+
+import bpy
+
+from ..dafnet_addon.blender import overlays
+from ..dafnet_addon.blender.armature import character_of
+from ..dafnet_addon.blender.overlay_data import faults_of, playing
+from ..dafnet_addon.blender.takes import PACKED, takes_of
+from .generate import DAFNET_OT_generate
+from .reporting import reported
+
+__all__ = ["DAFNET_OT_mark_frames"]
+
+
+class DAFNET_OT_mark_frames(bpy.types.Operator):
+    """Show in the timeline where feet slide (yellow) and joints touch furniture (red) in the take that plays, or hide it"""
+
+    bl_idname = "dafnet.mark_frames"
+    bl_label = "Mark Frames"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """A take plays, and none is being generated."""
+        if DAFNET_OT_generate.progress is not None:
+            cls.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
+            return False
+        cls.poll_message_set("Let the character play a take first")
+        character = character_of(context)
+        return character is not None and playing(character) is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Measure all takes of the character, or hide what was measured."""
+        character = character_of(context)
+        if character is None:
+            return {"CANCELLED"}
+        plays = playing(character)
+        if overlays.shown_faults(plays) is not None:
+            overlays.hide_faults()
+            return {"FINISHED"}
+        with reported(self):
+            takes = dict.fromkeys([plays, *(action for action in takes_of(character) if PACKED in action)])
+            found = faults_of(context, character, (action for action in takes if action is not None))
+            overlays.show_faults(found)
+            faults = found[plays.session_uid] if plays is not None else None
+            if faults is not None:
+                sliding, touching = (int((counts > 0).sum()) for counts in (faults.sliding, faults.collisions))
+                self.report({"INFO"}, f"Feet slide in {sliding} frames, joints touch furniture in {touching}.")
+            return {"FINISHED"}
+        return {"CANCELLED"}

@@ -1,0 +1,29 @@
+"""Switches of what is drawn over the view and in the timeline."""
+
+import bpy
+
+from ..dafnet_addon.blender import overlays
+from ..dafnet_addon.blender.armature import character_of
+from ..dafnet_addon.blender.overlay_data import KINDS, playing
+from ..operators.mark_frames import DAFNET_OT_mark_frames
+from .main import CharacterPanel
+
+__all__ = ["DAFNET_PT_overlays"]
+
+
+class DAFNET_PT_overlays(CharacterPanel, bpy.types.Panel):
+    """What the network sees, and how the take does"""
+
+    bl_label = "Overlays"
+    bl_idname = "DAFNET_PT_overlays"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the switches."""
+        layout = self.layout
+        grid = layout.grid_flow(columns=2, even_columns=True, align=True)
+        for kind in KINDS:
+            grid.prop(context.window_manager.dafnet_overlays, kind, toggle=True)
+        character = character_of(context)
+        marked = overlays.shown_faults(playing(character) if character else None) is not None
+        layout.operator(DAFNET_OT_mark_frames.bl_idname, icon="MARKER_HLT", depress=marked)
