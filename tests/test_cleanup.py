@@ -220,3 +220,11 @@ def test_cleaned_again_is_as_if_generated_so():
         drained(clean_again_steps(scene, Controls(30.0, path.matrices()[:40]), kept, ALL))
     with pytest.raises(InputError, match="generate it again"):
         unpacked(b"no take")
+
+
+def test_a_head_that_is_asked_out_of_reach_does_not_shake():
+    path = route(Stop((0.0, 0.0), 0.0, 0.2), Stop((0.0, 2.0), 0.0, 0.2)).path
+    head = np.tile((0.0, 0.0, 1.6), (len(path), 1))
+    controls = Controls(30.0, path.matrices(), mode="EE", head=head, hand_left=head - (0.3, 0.0, 0.7))
+    raw, clean = (generate(Scene(), controls, load_weights(), clean_up=c) for c in (CleanUp(), CleanUp(reach=1.0)))
+    assert jerk(clean.joints, 30.0) < jerk(raw.joints, 30.0) + 78.0, "no more than real motion has on top"

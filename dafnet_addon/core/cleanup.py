@@ -278,19 +278,27 @@ def reaching(joints: np.ndarray, targets: dict[str, np.ndarray], strength: float
         else:
             base, most = joints[:, _ARMS[name][0]], _UPPER_ARM + _FOREARM + _FARTHEST_LEAN
         goals[END_EFFECTORS[name]] = base + _softly_limited(goal - base, most)
+    damping = np.full(len(joints), _DAMPING)
     for _ in range(_ROUNDS):
         wants = [(j, goal - out[:, j]) for j, goal in goals.items()]
         if max(float(np.abs(want).max()) for _, want in wants) < 1e-4:
             break
-        _bend(out, wants)
+        bent = _bent(out, wants, damping)
+        # Levenberg and Marquardt: of a target that is out of reach a bold step may lead farther away, to and fro.
+        missed, misses = (sum(((goal - x[:, j]) ** 2).sum(-1) for j, goal in goals.items()) for x in (out, bent))
+        better = misses < missed
+        out[better] = bent[better]
+        damping = np.where(better, np.maximum(damping / 2.0, _DAMPING), damping * 4.0)
     for name, (shoulder, elbow, wrist) in _ARMS.items():
         if name in wished:
             out[:, elbow], out[:, wrist] = two_bone(out[:, shoulder], goals[wrist], out[:, elbow], _UPPER_ARM, _FOREARM)
     return out
 
 
-def _bend(joints: np.ndarray, wants: list[tuple[int, np.ndarray]]) -> None:
-    """Turn the trunk's joints so that joints move as wanted: (joint, displacement (T, 3)); one damped least-squares step."""
+def _bent(joints: np.ndarray, wants: list[tuple[int, np.ndarray]], damping: np.ndarray) -> np.ndarray:
+    """Joints with the trunk turned so that they move as wanted: (joint, displacement (T, 3)); one step of least squares with
+    ``damping`` (T,), metres.
+    """
     moves = np.concatenate([_limited(want, _STEP) for _, want in wants], axis=1)
     turning = [at for at in _SUPPLE if any(_HANGS[j, at] and j != at for j, _ in wants)]
     columns = []
@@ -303,13 +311,15 @@ def _bend(joints: np.ndarray, wants: list[tuple[int, np.ndarray]]) -> None:
             rows.append(_SUPPLE[at] * (skew - np.swapaxes(skew, 1, 2)))
         columns.append(np.concatenate(rows, axis=1))
     jacobian = np.concatenate(columns, axis=2)
-    square = jacobian @ np.swapaxes(jacobian, 1, 2) + _DAMPING**2 * np.eye(moves.shape[1])
+    square = jacobian @ np.swapaxes(jacobian, 1, 2) + (damping**2)[:, None, None] * np.eye(moves.shape[1])
     turns = np.einsum("tmn,tm->tn", jacobian, np.linalg.solve(square, moves[..., None])[..., 0])
+    joints = joints.copy()
     for k, at in enumerate(turning):
         turn = matrix_from_vector(_SUPPLE[at] * turns[:, 3 * k : 3 * k + 3])
         moving = [j for j in range(22) if _HANGS[j, at] and j != at]
         arms = joints[:, moving] - joints[:, at, None]
         joints[:, moving] = joints[:, at, None] + np.einsum("tij,tbj->tbi", turn, arms)
+    return joints
 
 
 def cleaned(
