@@ -7,7 +7,8 @@
 ``DATASET`` is made by ``dafnet prepare``, ``FOLDER`` holds its motion files. All systems have the width of the weights that
 ship, the same windows, batches, learning rates, modes and sensor dropout, and the likelihood alone (SAMP: its own loss): what
 this project adds (the way ahead, the free run) is left out, so that the systems differ by what the paper says they differ by.
-There are two budgets: equal processor time for a whole system, and as many steps as MoGlow, the dearest, takes in that time.
+There are three budgets: equal processor time for a whole system, as many steps as MoGlow, the dearest, takes in that time, and
+three times the time.
 What is finished is kept; a killed command goes on where it was.
 """
 
@@ -48,11 +49,11 @@ FLOWS: dict[str, dict[str, Any]] = {
 }
 """The likelihood models of Table 2, as the paper sizes them, and DAFNet the other way round (the paper's section 7)."""
 STEPPED = ("AP-P", "DAFNet")
-"""Those that get a second run, of as many steps as MoGlow's."""
+"""Those that get further runs: of as many steps as MoGlow's, and of three times the time."""
 SAMP = {"SAMP": ("samp", "samp"), "SAMP-A": ("samp", "samp-a"), "SAMP on our input": ("samp-ob", "samp-ob")}
 """By system, the network that it runs, and how (``baselines.samp``)."""
 NETWORKS = ("samp", "samp-ob")
-BUDGETS = ("equal time", "equal steps")
+BUDGETS = ("equal time", "equal steps", "triple time")
 SHIPPED = "the weights that ship"
 
 _FIGURES = {"fs": "foot_sliding_per_frame", "eed": "end_effector_error", "bcc": "bad_collisions_per_frame"}
@@ -93,13 +94,13 @@ def _jobs(runs: Path, budget: str, model: ModelConfig, training: TrainingConfig)
     """What has to be trained for a budget, the longest first; a flow's parts share its time."""
     for name, changed in FLOWS.items():
         of_it = replace(model, **changed)
-        if budget == "equal steps" and name not in STEPPED:
+        if budget != BUDGETS[0] and name not in STEPPED:
             continue
         parts = parts_of(of_it)
         for part in parts:
             shared = replace(training, minutes_flow=training.minutes_flow / len(parts))
             yield Job(_at(runs, budget) / of_it.system, part, of_it, shared)
-    if budget == "equal time":
+    if budget == BUDGETS[0]:
         for kind in NETWORKS:
             yield Job(_at(runs, budget) / kind, kind, model, training)
 
@@ -108,16 +109,17 @@ def train(
     dataset: Path, runs: Path, minutes: float, processes: int = os.cpu_count() or 1, model: ModelConfig = MODEL,
     training: TrainingConfig = TRAINING, samp: SampConfig = SMALL_SAMP,
 ) -> None:
-    """Train every system with both budgets; ``minutes`` of one core for each whole system, the shared predictor not counted."""
+    """Train every system with its budgets; ``minutes`` of one core for each whole system, the shared predictor not counted."""
     first = runs / "predictor"
     if not (first / "predictor.pt").exists():
         train_part("predictor", dataset, first, model, training)
-    training = replace(training, minutes_flow=minutes)
     for budget in BUDGETS:
+        spent = replace(training, minutes_flow=minutes)
         if budget == "equal steps":
-            dearest = _at(runs, BUDGETS[0]) / "moglow"
-            training = replace(training, steps_flow=Run.load("whole", dearest).step)
-        jobs = list(_jobs(runs, budget, model, training))
+            spent = replace(spent, steps_flow=Run.load("whole", _at(runs, BUDGETS[0]) / "moglow").step)
+        elif budget == "triple time":
+            spent = replace(spent, minutes_flow=3.0 * minutes)
+        jobs = list(_jobs(runs, budget, model, spent))
         for job in jobs:
             job.folder.mkdir(parents=True, exist_ok=True)
             if job.model.predicts and not (job.folder / "predictor.pt").exists():
@@ -154,7 +156,7 @@ def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
             file = at / network / f"{network}.pt"
             out[f"{name}, {budget}"] = steps_of(file.parent), partial(measured_samp, file, kind)
         for name, changed in compared.items():
-            if budget == BUDGETS[1] and name not in ("MoGlow", *STEPPED):
+            if budget != BUDGETS[0] and name not in (*(("MoGlow",) if budget == BUDGETS[1] else ()), *STEPPED):
                 continue
             # MoGlow's run with equal time is that with equal steps too.
             folder = (_at(runs, BUDGETS[0]) if name == "MoGlow" else at) / changed["system"]
