@@ -1,10 +1,13 @@
 """DAFNet: a character that walks up to furniture and uses it, for Blender."""
 
+from pathlib import Path
 from typing import Any
 
 __all__ = ["register", "unregister"]
 
 _commands: list[Any] = []
+_FILES = str(Path(__file__).parent / "dafnet_addon" / "blender")
+"""Holds the folder ``presets``."""
 
 
 def register() -> None:
@@ -13,11 +16,14 @@ def register() -> None:
 
     from . import operators, panels
     from .dafnet_addon import cli
-    from .dafnet_addon.blender import properties
+    from .dafnet_addon.blender import overlays, properties
 
     properties.register()
+    overlays.register()
+    bpy.utils.register_preset_path(_FILES)
     for cls in operators.CLASSES + panels.CLASSES:
         bpy.utils.register_class(cls)
+    bpy.types.VIEW3D_MT_add.append(panels.add_menu)
     _commands.append(bpy.utils.register_cli_command("dafnet", lambda arguments: cli.main(arguments, in_blender=True)))
 
 
@@ -26,10 +32,13 @@ def unregister() -> None:
     import bpy
 
     from . import operators, panels
-    from .dafnet_addon.blender import properties
+    from .dafnet_addon.blender import overlays, properties
 
     while _commands:
         bpy.utils.unregister_cli_command(_commands.pop())
+    bpy.types.VIEW3D_MT_add.remove(panels.add_menu)
     for cls in reversed(operators.CLASSES + panels.CLASSES):
         bpy.utils.unregister_class(cls)
+    bpy.utils.unregister_preset_path(_FILES)
+    overlays.unregister()
     properties.unregister()

@@ -3,12 +3,15 @@
 from .main import DAFNET_PT_character
 from .overlays import DAFNET_PT_overlays
 from .presets import DAFNET_MT_presets, DAFNET_PT_presets
+from .rig import DAFNET_PT_rig, DAFNET_UL_rig
+from .setup import DAFNET_MT_add, DAFNET_PT_setup, add_menu
 from .takes import DAFNET_PT_clean_up, DAFNET_PT_takes, DAFNET_UL_takes
 
-__all__ = ["CLASSES"]
+__all__ = ["CLASSES", "add_menu"]
 
 CLASSES = (
-    DAFNET_MT_presets, DAFNET_PT_presets, DAFNET_PT_character,
+    DAFNET_MT_presets, DAFNET_PT_presets, DAFNET_PT_character, DAFNET_PT_setup, DAFNET_MT_add,
     DAFNET_UL_takes, DAFNET_PT_takes, DAFNET_PT_clean_up,
     DAFNET_PT_overlays,
+    DAFNET_UL_rig, DAFNET_PT_rig,
 )

@@ -257,3 +257,19 @@ def test_deleted_between_two_bakes_none_is_left(shot: Shot) -> None:
     with pytest.raises(shot.addon("dafnet_addon.core.errors").InputError, match="not in the scene"):
         next(steps)
     assert {action.name for action in shot.bpy.data.actions} == actions
+
+
+def test_presets_set_how_takes_are_made(shot: Shot) -> None:
+    own, folders = shot.ann.dafnet, shot.bpy.utils.preset_paths("dafnet")
+    shipped = {file.stem: file for folder in folders for file in Path(folder).glob("*.py")}
+    assert {"calm", "lively", "raw", "tidy"} <= set(shipped)
+    for name, expected in (("lively", (1.0, 5, 1.0, 0.0)), ("raw", (0.0, 1, 0.0, 0.0)), ("tidy", (0.0, 1, 1.0, 1.0))):
+        shot.bpy.ops.script.execute_preset(filepath=str(shipped[name]), menu_idname="DAFNET_MT_presets")
+        assert (own.temperature, own.take_count, own.plant_feet, own.clear_furniture) == expected
+    own.temperature = 0.7
+    assert shot.bpy.ops.dafnet.add_preset(name="Mine") == {"FINISHED"}
+    own.temperature = 0.0
+    mine = next(file for folder in shot.bpy.utils.preset_paths("dafnet") for file in Path(folder).glob("Mine.py"))
+    shot.bpy.ops.script.execute_preset(filepath=str(mine), menu_idname="DAFNET_MT_presets")
+    assert own.temperature == pytest.approx(0.7)
+    mine.unlink()

@@ -13,7 +13,7 @@ from .armature import character_scale
 from .compat import action_curves, assign_action, new_action
 from .mannequin import FACING
 
-__all__ = ["bake", "laid_over", "require_bakeable"]
+__all__ = ["bake", "key_curves", "laid_over", "require_bakeable"]
 
 _TRANSFORMS = ("location", "rotation", "scale")
 
@@ -79,16 +79,16 @@ def bake(take: Take, armature: bpy.types.Object, frame_start: int, name: str, un
     carried = [curve for curve in action_curves(armature) if curve.data_path.startswith("dafnet.")]
     action, add_curve = new_action(armature, name)
     action.use_fake_user = True
-    _key(add_curve, "location", "Root", frames, take.root[:, :3, 3] / unit)
-    _key(add_curve, "rotation_euler", "Root", frames, np.stack([0 * heading, 0 * heading, heading], axis=1))
+    key_curves(add_curve, "location", "Root", frames, take.root[:, :3, 3] / unit)
+    key_curves(add_curve, "rotation_euler", "Root", frames, np.stack([0 * heading, 0 * heading, heading], axis=1))
     for j, joint_name in enumerate(JOINTS):
         rest = np.array(armature.data.bones[joint_name].matrix_local)
         axes = FACING @ rest[:3, :3]
         quaternions = continuous_signs(quaternion_from_matrix(axes.T @ local[:, j] @ axes))
         path = f'pose.bones["{joint_name}"].'
         if j == 0:
-            _key(add_curve, path + "location", joint_name, frames, (pelvis - rest[:3, 3]) @ rest[:3, :3])
-        _key(add_curve, path + "rotation_quaternion", joint_name, frames, quaternions)
+            key_curves(add_curve, path + "location", joint_name, frames, (pelvis - rest[:3, 3]) @ rest[:3, :3])
+        key_curves(add_curve, path + "rotation_quaternion", joint_name, frames, quaternions)
     for curve in carried:
         _copy(curve, add_curve(curve.data_path, curve.array_index, "DAFNet"))
 
@@ -103,7 +103,7 @@ def bake(take: Take, armature: bpy.types.Object, frame_start: int, name: str, un
     return action
 
 
-def _key(
+def key_curves(
     add_curve: Callable[[str, int, str], bpy.types.FCurve],
     path: str, group: str, frames: np.ndarray, values: np.ndarray,
 ) -> None:

@@ -24,7 +24,7 @@ from .preview import look_at, render_film, render_sheet, use_workbench
 from .properties import ensure_registered
 from .scene_reader import read_scene
 
-__all__ = ["FURNITURE", "Part", "Room", "add_piece", "build_room", "run_demo"]
+__all__ = ["FURNITURE", "Part", "Room", "add_piece", "build_room", "key_channels", "new_collection", "run_demo"]
 
 Triple = tuple[float, float, float]
 
@@ -111,8 +111,16 @@ FURNITURE: dict[str, tuple[Part, ...]] = {
         *_four("Oak", 0.86, 0.32, 0.085, 0.040, 0.0),
         Part("Coral", (0.42, 0.14, 0.40), (-0.58, -0.06, 0.63), (20, 12, 8), 0.060),
     ),
+    "Bed": (  # one lies down along it with the head to +x, from where one sat on its edge
+        Part("Paper", (2.00, 0.93, 0.22), (-0.02, -0.30, 0.35), bevel=0.045),
+        Part("Oak", (2.05, 0.98, 0.13), (-0.02, -0.30, 0.195), bevel=0.010),
+        Part("Oak", (0.045, 1.02, 0.92), (1.025, -0.30, 0.46), bevel=0.015),
+        Part("Oak", (0.045, 1.02, 0.50), (-1.06, -0.30, 0.25), bevel=0.015),
+        Part("Slate", (0.38, 0.66, 0.075), (0.77, -0.30, 0.4875), bevel=0.036),
+        Part("Teal", (0.50, 0.945, 0.010), (-0.72, -0.30, 0.461), bevel=0.004),
+    ),
 }
-"""What the room is furnished with, part by part."""
+"""Pieces of furniture, part by part."""
 
 _SHELL = (  # the room itself: no furniture, since nobody sits on a wall
     Part("Floor", (9.6, 8.6, 0.10), (1.45, -1.80, -0.05), bevel=0.0),
@@ -151,12 +159,12 @@ def build_room(context: bpy.types.Context) -> Room:
     walked = demo_route()
     scene.render.fps, scene.render.fps_base = FPS, 1.0
     scene.frame_start, scene.frame_end = 1, len(walked.path)
-    shell = _collection(scene, "Room")
+    shell = new_collection(scene, "Room")
     add_piece(shell, "Room", _SHELL, Place((0.0, 0.0), 0.0))
-    furniture = _collection(scene, "Furniture")
-    for name, parts in FURNITURE.items():
-        add_piece(furniture, name, parts, PLACES[name])
-    _camera_and_lights(scene, _collection(scene, "Camera and Lights"), walked)
+    furniture = new_collection(scene, "Furniture")
+    for name, place in PLACES.items():
+        add_piece(furniture, name, FURNITURE[name], place)
+    _camera_and_lights(scene, new_collection(scene, "Camera and Lights"), walked)
 
     scene.cursor.location = (0.0, 0.0, 0.0)
     armature = create_character(context)
@@ -165,11 +173,11 @@ def build_room(context: bpy.types.Context) -> Room:
     frames = np.arange(1, len(walked.path) + 1)
     turns = np.zeros((len(frames), 3))
     turns[:, 2] = walked.path.yaw
-    _key(settings.root, frames, location=walked.path.position, rotation_euler=turns)
+    key_channels(settings.root, frames, location=walked.path.position, rotation_euler=turns)
 
     board = next(rest for rest in walked.rests if rest.stop.name == "Whiteboard")
     hand = settings.hand_right
-    _key(hand, frames, location=hand_target(board, frames - 1))
+    key_channels(hand, frames, location=hand_target(board, frames - 1))
     hand.empty_display_size = 0.08
     settings.head = settings.hand_left = None  # the animator asks for the drawing hand only
     for frame, mode in ((1, "FREE"), (board.first + 5, "EE"), (board.last - 5, "FREE")):
@@ -210,7 +218,7 @@ def run_demo(
     return report
 
 
-def _collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
+def new_collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
     made = bpy.data.collections.new(name)
     scene.collection.children.link(made)
     return made
@@ -285,7 +293,7 @@ def _camera_and_lights(scene: bpy.types.Scene, collection: bpy.types.Collection,
     for aim in aims:
         look_at(camera, (4.4, -6.1, 2.70), aim.tolist())
         turns.append(tuple(camera.rotation_euler))
-    _key(camera, np.arange(1, len(aims) + 1), rotation_euler=np.array(turns))
+    key_channels(camera, np.arange(1, len(aims) + 1), rotation_euler=np.array(turns))
 
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.data.energy, sun.data.angle = 2.5, radians(8)
@@ -297,7 +305,7 @@ def _camera_and_lights(scene: bpy.types.Scene, collection: bpy.types.Collection,
         collection.objects.link(light)
 
 
-def _key(owner: bpy.types.Object, frames: np.ndarray, **channels: np.ndarray) -> None:
+def key_channels(owner: bpy.types.Object, frames: np.ndarray, **channels: np.ndarray) -> None:
     """Key every channel (T, n) of ``owner`` at ``frames``, with straight lines between the keys."""
     action, add = new_action(owner, f"{owner.name} path")
     linear = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEAR"].value

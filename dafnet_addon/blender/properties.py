@@ -18,6 +18,7 @@ from bpy.props import (
 
 from ..core.errors import InputError
 from ..core.take import MODES
+from . import rig_properties
 
 __all__ = [
     "ADDON", "CLEAN_UP", "CharacterSettings", "Preferences", "Settings", "TakeSettings", "settings_of", "find_scene",
@@ -109,7 +110,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
     )
     upper_body_source: PointerProperty(
         name="Source", type=bpy.types.Object, poll=_is_armature, options=set(),
-        description="Armature with the character's bone names whose upper body is copied",
+        description="Armature whose upper body is copied: another character, or any rig whose bones are known (Your Rig)",
     )
     use_scene_range: BoolProperty(
         name="Scene Range", default=True, options=set(),
@@ -336,9 +337,11 @@ def _register_settings() -> None:
         bpy.utils.register_class(cls)
     bpy.types.Object.dafnet = PointerProperty(type=CharacterSettings, name="DAFNet")
     bpy.types.Action.dafnet = PointerProperty(type=TakeSettings, name="DAFNet")
+    rig_properties.register()
 
 
 def _unregister_settings() -> None:
+    rig_properties.unregister()
     del bpy.types.Action.dafnet
     del bpy.types.Object.dafnet
     for cls in reversed(_GROUPS):

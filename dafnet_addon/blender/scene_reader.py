@@ -20,11 +20,14 @@ from ..core.root import POSITION_SIGMA, YAW_SIGMA, root_from_joints, root_from_m
 from ..core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
 from ..core.solids import Mesh, Scene
 from ..core.take import Controls
-from .armature import metres_per_unit, missing_bones
+from .armature import metres_per_unit
 from .baker import laid_over, require_bakeable
 from .compat import action_curves
 from .mannequin import FACING
 from .properties import Settings, find_collection, find_object, find_scene
+from .rig_properties import map_of
+from .rig_reading import joints_of, pose_matrices
+from .rigs import RigMap, is_character, required
 
 __all__ = ["ReadScene", "furniture_now", "read_steps", "read_scene"]
 
@@ -72,8 +75,9 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     Targets: the empties' places. Their rotations count where they are keyed, or where a target was ever turned in its
     parent's space; a target that was only moved leaves head and hands free to turn.
 
-    Upper body: the source's bones, carried from the source's root onto this character's and to its size. The source's
-    root is its object if it is one of our characters, else it is found from hips and shoulders.
+    Upper body: the source's bones, carried from the source's root onto this character's and to its size. The source is
+    another character or any rig whose bones are known (``rig_properties.map_of``). Its root is its object if it is one of
+    our characters, else it is found from hips and shoulders.
 
     ``InputError``: something that is needed is missing, gone, linked, empty or not a number.
     """
@@ -93,7 +97,8 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     for driver, role in ((root, "root"), *((target, _TARGETS[name]) for name, target in targets.items())):
         if armature in _followed(driver):
             raise InputError(f"The {role} '{driver.name}' follows the character itself; let it follow something else.")
-    source = _upper_body_source(settings, armature)
+    source, source_map = _upper_body_source(settings, armature)
+    places = [source_map.place(name) if source_map else name for name in JOINTS]
     own = {armature, root, *targets.values(), *armature.children_recursive}
     furniture = _Furniture(find_collection(settings.furniture), armature, own) if settings.furniture else None
 
@@ -124,7 +129,7 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
                 if source:
                     evaluated = source.evaluated_get(depsgraph)
                     bodies.append(_array(evaluated.matrix_world))
-                    bones.append(np.array([evaluated.pose.bones[name].head for name in JOINTS]))
+                    bones.append(pose_matrices(evaluated, places))
         yield min(start + _BATCH, len(frames)) / (len(frames) + 1)
 
     warnings = tuple(_told(armature, pieces))
@@ -140,7 +145,7 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
         if _is_turned(target, np.array(tracks[f"{role} local"])):
             given[f"{role}_rotation"] = matrices[:, :3, :3]
     if source and "FULL" in modes:
-        given["upper_body"] = _carried(source, np.array(bones), np.array(bodies), unit, root_matrices, size, fps)
+        given["upper_body"] = _carried(source, source_map, np.array(bones), np.array(bodies), unit, root_matrices, size, fps)
     elif "FULL" in modes:
         raise InputError(f"The mode of '{armature.name}' is FULL but no source is set; choose one to copy from.")
     for role in targets:
@@ -347,33 +352,40 @@ def _is_turned(target: bpy.types.Object, local: np.ndarray) -> bool:
     return bool(np.abs(axes - np.eye(3)).max() > _TURNED)
 
 
-def _upper_body_source(settings: Settings, armature: bpy.types.Object) -> bpy.types.Object | None:
+def _upper_body_source(
+    settings: Settings, armature: bpy.types.Object,
+) -> tuple[bpy.types.Object | None, RigMap | None]:
+    """The upper body's source, and which of its bones are which joints where it is no character of ours."""
     if settings.upper_body_source is None:
-        return None
+        return None, None
     source = find_object(settings, settings.upper_body_source, "upper body's source")
     if source.type != "ARMATURE" or source == armature:
         raise InputError(f"'{source.name}' cannot be the upper body's source; choose another armature.")
-    if missing := missing_bones(source):
-        raise InputError(
-            f"The upper body's source '{source.name}' has no bone '{missing[0]}'; name its bones as the character's."
-        )
-    return source
+    if is_character(source):
+        return source, None
+    rig_map = map_of(source)
+    required(source, rig_map)
+    return source, rig_map
 
 
 def _carried(
-    source: bpy.types.Object, heads: np.ndarray, bodies: np.ndarray,
+    source: bpy.types.Object, rig_map: RigMap | None, bones: np.ndarray, bodies: np.ndarray,
     unit: float, root: np.ndarray, size: float, fps: float,
 ) -> np.ndarray:
     """Upper body (T, 14, 3), world metres, on this character's ``root`` (T, 4, 4) and of its ``size``.
 
-    ``heads`` (T, 22, 3): the source's bones in its own space; ``bodies`` (T, 4, 4): its object's matrices; both in
+    ``bones`` (T, 22, 4, 4): the source's bones in its own space; ``bodies`` (T, 4, 4): its object's matrices; both in
     Blender units.
     """
     what = f"upper body's source '{source.name}'"
-    if not np.isfinite(heads).all() or not np.isfinite(bodies).all():
+    there = np.array([rig_map is None or rig_map.place(name) is not None for name in JOINTS])
+    if not np.isfinite(bones[:, there]).all() or not np.isfinite(bodies).all():
         raise InputError(f"The {what} has a transform that is not a number; clear its transform or fix what drives it.")
-    joints = unit * (np.einsum("tij,tnj->tni", bodies[:, :3, :3], heads) + bodies[:, None, :3, 3])
-    if source.dafnet.root:
+    if rig_map is None:
+        joints = unit * (bodies[:, None] @ bones)[..., :3, 3]
+    else:
+        joints = unit * joints_of(source, rig_map, bodies, bones, size / unit)
+    if rig_map is None and source.dafnet.root:
         frames = _rigid(bodies, unit, what)
         frames[:, :3, :3] = frames[:, :3, :3] @ FACING
         path, _ = root_from_matrices(frames)

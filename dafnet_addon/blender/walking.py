@@ -16,11 +16,12 @@ from .compat import action_curves
 from .properties import Settings, find_object, settings_of
 from .scene_reader import furniture_now
 
-__all__ = ["Walk", "walk"]
+__all__ = ["MOVES", "Walk", "extended_to", "keyable_root", "last_key", "walk", "write_keys"]
 
 _KEYS_A_SECOND = 10
 _BEFORE = 0.2  # seconds of rest before the first step
-_MOVES = ("location", "rotation_euler")
+MOVES = ("location", "rotation_euler")
+"""What is keyed of a root."""
 
 
 @dataclass(frozen=True)
@@ -32,14 +33,14 @@ class Walk:
     extended: bool
 
 
-def _root_of(settings: Settings) -> bpy.types.Object:
+def keyable_root(settings: Settings) -> bpy.types.Object:
     """The root, whose keys are to be written: its own place must be its place in the world."""
     if settings.root is None:
         raise InputError(f"The character '{settings.armature}' has no root; choose its root object in the DAFNet panel.")
     root = find_object(settings, settings.root, "root")
     if root.parent or any(not c.mute for c in root.constraints):
         raise InputError(f"The root '{root.name}' follows something; clear its parent and constraints to key it.")
-    if root.animation_data and any(driver.data_path in _MOVES for driver in root.animation_data.drivers):
+    if root.animation_data and any(driver.data_path in MOVES for driver in root.animation_data.drivers):
         raise InputError(f"The root '{root.name}' has drivers; remove them to key it.")
     if root.library or len(root.rotation_mode) != 3 or root.rotation_mode[2] != "Z":
         raise InputError(f"The root '{root.name}' is linked or not in rotation mode XYZ; make it local and set that mode.")
@@ -60,9 +61,9 @@ def walk(
     if seat is not None and own.furniture is None:
         own.furniture = _collection_of(seat, armature, scene)
     settings = settings_of(armature, scene)
-    root = _root_of(settings)
-    keyed = [float(p.co[0]) for c in action_curves(root) if c.data_path in _MOVES for p in c.keyframe_points]
-    before, first = scene.frame_current, int(np.ceil(max(keyed))) if keyed else scene.frame_current
+    root = keyable_root(settings)
+    keyed = last_key(root)
+    before, first = scene.frame_current, scene.frame_current if keyed is None else keyed
     try:
         scene.frame_set(first)
         unit = metres_per_unit(scene)
@@ -74,14 +75,26 @@ def walk(
         scene.frame_set(before)
     route = _route(found, seat, place, yaw, goal, seconds, speed, scene.render.fps / scene.render.fps_base, size)
     last = first + len(route.path) - 1
-    _write(root, route, first, size / unit, _KEYS_A_SECOND / (scene.render.fps / scene.render.fps_base))
-    end = scene.frame_end if own.use_scene_range else own.frame_end
-    if last > end:
-        if own.use_scene_range:
-            scene.frame_end = last
-        else:
-            own.frame_end = last
-    return Walk(first, last, last > end)
+    write_keys(root, route, first, size / unit, scene.render.fps / scene.render.fps_base)
+    return Walk(first, last, extended_to(scene, armature, last))
+
+
+def last_key(root: bpy.types.Object) -> int | None:
+    """The frame of a root's last key, or the whole one after it; None where it has none."""
+    keyed = [float(p.co[0]) for c in action_curves(root) if c.data_path in MOVES for p in c.keyframe_points]
+    return int(np.ceil(max(keyed))) if keyed else None
+
+
+def extended_to(scene: bpy.types.Scene, armature: bpy.types.Object, last: int) -> bool:
+    """Let the range that the character generates reach to frame ``last``; whether its end had to be moved for that."""
+    own = armature.dafnet
+    if last <= (scene.frame_end if own.use_scene_range else own.frame_end):
+        return False
+    if own.use_scene_range:
+        scene.frame_end = last
+    else:
+        own.frame_end = last
+    return True
 
 
 def _collection_of(
@@ -119,17 +132,20 @@ def _route(
     return walk_to(everything.solids, start, end, speed, fps, floor)
 
 
-def _write(root: bpy.types.Object, route: Route, first: int, scale: float, share: float) -> None:
-    """Key location and heading at about ten frames a second, and where the root comes to rest."""
-    frames = set(range(0, len(route.path), max(1, round(1.0 / share))))
+def write_keys(root: bpy.types.Object, route: Route, first: int, scale: float, fps: float) -> None:
+    """Key location and heading about ten times a second from frame ``first`` on, and where the root comes to rest.
+
+    ``scale``: the route's metres in Blender units.
+    """
+    frames = set(range(0, len(route.path), max(1, round(fps / _KEYS_A_SECOND))))
     frames |= {len(route.path) - 1, *(k for rest in route.rests for k in (rest.first, rest.last))}
     for k in sorted(frames):
         root.location = route.path.position[k] * scale
         root.rotation_euler = (0.0, 0.0, float(route.path.yaw[k]))
-        for path in _MOVES:
+        for path in MOVES:
             root.keyframe_insert(path, frame=first + k)
     for curve in action_curves(root):
-        if curve.data_path in _MOVES:
+        if curve.data_path in MOVES:
             for point in curve.keyframe_points:
                 if point.co[0] >= first:
                     point.interpolation = "BEZIER"

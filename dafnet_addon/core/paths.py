@@ -14,7 +14,7 @@ import numpy as np
 from .errors import InputError
 from .root import RootPath
 
-__all__ = ["Stop", "Rest", "Route", "facing", "route"]
+__all__ = ["Stop", "Rest", "Route", "facing", "route", "walked_along"]
 
 Point = tuple[float, float]
 
@@ -135,14 +135,25 @@ def _leg(origin: Stop, via: Sequence[Point], goal: Stop, cruise: float, fps: flo
         raise InputError("Two neighbouring points of the root's path are less than 5 cm apart; move or remove one.")
 
     curve, length, corners = _rounded(np.array(points))
+    # The short straights at a seat are taken forwards and backwards: they say nothing about where the walker looks.
+    told = (corners[0][1] if origin.seated else 0.0), (corners[-1][0] if goal.seated else length)
+    return walked_along(curve, length, origin, goal, told, cruise, fps)
+
+
+def walked_along(
+    curve: np.ndarray, length: float, origin: Stop, goal: Stop, told: Point, cruise: float, fps: float,
+    yaw: float | None = None,
+) -> RootPath:
+    """A smooth ``curve`` (N, 2), evenly sampled and ``length`` metres long, walked from rest at ``origin`` to rest at ``goal``.
+
+    The walker looks along it between ``told`` metres of the way, or keeps the heading ``yaw``, and turns away from
+    ``origin.yaw`` and to ``goal.yaw`` as people do. From one frame after the rest to the first frame of the other; z is 0.
+    """
     step = np.diff(curve, axis=0)
     arc = np.linspace(0.0, length, len(curve))
     tangent = np.unwrap(np.arctan2(-step[:, 0], step[:, 1]))
     tangent = np.concatenate([tangent, tangent[-1:]])
-    # The short straights at a seat are taken forwards and backwards: they say nothing about where the walker looks.
-    first = corners[0][1] if origin.seated else 0.0
-    last = corners[-1][0] if goal.seated else length
-    heading = np.interp(np.clip(arc, first, last), arc, tangent)
+    heading = np.interp(np.clip(arc, *told), arc, tangent) if yaw is None else np.full(len(arc), yaw)
     start, end = (_RISE if origin.seated else _START), (_SIT if goal.seated else _HALT)
     speed = _speeds(arc, tangent, heading, cruise, start, end)
     clock = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(arc) / (speed[1:] + speed[:-1]))])
@@ -176,8 +187,7 @@ def _leg(origin: Stop, via: Sequence[Point], goal: Stop, cruise: float, fps: flo
     arriving = _blend((time - arrive) / (arrive_end - arrive))
     from_origin = _wrapped(origin.yaw - walked(leave_end)) + walked(leave_end)
     to_goal = walked(arrive) + arrive_turn
-    yaw = walking + leaving * (from_origin - walking) + arriving * (to_goal - walking)
-    return RootPath(position, yaw)
+    return RootPath(position, walking + leaving * (from_origin - walking) + arriving * (to_goal - walking))
 
 
 def route(start: Stop, *places: Point | Stop, speed: float = 1.1, fps: float = 30.0, floor: float = 0.0) -> Route:

@@ -1,28 +1,25 @@
-"""An animator's first shot, with the mouse: see scripts/window.sh."""
-
 import sys
 from pathlib import Path
-
 import bpy
-
 sys.path.insert(0, str(Path(__file__).parent))
 from driver import Driver, Waits, play
-
 PICTURES = Path(sys.argv[sys.argv.index("--") + 1])
-
-
-def shot() -> Waits:
+def everything() -> Waits:
     user = Driver(PICTURES)
-    yield from user.press("ESC")  # the splash screen
+    yield from user.press("ESC")
+    with user.override():
+        bpy.ops.object.select_all(action="SELECT"); bpy.ops.object.delete()
+        bpy.ops.dafnet.add_character(name="Ann")
+    ann = bpy.data.objects["Ann"]
+    bpy.context.scene.frame_end = 60
+    for frame, y in ((1, 0.0), (60, 1.8)):
+        ann.dafnet.root.location.y = y
+        ann.dafnet.root.keyframe_insert("location", frame=frame)
+    ann.dafnet.take_count = 4
+    ann.dafnet.mode = "EE"
     yield from user.sidebar("DAFNet")
-    yield from user.picture("01_empty")
-    yield from user.click("dafnet.add_character")
+    yield from user.click("dafnet.generate(task='NEW')")
+    yield from user.until(lambda: len(ann.dafnet.takes) == 4, "takes")
     yield 0.5
-    yield from user.picture("02_character")
-    assert bpy.context.scene.objects.get("Character"), "Add Character"
-    yield from user.click("dafnet.generate")
-    yield 0.3
-    yield from user.picture("03_generating")
-
-
-play(shot)
+    yield from user.picture("takes")
+play(everything)

@@ -1,0 +1,370 @@
+"""The motion that a DAFNet character plays, hand edits included, onto an armature of the animator's own: a new action."""
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix, Quaternion
+
+from ..core.errors import InputError
+from ..core.retargeting import Landed, canonical_body, onto
+from ..core.root import root_from_matrices
+from ..core.rotations import continuous_signs, normalised, quaternion_from_matrix
+from ..core.skeleton import JOINTS
+from .armature import character_scale, metres_per_unit
+from .baker import key_curves
+from .compat import action_curves, assign_action, new_action
+from .mannequin import FACING
+from .rig_controls import Attachments, Channels, Control, channels, controls_of, posed, probe, settled
+from .rig_reading import character_motion, pose_matrices, rigid_parts, shape_of
+from .rigs import RigMap, in_names_of, required
+
+__all__ = ["Baked", "bake_onto_rig", "frames_played"]
+
+_CHECKED = 12
+"""Frames in which the result is measured."""
+_BONE_PATH = re.compile(r'^pose\.bones\["(.+?)"\](?:\["(.+)"\])?')
+Curves = Callable[[str, int, str], bpy.types.FCurve]
+
+
+@dataclass(frozen=True)
+class Baked:
+    """The new ``action``; ``errors``: mean and largest distance (metres) of wrists, ankles, head and pelvis (the middle of the
+    hip joints) from where they were to lie, measured on the rig as Blender plays it. ``ratio``: the rig's size over the
+    character's, by which the motion was scaled.
+    """
+
+    action: bpy.types.Action
+    errors: dict[str, tuple[float, float]]
+    ratio: float
+
+
+@dataclass(frozen=True)
+class _Read:
+    """Matrices of every frame: ``bodies`` and ``poses`` of the character, ``above`` (T, 4, 4) what carries the rig's object."""
+
+    bodies: np.ndarray
+    poses: np.ndarray
+    above: np.ndarray
+
+
+def frames_played(character: bpy.types.Object, scene: bpy.types.Scene) -> range:
+    """The frames of the action that the character plays, or the scene's."""
+    action = character.animation_data.action if character.animation_data else None
+    if action is None:
+        return range(scene.frame_start, scene.frame_end + 1)
+    first, last = action.frame_range
+    return range(round(first), round(last) + 1)
+
+
+def bake_onto_rig(
+    context: bpy.types.Context, character: bpy.types.Object, rig: bpy.types.Object, rig_map: RigMap,
+    root_motion: str = "OBJECT", limbs: str = "FK", frames: range | None = None, name: str | None = None,
+) -> Baked:
+    """Key on ``rig`` what ``character`` does in ``frames`` (those of its action), in a new action that the rig then plays.
+
+    ``root_motion``: OBJECT, BONE or HIPS, what carries the rig over the floor; ``limbs``: FK or IK. Earlier actions are kept
+    by a fake user. Controls that are not mapped keep their pose, but those above mapped ones and those that the earlier
+    action moves are put at rest. ``InputError``: rig, map or character cannot be used; the rig is then as it was.
+    """
+    frames = frames_played(character, context.scene) if frames is None else frames
+    unit = metres_per_unit(context.scene)
+    size = character_scale(character, 1.0)
+    _require_bakeable(context, rig, root_motion)
+    rig_map = in_names_of(rig_map, rig.data.bones.keys()) if rig.mode != "EDIT" else rig_map
+    required(rig, rig_map)
+    controls = controls_of(rig, rig_map, limbs, root_motion == "BONE")
+    read = _read(context, character, rig, frames)
+    with _undone_on_failure(context, rig):
+        return _bake(context, character, rig, rig_map, controls, read, _Wish(
+            root_motion, limbs, np.array(frames, float), name or f"{character.name} on {rig.name}", size, unit))
+
+
+@dataclass(frozen=True)
+class _Wish:
+    """What was asked for, see ``bake_onto_rig``; ``size``: of the character, in Blender units of the canonical metre."""
+
+    root_motion: str
+    limbs: str
+    frames: np.ndarray
+    name: str
+    size: float
+    unit: float
+
+
+def _bake(
+    context: bpy.types.Context, character: bpy.types.Object, rig: bpy.types.Object, rig_map: RigMap,
+    controls: list[Control], read: _Read, wish: _Wish,
+) -> Baked:
+    previous = rig.animation_data.action if rig.animation_data else None
+    moved, switched = _animated(rig)
+    action, add_curve = new_action(rig, wish.name)
+    action.use_fake_user = True
+    assign_action(rig, action)
+    for bone, key, value in (*rig_map.settings.get(wish.limbs, ()), *rig_map.settings.get("BOTH", ())):
+        _set(rig, add_curve, bone, key, value, wish.frames[0])
+        switched.discard((bone, key))
+    for bone, key in switched:
+        _set(rig, add_curve, bone, key, rig.pose.bones[bone].get(key), wish.frames[0])
+    moved |= {bone.name for bone in rig.pose.bones if bone.matrix_basis != Matrix.Identity(4)}
+    for bone in _in_the_way(context, rig, rig_map, moved - {control.bone for control in controls}):
+        _at_rest(rig.pose.bones[bone], add_curve, wish.frames[0], ("location", "rotation", "scale"))
+    for control in controls:
+        if control.bone in moved:
+            _at_rest(rig.pose.bones[control.bone], add_curve, wish.frames[0], ("location", "scale")[control.moves :])
+
+    held = probe(context, rig, controls)
+    evaluated = settled(context, rig)
+    places = [rig_map.place(joint) for joint in JOINTS]
+    basis = np.array(rig.matrix_basis, float)
+    still = read.above @ basis
+    _, scale = rigid_parts(still, f"armature '{rig.name}'")
+    shape = shape_of(rig, rig_map, pose_matrices(evaluated, places), scale)
+    path, _ = root_from_matrices(_facing(read.bodies))
+    landed = onto(character_motion(character, read.bodies, read.poses), canonical_body(wish.size), shape.body, path.position)
+    carrier = path.matrices()
+    carrier[:, :3, :3] = scale * carrier[:, :3, :3] @ shape.axes.T
+    objects = carrier if wish.root_motion == "OBJECT" else still
+    made = channels(controls, held, shape, landed, objects, carrier if wish.root_motion == "BONE" else objects)
+
+    _key_object(rig, add_curve, wish, np.linalg.inv(read.above) @ objects, basis)
+    curves = {control.bone: _key_control(rig, add_curve, control, made, i, wish.frames) for i, control in enumerate(controls)}
+    if previous:
+        previous.use_fake_user = True
+    if held.loose:
+        _settle_loose(context, rig, controls, held, made, curves, wish.frames)
+    return Baked(action, _measured(context, rig, rig_map, landed, wish), landed.ratio)
+
+
+def _facing(bodies: np.ndarray) -> np.ndarray:
+    """Root frames (T, 4, 4) of a character's object matrices."""
+    frames = bodies.copy()
+    frames[:, :3, :3] = frames[:, :3, :3] @ FACING
+    return frames
+
+
+def _require_bakeable(context: bpy.types.Context, rig: bpy.types.Object, root_motion: str) -> None:
+    if rig.type != "ARMATURE":
+        raise InputError(f"'{rig.name}' is no armature; choose the armature of your rig.")
+    if rig.library:
+        raise InputError(f"The armature '{rig.name}' is linked; make a library override of it, or make it local first.")
+    if rig.data.pose_position == "REST":
+        raise InputError(f"The armature '{rig.name}' shows its rest position; set it to Pose Position.")
+    if rig not in {each.original for each in context.evaluated_depsgraph_get().ids}:
+        raise InputError(f"'{rig.name}' or its collection is disabled in viewports; enable it, or hide it with H.")
+    data = rig.animation_data
+    if data and (data.use_tweak_mode or any(track.is_solo for track in data.nla_tracks)):
+        raise InputError(f"The armature '{rig.name}' plays an NLA strip in tweak or solo mode; leave it first.")
+    delta = (*rig.delta_location, *rig.delta_rotation_euler, *(s - 1.0 for s in rig.delta_scale))
+    if root_motion == "OBJECT" and (any(not c.mute for c in rig.constraints) or any(delta)):
+        raise InputError(f"The object '{rig.name}' has constraints or delta transforms; choose Hips as the root motion.")
+
+
+def _read(context: bpy.types.Context, character: bpy.types.Object, rig: bpy.types.Object, frames: range) -> _Read:
+    """Play the frames and note what is needed; the current frame is as it was afterwards."""
+    scene = context.scene
+    now, within = scene.frame_current, scene.frame_subframe
+    bodies, poses, above = [], [], []
+    try:
+        for frame in frames:
+            scene.frame_set(frame)
+            depsgraph = context.evaluated_depsgraph_get()
+            evaluated, own = character.evaluated_get(depsgraph), rig.evaluated_get(depsgraph)
+            bodies.append(np.array(evaluated.matrix_world, float))
+            poses.append(pose_matrices(evaluated, list(JOINTS)))
+            above.append(np.array(own.matrix_world @ own.matrix_basis.inverted_safe(), float))
+    finally:
+        scene.frame_set(now, subframe=within)
+    read = _Read(np.array(bodies), np.array(poses), np.array(above))
+    if not all(np.isfinite(values).all() for values in (read.bodies, read.poses, read.above)):
+        raise InputError(f"'{character.name}' or '{rig.name}' has a transform that is not a number; fix what drives it.")
+    return read
+
+
+@contextmanager
+def _undone_on_failure(context: bpy.types.Context, rig: bpy.types.Object) -> Iterator[None]:
+    """The rig's action, pose, settings and the current frame as they were where the block fails; the frame in any case."""
+    scene = context.scene
+    now, within = scene.frame_current, scene.frame_subframe
+    data = rig.animation_data
+    action = data.action if data else None
+    poses = {bone.name: bone.matrix_basis.copy() for bone in rig.pose.bones}
+    values = {
+        (bone.name, key): value for bone in rig.pose.bones for key, value in bone.items() if isinstance(value, int | float)
+    }
+    before = set(bpy.data.actions)
+    try:
+        yield
+    except BaseException:
+        if rig.animation_data:
+            rig.animation_data.action = action
+        for made in set(bpy.data.actions) - before:
+            bpy.data.actions.remove(made)
+        if data is None:
+            rig.animation_data_clear()
+        for bone, matrix in poses.items():
+            rig.pose.bones[bone].matrix_basis = matrix
+        for (bone, key), value in values.items():
+            rig.pose.bones[bone][key] = value
+        raise
+    finally:
+        scene.frame_set(now, subframe=within)
+
+
+def _animated(rig: bpy.types.Object) -> tuple[set[str], set[tuple[str, str]]]:
+    """Bones, and custom properties of bones, that the action moves which the rig plays."""
+    moved, switched = set(), set()
+    for curve in action_curves(rig):
+        found = _BONE_PATH.match(curve.data_path)
+        bone, key = (bpy.utils.unescape_identifier(part or "") for part in found.groups()) if found else ("", "")
+        if key and bone in rig.pose.bones:
+            switched.add((bone, key))
+        elif bone in rig.pose.bones:
+            moved.add(bone)
+    return moved, switched
+
+
+def _in_the_way(context: bpy.types.Context, rig: bpy.types.Object, rig_map: RigMap, suspects: set[str]) -> list[str]:
+    """Those of some bones that move joints when they are moved; they are left at rest, the others keep their pose.
+
+    In control rigs they need not be parents of what they move, so each of them is tried.
+    """
+    poses = {name: rig.pose.bones[name].matrix_basis.copy() for name in suspects}
+    places = [rig_map.place(joint) for joint in JOINTS]
+    for name in suspects:
+        rig.pose.bones[name].matrix_basis.identity()
+    rest = pose_matrices(settled(context, rig), places) if suspects else np.empty(0)
+    found = []
+    for name in sorted(suspects):
+        bone = rig.pose.bones[name]
+        bone.matrix_basis = Matrix.Rotation(0.3, 4, "X") @ Matrix.Rotation(0.3, 4, "Z")
+        bone.location = (0.1 * bone.length,) * 3
+        off = np.abs(pose_matrices(settled(context, rig), places) - rest)
+        if np.nanmax(off) > 1e-3:
+            found.append(name)
+        bone.matrix_basis.identity()
+    for name in suspects - set(found):
+        rig.pose.bones[name].matrix_basis = poses[name]
+    return found
+
+
+def _at_rest(bone: bpy.types.PoseBone, add_curve: Curves, frame: float, kinds: tuple[str, ...]) -> None:
+    """Put a bone at rest, with one key for each kind of channels."""
+    bone.matrix_basis.identity()
+    start = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].'
+    path, rotation = _rotation_channels(bone.rotation_mode, np.array([[1.0, 0.0, 0.0, 0.0]]))
+    given = {"location": ("location", np.zeros((1, 3))), "rotation": (path, rotation), "scale": ("scale", np.ones((1, 3)))}
+    for kind in kinds:
+        key_curves(add_curve, start + given[kind][0], bone.name, np.array([frame]), given[kind][1])
+
+
+def _set(rig: bpy.types.Object, add_curve: Curves, bone: str, key: str, value: Any, frame: float) -> None:
+    """Set and key a custom property of a bone, where the bone has it as a number."""
+    holder = rig.pose.bones[bone]
+    if isinstance(holder.get(key), int | float):
+        holder[key] = type(holder[key])(value)
+        names = (bpy.utils.escape_identifier(part) for part in (bone, key))
+        key_curves(add_curve, 'pose.bones["{}"]["{}"]'.format(*names), bone, np.array([frame]), np.array([[value]]))
+
+
+def _rotation_channels(mode: str, quaternions: np.ndarray) -> tuple[str, np.ndarray]:
+    """Data path and values (T, 3 or 4) of rotations (T, 4) in one of Blender's rotation modes, steady in time."""
+    if mode == "QUATERNION":
+        return "rotation_quaternion", quaternions
+    if mode == "AXIS_ANGLE":
+        axis, length = quaternions[:, 1:], np.linalg.norm(quaternions[:, 1:], axis=1)
+        angle = 2.0 * np.arctan2(length, quaternions[:, 0])
+        return "rotation_axis_angle", np.concatenate([angle[:, None], normalised(axis, np.array([0.0, 1.0, 0.0]))], axis=1)
+    angles, before = [], Euler((0.0, 0.0, 0.0), mode)
+    for quaternion in quaternions:
+        before = Quaternion(quaternion.tolist()).to_euler(mode, before)
+        angles.append(tuple(before))
+    return "rotation_euler", np.array(angles)
+
+
+def _quaternions(turns: np.ndarray) -> np.ndarray:
+    return continuous_signs(quaternion_from_matrix(turns))
+
+
+def _key_object(
+    rig: bpy.types.Object, add_curve: Curves, wish: _Wish, basis: np.ndarray, now: np.ndarray,
+) -> None:
+    """Keys of the object: its way over the floor, or the one place where it stays."""
+    frames = wish.frames
+    if wish.root_motion != "OBJECT":
+        basis, frames = now[None], frames[:1]
+    turns, _ = rigid_parts(basis, f"armature '{rig.name}'")
+    path, values = _rotation_channels(rig.rotation_mode, _quaternions(turns))
+    key_curves(add_curve, "location", "Object", frames, basis[:, :3, 3])
+    key_curves(add_curve, path, "Object", frames, values)
+
+
+def _key_control(
+    rig: bpy.types.Object, add_curve: Curves, control: Control, made: Channels, i: int, frames: np.ndarray,
+) -> dict[str, list[bpy.types.FCurve]]:
+    """Keys of one control; returns its curves by channel."""
+    bone = rig.pose.bones[control.bone]
+    bone.matrix_basis.identity()
+    path, values = _rotation_channels(bone.rotation_mode, _quaternions(made.turns[:, i]))
+    start = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].'
+    found: dict[str, list[bpy.types.FCurve]] = {}
+
+    def add(channel: str) -> Curves:
+        def kept(path: str, index: int, group: str) -> bpy.types.FCurve:
+            curve = add_curve(path, index, group)
+            found.setdefault(channel, []).append(curve)
+            return curve
+        return kept
+
+    if control.moves:
+        key_curves(add("location"), start + "location", bone.name, frames, made.moves[:, i])
+    if control.pole is None:
+        key_curves(add("rotation"), start + path, bone.name, frames, values)
+    return found
+
+
+def _settle_loose(
+    context: bpy.types.Context, rig: bpy.types.Object, controls: list[Control], held: Attachments, made: Channels,
+    curves: dict[str, dict[str, list[bpy.types.FCurve]]], frames: np.ndarray,
+) -> None:
+    """Where a control is not turned rigidly by another one, look in each frame how it lies, and turn it as was wanted.
+
+    Once for every such control, since each of them may hang on the one before.
+    """
+    for _ in held.loose:
+        bare = np.empty((len(frames), len(held.loose), 3, 3))
+        for t, frame in enumerate(frames):
+            context.scene.frame_set(int(frame))
+            evaluated = rig.evaluated_get(context.evaluated_depsgraph_get())
+            bare[t] = posed(evaluated, [controls[i] for i in held.loose], made.turns[t, held.loose])
+        for k, i in enumerate(held.loose):
+            made.turns[:, i] = np.swapaxes(bare[:, k], 1, 2) @ made.wanted[:, i]
+            mode = rig.pose.bones[controls[i].bone].rotation_mode
+            _, values = _rotation_channels(mode, _quaternions(made.turns[:, i]))
+            for curve, column in zip(curves[controls[i].bone]["rotation"], values.T, strict=True):
+                points = np.stack([frames, column], axis=1).astype(np.float32)
+                curve.keyframe_points.foreach_set("co", points.ravel())
+                curve.update()
+
+
+def _measured(
+    context: bpy.types.Context, rig: bpy.types.Object, rig_map: RigMap, landed: Landed, wish: _Wish,
+) -> dict[str, tuple[float, float]]:
+    """Errors as in ``Baked``."""
+    chosen = np.unique(np.linspace(0, len(wish.frames) - 1, _CHECKED).astype(int))
+    parts = {"wrists": (20, 21), "ankles": (7, 8), "head": (15,), "pelvis": (1, 2)}
+    found: dict[str, list[np.ndarray]] = {part: [] for part in parts}
+    for t in chosen:
+        context.scene.frame_set(int(wish.frames[t]))
+        evaluated = rig.evaluated_get(context.evaluated_depsgraph_get())
+        for part, joints in parts.items():
+            bones = [rig_map.place(JOINTS[j]) for j in joints]
+            at = np.array([evaluated.matrix_world @ evaluated.pose.bones[bone].head for bone in bones])
+            off = at - landed.targets[t, list(joints)]
+            off = off.mean(axis=0, keepdims=True) if part == "pelvis" else off
+            found[part].append(wish.unit * np.linalg.norm(off, axis=-1))
+    return {part: (float(np.mean(values)), float(np.max(values))) for part, values in found.items()}

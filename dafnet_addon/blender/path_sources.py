@@ -1,0 +1,273 @@
+"""Keys on a character's root from what the animator has already: a drawn curve, something that moves, points on the floor."""
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..core.distance import scaled
+from ..core.errors import InputError
+from ..core.paths import Route, Stop, facing, route
+from ..core.solids import Scene
+from ..core.trails import FASTEST, followed, trail
+from ..director.seats import on_a_seat
+from ..director.surfaces import surface_points
+from ..director.walks import way_round
+from .armature import character_scale, metres_per_unit, missing_bones, sent
+from .compat import action_curves
+from .properties import settings_of
+from .scene_reader import furniture_now
+from .walking import MOVES, Walk, extended_to, keyable_root, last_key, walk, write_keys
+
+__all__ = ["along_curve", "as_moved", "chosen", "floor_points", "is_curve", "may_move", "places_of", "through_points"]
+
+_BEFORE = 0.2  # seconds of rest before the first step
+_AFTER_SEAT = 0.55  # metres straight in front of a seat, as ``director.walks`` goes
+_SPACING = 0.05  # metres between points on the furniture
+_THERE = 0.1  # metres between a root and the line's beginning that need no walk
+
+
+def is_curve(candidate: bpy.types.Object) -> bool:
+    """Whether it is a curve that was drawn."""
+    return candidate.type == "CURVE"
+
+
+def may_move(candidate: bpy.types.Object) -> bool:
+    """Whether keys, drivers, constraints or a parent may move it."""
+    return bool(
+        any(curve.data_path == "location" for curve in action_curves(candidate)) or candidate.parent or candidate.constraints
+        or (candidate.animation_data and (candidate.animation_data.drivers or candidate.animation_data.nla_tracks))
+    )
+
+
+def _parts_of(character: bpy.types.Object) -> set[bpy.types.Object]:
+    own = character.dafnet
+    return {character, *character.children_recursive, own.root, own.head, own.hand_left, own.hand_right} - {None}
+
+
+def chosen(
+    context: bpy.types.Context, fits: Callable[[bpy.types.Object], bool]
+) -> tuple[bpy.types.Object | None, bpy.types.Object | None]:
+    """The character to direct (``armature.sent``), and the active or else the only selected other object that ``fits``."""
+    character = sent(context)[0]
+    if character is None:
+        return None, None
+    parts = _parts_of(character)
+    others = [o for o in context.selected_objects if o not in parts and fits(o)]
+    active = context.object
+    return character, active if active in others else others[0] if len(others) == 1 else None
+
+
+def floor_points(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected empties that are no part of a character, in the order of their names; 10 comes after 9."""
+    characters = [o for o in context.scene.objects if o.type == "ARMATURE" and not missing_bones(o)]
+    parts = {part for character in characters for part in _parts_of(character)}
+    found = [o for o in context.selected_objects if o.type == "EMPTY" and o not in parts]
+    return sorted(found, key=lambda o: [(not t.isdigit(), int(t) if t.isdigit() else 0, t.lower())
+                                        for t in re.split(r"(\d+)", o.name)])
+
+
+@dataclass(frozen=True)
+class _Directed:
+    """The character's ``root`` in the scene, its ``place`` (3,) and ``yaw`` at frame ``first`` and the furniture then, in
+    canonical metres, of which a Blender unit is ``unit``.
+    """
+
+    root: bpy.types.Object
+    first: int
+    unit: float
+    fps: float
+    place: np.ndarray
+    yaw: float
+    solids: Scene
+
+    @property
+    def floor(self) -> float:
+        return float(self.place[2])
+
+    def start(self) -> Stop:
+        """Where the root rests before it goes."""
+        seated = on_a_seat(self.solids.solids, self.place[:2], self.floor)
+        return Stop((float(self.place[0]), float(self.place[1])), self.yaw, _BEFORE, seated=seated)
+
+
+def _directed(context: bpy.types.Context, armature: bpy.types.Object, first: int | None = None) -> _Directed:
+    """At frame ``first``, None for the root's last key or else the current frame. The scene's frame is as before."""
+    scene = context.scene
+    settings = settings_of(armature, scene)
+    root = keyable_root(settings)
+    fps, size = scene.render.fps / scene.render.fps_base, character_scale(armature, metres_per_unit(scene))
+    unit, before, subframe = metres_per_unit(scene) / size, scene.frame_current, scene.frame_subframe
+    if first is None:
+        keyed = last_key(root)
+        first = before if keyed is None else keyed
+    try:
+        scene.frame_set(first)
+        place, yaw = np.array(root.location, float) * unit, float(root.rotation_euler[2])
+        meshes = [mesh for found in furniture_now(context, settings).values() for mesh in found]
+    finally:
+        scene.frame_set(before, subframe=subframe)
+    return _Directed(root, first, unit, fps, place, yaw, scaled(Scene(tuple(meshes)), 1.0 / size))
+
+
+def _written(context: bpy.types.Context, armature: bpy.types.Object, directed: _Directed, walked: Route) -> Walk:
+    """Key a route over what the root has from its first frame on; before that it moves as it did."""
+    root, first = directed.root, directed.first
+    kept: dict[tuple[str, int], list[tuple[int, float]]] = {}
+    for curve in action_curves(root):
+        if curve.data_path not in MOVES:
+            continue
+        earlier = [point for point in curve.keyframe_points if point.co[0] < first]
+        if earlier:
+            last = earlier[-1]
+            last.handle_left_type = last.handle_right_type = "FREE"  # else the next key would bend what leads to this one
+            between = range(int(np.floor(last.co[0])) + 1, first)
+            kept[curve.data_path, curve.array_index] = [(frame, curve.evaluate(frame)) for frame in between]
+        for k in reversed([k for k, point in enumerate(curve.keyframe_points) if point.co[0] >= first]):
+            curve.keyframe_points.remove(curve.keyframe_points[k], fast=True)
+        curve.update()
+    write_keys(root, walked, first, 1.0 / directed.unit, directed.fps)
+    for curve in action_curves(root):
+        for frame, value in kept.get((curve.data_path, curve.array_index), []):
+            if abs(curve.evaluate(frame) - value) > 1e-5:
+                curve.keyframe_points.insert(frame, value).interpolation = "LINEAR"
+        curve.update()
+    last_frame = first + len(walked.path) - 1
+    context.scene.frame_set(context.scene.frame_current)  # the keys' last place is not where it is now
+    return Walk(first, last_frame, extended_to(context.scene, armature, last_frame))
+
+
+def _line_of(context: bpy.types.Context, curve: bpy.types.Object) -> np.ndarray:
+    """The longest line (N, 3) of a curve as the scene evaluates it, world, Blender units."""
+    if curve.type != "CURVE":
+        raise InputError(f"'{curve.name}' is not a curve; select a Bezier, poly or NURBS curve.")
+    evaluated = curve.evaluated_get(context.evaluated_depsgraph_get())
+    lines = _lines(evaluated)
+    if not lines:  # it has a bevel or another surface: the bare line, without its modifiers
+        bare = bpy.data.objects.new(curve.name, curve.data.copy())
+        data = bare.data
+        try:
+            data.bevel_mode, data.bevel_depth, data.extrude, data.bevel_object, data.dimensions = "ROUND", 0.0, 0.0, None, "3D"
+            lines = _lines(bare)
+        finally:
+            bpy.data.objects.remove(bare)
+            bpy.data.curves.remove(data)
+    matrix = np.array(evaluated.matrix_world, float)
+    world = [line @ matrix[:3, :3].T + matrix[:3, 3] for line in lines]
+    if not world:
+        raise InputError(f"The curve '{curve.name}' has no line; draw one on the floor.")
+    return max(world, key=lambda line: float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()))
+
+
+def _lines(owner: bpy.types.Object) -> list[np.ndarray]:
+    """The chains of edges (N, 3) that a curve is drawn with, in its own space; none where it has faces."""
+    mesh = owner.to_mesh()
+    try:
+        if mesh is None or len(mesh.polygons) or not len(mesh.edges):
+            return []
+        flat, edges = np.empty(3 * len(mesh.vertices)), np.empty(2 * len(mesh.edges), int)
+        mesh.vertices.foreach_get("co", flat)
+        mesh.edges.foreach_get("vertices", edges)
+    finally:
+        owner.to_mesh_clear()
+    points, pairs = flat.reshape(-1, 3), {tuple(sorted(pair)) for pair in edges.reshape(-1, 2).tolist()}
+    lines, start = [], 0
+    for k in range(1, len(points) + 1):
+        if k == len(points) or (k - 1, k) not in pairs:
+            closed = (start, k - 1) in pairs and k - start > 2
+            lines.append(points[[*range(start, k), *([start] if closed else [])]])
+            start = k
+    return [line for line in lines if len(line) > 1]
+
+
+def along_curve(
+    context: bpy.types.Context, armature: bpy.types.Object, curve: bpy.types.Object, *, speed: float = 1.1,
+    seconds: float = 1.0, keep_facing: bool = False, backwards: bool = False,
+) -> Walk:
+    """Let the character walk along a curve from the current frame on, and stand at its end for some ``seconds``.
+
+    Where the root has keys before that, it goes from where it is to the curve first; else the walk begins on the curve. Later
+    keys are replaced. ``keep_facing``: it looks where it looks now all the way. ``backwards``: from the curve's end.
+    ``InputError``: no curve, too short, or the root cannot be keyed; nothing is changed then.
+    """
+    line = _line_of(context, curve)[:: -1 if backwards else 1]
+    at = _directed(context, armature, context.scene.frame_current)
+    points = line[:, :2] * at.unit
+    keys = [p.co[0] for c in action_curves(at.root) if c.data_path in MOVES for p in c.keyframe_points]
+    away = float(np.linalg.norm(points[0] - at.place[:2]))
+    start = at.start() if away < _THERE or (keys and min(keys) < at.first) else None
+    if start is not None and away >= _THERE:
+        points = np.concatenate([_way(at, start, [points[0]])[:-1], points])
+    walked = trail(
+        points, start, speed=speed, fps=at.fps, floor=at.floor, yaw=at.yaw if keep_facing else None, seconds=seconds,
+        name=f"curve '{curve.name}'",
+    )
+    return _written(context, armature, at, walked)
+
+
+def _way(at: _Directed, start: Stop, goals: list[np.ndarray]) -> np.ndarray:
+    """Corners (N, 2) of the way round the furniture from ``start`` through the places ``goals`` (2,), with these."""
+    points = surface_points(at.solids.solids, _SPACING) - np.array([0.0, 0.0, at.floor])
+    forward = np.array([-np.sin(start.yaw), np.cos(start.yaw)])
+    here, corners = np.array(start.position) + (_AFTER_SEAT if start.seated else 0.0) * forward, []
+    for goal in goals:
+        corners += [*(np.array(corner) for corner in way_round(points, here, goal)), goal]
+        here = goal
+    return np.array(corners)
+
+
+def places_of(context: bpy.types.Context, source: bpy.types.Object, frames: Iterable[int]) -> np.ndarray:
+    """Where an object is in some frames (N, 3), world, Blender units; the current frame stays."""
+    scene = context.scene
+    before, subframe = scene.frame_current, scene.frame_subframe
+    places = []
+    try:
+        for frame in frames:
+            scene.frame_set(frame)
+            places.append(tuple(source.evaluated_get(context.evaluated_depsgraph_get()).matrix_world.translation))
+    finally:
+        scene.frame_set(before, subframe=subframe)
+    return np.array(places, float)
+
+
+def as_moved(context: bpy.types.Context, armature: bpy.types.Object, source: bpy.types.Object) -> tuple[Walk, str]:
+    """Let the root go where ``source`` goes over the floor, at the same frames: those of its keys, else of the scene's range.
+
+    The root's keys from there on are replaced. Also returns a warning, empty where there is none. ``InputError``: it hardly
+    moves, or the root cannot be keyed; nothing is changed then.
+    """
+    scene = context.scene
+    keys = [p.co[0] for c in action_curves(source) if c.data_path == "location" for p in c.keyframe_points]
+    first, last = (int(np.floor(min(keys))), int(np.ceil(max(keys)))) if keys else (scene.frame_start, scene.frame_end)
+    at = _directed(context, armature, first)
+    places = places_of(context, source, range(first, last + 1))[:, :2] * at.unit
+    moved = followed(places, at.fps, at.yaw, at.floor)
+    fastest = float(np.linalg.norm(np.diff(moved.path.position, axis=0), axis=1).max() * at.fps)
+    made = _written(context, armature, at, moved)
+    hurried = f"'{source.name}' moves at up to {fastest:.1f} m/s, faster than this character can walk; slow it down."
+    return made, hurried if fastest > FASTEST else ""
+
+
+def through_points(
+    context: bpy.types.Context, armature: bpy.types.Object, points: list[bpy.types.Object], *, speed: float = 1.1,
+    seconds: float = 1.0,
+) -> Walk:
+    """Let the character walk through the places of ``points``, or to the 3D cursor where there is none, and stand at the last.
+
+    Goes on from the root's last key, else from the current frame, round the furniture and without rests in between.
+    ``InputError``: no way, or the root cannot be keyed; nothing is changed then.
+    """
+    if not points:
+        return walk(context, armature, None, seconds, speed)
+    at = _directed(context, armature)
+    places = [np.array(point.matrix_world.translation, float)[:2] * at.unit for point in points]
+    if len(places) > 1 and np.linalg.norm(places[0] - at.place[:2]) < 0.3:
+        del places[0]  # it stands there already
+    start = at.start()
+    way = _way(at, start, places)
+    last = way[-1] - (way[-2] if len(way) > 1 else np.array(start.position))
+    via = [(float(x), float(y)) for x, y in way]
+    goal = Stop(via.pop(), facing(last), seconds)
+    return _written(context, armature, at, route(start, *via, goal, speed=speed, fps=at.fps, floor=at.floor))

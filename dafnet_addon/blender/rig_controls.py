@@ -1,0 +1,205 @@
+"""A rig's controls: which are keyed, what each of them moves with, and from the pose wanted to the channels that give it.
+
+What a control moves with is not always its parent: in control rigs that is a mechanism bone with constraints. So the rig is
+asked: all controls are turned at random, and for each one the earlier control is looked for to which its place and its
+rotation, without its own channels, are rigidly attached; the object itself is the first candidate.
+"""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..core.errors import InputError
+from ..core.retargeting import LIMBS, Landed
+from ..core.rotations import matrix_from_vector, normalised, rotate, transpose
+from ..core.skeleton import JOINTS
+from .rig_reading import Shape, pose_matrices
+from .rigs import RigMap
+
+__all__ = ["Attachments", "Channels", "Control", "channels", "controls_of", "posed", "probe", "settled"]
+
+_TRIES, _TURN = 4, 0.7  # random poses, and how far they turn, radians
+_RIGID = 0.01
+_ROOT, _OBJECT = -1, -1
+
+
+@dataclass(frozen=True)
+class Control:
+    """A bone to key. ``joint``: index of the joint that it turns with, -1 for the root bone. ``moves``: whether its location
+    is keyed. ``pole``: index in ``LIMBS`` of the limb whose plane it gives, which is all that it does.
+    """
+
+    bone: str
+    joint: int
+    moves: bool = False
+    pole: int | None = None
+
+
+@dataclass(frozen=True)
+class Attachments:
+    """``neutral`` (N, 4, 4): poses of the controls with empty channels, in the armature's space. ``turned_by``, ``moved_by``
+    (N,): the control by which each is turned and moved, -1 for the object. ``loose``: controls that no other turns rigidly.
+    ``axes`` (N, 3, 3): of each control's location channels in the armature's space.
+    """
+
+    neutral: np.ndarray
+    turned_by: list[int]
+    moved_by: list[int]
+    loose: list[int]
+    axes: np.ndarray
+
+
+@dataclass(frozen=True)
+class Channels:
+    """``turns`` (T, N, 3, 3) and ``moves`` (T, N, 3): rotation and location channels. ``wanted`` (T, N, 3, 3): the rotations
+    in the armature's space that they are to give.
+    """
+
+    turns: np.ndarray
+    moves: np.ndarray
+    wanted: np.ndarray
+
+
+def controls_of(rig: bpy.types.Object, rig_map: RigMap, limbs: str, carried_by_root: bool) -> list[Control]:
+    """The controls to key, parents first; ``limbs`` is FK or IK.
+
+    ``InputError``: the rig knows no IK, or a bone that has to move cannot.
+    """
+    controls = []
+    if rig_map.root and rig_map.root != rig_map.joints["pelvis"]:
+        controls.append(Control(rig_map.root, _ROOT, moves=carried_by_root))
+    elif carried_by_root:
+        raise InputError(f"'{rig.name}' has no root bone set; choose it in the Your Rig panel, or another root motion.")
+    replaced: set[int] = set()
+    ends: list[Control] = []
+    if limbs == "IK":
+        if rig_map.limbs.keys() != LIMBS.keys():
+            raise InputError(f"No IK controls of '{rig.name}' are known; set Limbs to FK, or detect its convention again.")
+        for k, (limb, joints) in enumerate(LIMBS.items()):
+            names = rig_map.limbs[limb]
+            replaced |= {*joints, *((joints[2] + 3,) if limb.endswith("leg") else ())}
+            ends.append(Control(names["end"], joints[2], moves=True))
+            if "toe" in names:
+                ends.append(Control(names["toe"], joints[2] + 3))
+            ends.append(Control(names["pole"], joints[1], moves=True, pole=k))
+    for j, joint in enumerate(JOINTS):
+        if joint in rig_map.joints and j not in replaced:
+            controls.append(Control(rig_map.joints[joint], j, moves=j == 0))
+    controls += sorted(ends, key=lambda control: control.pole is not None)
+    for control in controls:
+        bone = rig.data.bones[control.bone]
+        if control.moves and bone.parent and bone.use_connect:
+            raise InputError(f"The bone '{bone.name}' is connected to its parent and cannot move; disconnect it in edit mode.")
+    return controls
+
+
+def settled(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.types.Object:
+    """The rig evaluated as its channels now are; twice, for what lags by an update."""
+    for _ in range(2):
+        rig.update_tag(refresh={"DATA", "OBJECT"})
+        context.view_layer.update()
+    return rig.evaluated_get(context.evaluated_depsgraph_get())
+
+
+def probe(context: bpy.types.Context, rig: bpy.types.Object, controls: list[Control]) -> Attachments:
+    """Find what the controls move with; leaves all of their channels empty."""
+    names: list[str | None] = [control.bone for control in controls]
+    rng = np.random.default_rng(0)
+    poses, channels = [], []
+    for k in range(_TRIES + 1):
+        turns = matrix_from_vector(_TURN * normalised(rng.normal(size=(len(controls), 3))) * (k < _TRIES))
+        for control, turn in zip(controls, turns, strict=True):
+            rig.pose.bones[control.bone].matrix_basis = Matrix(turn.tolist()).to_4x4()
+        poses.append(pose_matrices(settled(context, rig), names))
+        channels.append(turns)
+    neutral, rotation, place = poses[-1], _rotations(np.array(poses)), np.array(poses)[..., :3, 3]
+    bare = rotation @ transpose(np.array(channels))  # without the control's own rotation
+    size = np.ptp(neutral[:, :3, 3], axis=0).max() or 1.0
+
+    turned_by, moved_by, loose = [], [], []
+    for i in range(len(controls)):
+        turned, moved = [_spread(bare[:, i])], [_spread(place[:, i]) / size]
+        for c in range(i):
+            inverse = transpose(rotation[:, c])
+            turned.append(_spread(inverse @ bare[:, i]))
+            moved.append(_spread(rotate(inverse, place[:, i] - place[:, c])) / size)
+        turned_by.append(int(np.argmin(turned)) - 1)
+        moved_by.append(int(np.argmin(moved)) - 1)
+        if min(turned) > _RIGID and controls[i].pole is None:
+            loose.append(i)
+    axes = np.array([_location_axes(rig, control.bone) for control in controls])
+    return Attachments(neutral, turned_by, moved_by, loose, axes)
+
+
+def _spread(values: np.ndarray) -> float:
+    return float(np.abs(values - values[-1]).max())
+
+
+def _rotations(matrices: np.ndarray) -> np.ndarray:
+    axes = matrices[..., :3, :3]
+    return axes / np.maximum(np.linalg.norm(axes, axis=-2, keepdims=True), 1e-12)
+
+
+def _location_axes(rig: bpy.types.Object, name: str) -> np.ndarray:
+    """(3, 3): columns are where the location channels lead, in the armature's space, as the rig is posed now."""
+    bone = rig.data.bones[name]
+    rest = np.array(bone.matrix_local, float)[:3, :3]
+    if bone.parent is None:
+        return rest if bone.use_local_location else np.eye(3)
+    parent = np.array(rig.pose.bones[bone.parent.name].matrix, float)[:3, :3]
+    if not bone.use_local_location:
+        return parent
+    return parent @ np.array(bone.parent.matrix_local, float)[:3, :3].T @ rest
+
+
+def channels(
+    controls: list[Control], held: Attachments, shape: Shape, landed: Landed, objects: np.ndarray, carrier: np.ndarray,
+) -> Channels:
+    """Channels of all controls for a motion that has landed on the rig.
+
+    ``objects`` (T, 4, 4): the rig's object in the world. ``carrier`` (T, 4, 4): where the root bone carries the rig, as a
+    matrix that the object would otherwise have.
+    """
+    frames, n = len(objects), len(controls)
+    scale = np.linalg.norm(objects[0, :3, 0])
+    turned, origin = objects[:, :3, :3] / scale, objects[:, :3, 3]
+    neutral, start = _rotations(held.neutral), held.neutral[:, :3, 3]
+    wanted, place = np.empty((frames, n, 3, 3)), np.empty((frames, n, 3))
+    turns, moves = np.empty((frames, n, 3, 3)), np.zeros((frames, n, 3))
+
+    def to_rig(points: np.ndarray) -> np.ndarray:
+        return rotate(transpose(turned), points - origin) / scale
+
+    for i, control in enumerate(controls):
+        by, at = held.turned_by[i], held.moved_by[i]
+        free = neutral[i] if by < 0 else wanted[:, by] @ neutral[by].T @ neutral[i]
+        free = np.broadcast_to(free, (frames, 3, 3))
+        turn = np.broadcast_to(np.eye(3), (frames, 3, 3)) if at < 0 else wanted[:, at] @ neutral[at].T
+        rest = np.broadcast_to(start[i], (frames, 3)) if at < 0 else place[:, at] + rotate(turn, start[i] - start[at])
+        if control.pole is not None:
+            _, middle, end = list(LIMBS.values())[control.pole]
+            out = landed.bends[:, control.pole] * (shape.body.length(middle) + shape.body.length(end))
+            wanted[:, i], place[:, i] = free, to_rig(landed.motion.joints[:, middle] + out)
+        elif control.joint == _ROOT:
+            motion = transpose(turned) @ carrier[:, :3, :3] / scale
+            wanted[:, i] = motion @ neutral[i]
+            place[:, i] = to_rig(rotate(carrier[:, :3, :3], start[i]) + carrier[:, :3, 3])
+        else:
+            j = control.joint
+            body = landed.turns[:, j] @ shape.axes.T
+            wanted[:, i] = transpose(turned) @ body @ neutral[i]
+            place[:, i] = rest
+            if control.moves:
+                beside = np.nan_to_num(scale * (start[i] - shape.rest[j, :3, 3]))
+                place[:, i] = to_rig(landed.motion.joints[:, j] + rotate(body, beside))
+        turns[:, i] = transpose(free) @ wanted[:, i]
+        if control.moves:
+            moves[:, i] = rotate(np.linalg.inv(turn @ held.axes[i]), place[:, i] - rest)
+    return Channels(turns, moves, wanted)
+
+
+def posed(rig: bpy.types.Object, controls: list[Control], turns: np.ndarray) -> np.ndarray:
+    """Rotations (N, 3, 3) that an evaluated rig's controls would have without their own ``turns`` (N, 3, 3)."""
+    return _rotations(pose_matrices(rig, [control.bone for control in controls])) @ transpose(turns)

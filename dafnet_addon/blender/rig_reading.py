@@ -1,0 +1,124 @@
+"""Armatures as bodies and motions: from pose matrices of any mapped rig, or of our own character, to joints and frames."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..core.errors import InputError
+from ..core.retargeting import Body, Motion, canonical_body, filled, onto
+from ..core.rotations import normalised, rotate, transpose
+from ..core.skeleton import JOINTS, PARENTS
+from .mannequin import FACING
+from .rigs import RigMap
+
+__all__ = ["Shape", "character_motion", "joints_of", "motion_of", "pose_matrices", "rigid_parts", "shape_of"]
+
+_SNAP = np.cos(np.radians(20.0))
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A rig at rest.
+
+    ``axes`` (3, 3): columns are the canonical frame's axes in the armature's space. ``rest`` (22, 4, 4): matrices of the
+    joints' bones in that space, NaN where it has none. ``body``: the same as a body, in world lengths.
+    """
+
+    axes: np.ndarray
+    rest: np.ndarray
+    body: Body
+
+
+def pose_matrices(evaluated: bpy.types.Object, bones: list[str | None]) -> np.ndarray:
+    """Pose matrices (N, 4, 4) of bones, in the armature's space; NaN for None."""
+    pose = evaluated.pose.bones
+    return np.array([np.full((4, 4), np.nan) if name is None else np.array(pose[name].matrix, float) for name in bones])
+
+
+def rigid_parts(matrices: np.ndarray, what: str) -> tuple[np.ndarray, float]:
+    """Rotations (T, 3, 3) of an object's matrices (T, 4, 4), and its one scale.
+
+    ``InputError``: it is scaled unevenly, mirrored, or over time.
+    """
+    lengths = np.linalg.norm(matrices[:, :3, :3], axis=1)
+    if not np.isfinite(matrices).all():
+        raise InputError(f"The {what} has a transform that is not a number; clear its transform or fix what drives it.")
+    scale = float(lengths[0].mean())
+    if scale < 1e-9 or np.abs(lengths - scale).max() > 1e-3 * scale or (np.linalg.det(matrices[:, :3, :3]) < 0).any():
+        raise InputError(f"The {what} is scaled unevenly or over time; give it one positive scale in all three axes.")
+    return matrices[:, :3, :3] / lengths[:, None], scale
+
+
+def shape_of(armature: bpy.types.Object, rig_map: RigMap, rest: np.ndarray, scale: float) -> Shape:
+    """The rig's shape, of the matrices (22, 4, 4) of its joints' bones at rest; ``scale``: the object's in the world."""
+    heads = rest[:, :3, 3]
+    axes = _axes(heads)
+    present = np.array([rig_map.joints.get(name) is not None for name in JOINTS])
+    fingers = np.full((2, 3), np.nan)
+    for k, name in enumerate(("left_wrist", "right_wrist")):
+        hand = armature.data.bones.get(rig_map.place(name) or "")
+        tips = [b.head_local for b in hand.children if "thumb" not in b.name.lower()] if hand else []
+        tips = [tip for tip in tips if (tip - hand.head_local).length > 0.1 * hand.length]
+        if tips:
+            fingers[k] = (np.mean([np.array(tip) for tip in tips], axis=0) - np.array(hand.head_local)) @ axes
+    return Shape(axes, rest, Body(filled(scale * heads @ axes), present, fingers))
+
+
+def _axes(heads: np.ndarray) -> np.ndarray:
+    """Columns right, forward, up of a body by its joints (22, 3); the armature's own axes where they are near."""
+    right = normalised(heads[2] - heads[1]) + normalised(heads[17] - heads[16])
+    up = _snapped(heads[15] - 0.5 * (heads[1] + heads[2]))
+    right = _snapped(right - (right @ up) * up)
+    right = normalised(right - (right @ up) * up)
+    return np.stack([right, np.cross(up, right), up], axis=1)
+
+
+def _snapped(direction: np.ndarray) -> np.ndarray:
+    unit = normalised(direction)
+    k = int(np.argmax(np.abs(unit)))
+    return np.sign(unit[k]) * np.eye(3)[k] if abs(unit[k]) > _SNAP else unit
+
+
+def _world(bodies: np.ndarray, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (T, N, 3) and rotations (T, N, 3, 3) in the world of bones; object and bones may be scaled."""
+    world = bodies[:, None] @ poses
+    axes = world[..., :3, :3] / np.maximum(np.linalg.norm(world[..., :3, :3], axis=-2, keepdims=True), 1e-12)
+    return world[..., :3, 3], axes
+
+
+def character_motion(armature: bpy.types.Object, bodies: np.ndarray, poses: np.ndarray) -> Motion:
+    """The motion of our own character. ``bodies`` (T, 4, 4): its object; ``poses`` (T, 22, 4, 4): its bones, in its space."""
+    joints, turned = _world(bodies, poses)
+    rest = np.array([np.array(armature.data.bones[name].matrix_local)[:3, :3] for name in JOINTS])
+    return Motion(joints, turned @ transpose(FACING @ rest))
+
+
+def motion_of(shape: Shape, bodies: np.ndarray, poses: np.ndarray) -> Motion:
+    """The motion of any rig, its joints' bones as for ``character_motion``; joints without a bone follow their parents."""
+    joints, turned = _world(bodies, poses)
+    turns = turned @ transpose(shape.axes.T @ shape.rest[:, :3, :3])
+    for j, parent in enumerate(PARENTS):
+        if not np.isfinite(shape.rest[j]).all():
+            turns[:, j] = turns[:, parent]
+            joints[:, j] = joints[:, parent] + rotate(turns[:, parent], shape.body.rest[j] - shape.body.rest[parent])
+    return Motion(joints, turns @ transpose(shape.body.alignment()))
+
+
+def joints_of(
+    armature: bpy.types.Object, rig_map: RigMap, bodies: np.ndarray, poses: np.ndarray, size: float,
+) -> np.ndarray:
+    """Joints (T, 22, 3) of a DAFNet body of this size (world lengths) that moves as any mapped rig does; world.
+
+    ``bodies`` (T, 4, 4): the rig's object; ``poses`` (T, 22, 4, 4): the bones ``rig_map.place`` of the joints, in its space,
+    NaN where there is none.
+    """
+    _, scale = rigid_parts(bodies, f"armature '{armature.name}'")
+    rest = [rig_map.place(name) for name in JOINTS]
+    matrices = np.array([
+        np.full((4, 4), np.nan) if name is None else np.array(armature.data.bones[name].matrix_local, float) for name in rest
+    ])
+    shape = shape_of(armature, rig_map, matrices, scale)
+    motion = motion_of(shape, bodies, poses)
+    floor = motion.joints[:, 0] * (1.0, 1.0, 0.0) + (0.0, 0.0, bodies[0, 2, 3])
+    return onto(motion, shape.body, canonical_body(size), floor).motion.joints

@@ -1,0 +1,148 @@
+"""The furniture that a character comes near on its root path, found in the scene."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..core.conditions import shot_steps
+from ..core.errors import InputError
+from ..core.progress import drained
+from ..core.solids import Mesh
+from ..director.surfaces import surface_points
+from .armature import character_scale, metres_per_unit
+from .path_sources import places_of
+from .properties import Settings, find_object, settings_of
+from .scene_reader import furniture_now, read_scene
+
+__all__ = ["Found", "find_furniture"]
+
+_NEAR = 1.5  # metres over the floor; the sensor reaches to 1 m
+_LOW, _HIGH = 0.07, 2.0  # metres over the floor: floors and rugs are lower, lamps and ceilings higher
+_SPACING = 0.1  # metres between points on a surface
+_LOOKS = 10  # places a second along the path
+_UNSEEN = {"CURVE", "SURFACE", "META", "FONT"}
+"""Types of objects that may have faces, but are no meshes."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """``taken``: names of what lies in ``collection`` now; ``warnings``: sentences about what the sensor cannot see."""
+
+    collection: bpy.types.Collection
+    taken: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Found:
+    """Link the visible meshes near the root's path into a collection "… Furniture", which becomes the character's.
+
+    The character, other armatures with what is parented to or deformed by them, and floors are none. What the collection holds
+    of an earlier time and is not near any more is unlinked again, as far as it lies in another collection as well.
+    ``InputError``: there is no root or nothing near it, or the scene cannot be read; nothing is changed then.
+    """
+    scene, own = context.scene, armature.dafnet
+    settings = settings_of(armature, scene, mode="FREE")
+    path = _path(context, settings, armature)
+    unit = metres_per_unit(scene)
+    size = character_scale(armature, unit)
+    candidates = [o for o in scene.objects if o not in _bodies(scene)]
+
+    made = bpy.data.collections.new(f"{armature.name} Furniture")
+    try:
+        for each in candidates:
+            if each.visible_get():
+                made.objects.link(each)
+        meshes = furniture_now(context, settings_of(armature, scene, furniture=made.name_full))
+        near = {name for name, found in meshes.items() if _is_near(found, path, size)}
+        if not near:
+            raise InputError(
+                f"No visible mesh lies within {_NEAR:g} m of the root's path; key the root to the furniture first."
+            )
+        for each in list(made.objects):
+            if each.name not in near:
+                made.objects.unlink(each)
+        read = read_scene(context, settings_of(armature, scene, mode="FREE", furniture=made.name_full))
+        warnings = read.warnings + drained(shot_steps(read.scene, read.controls)).warnings
+    except InputError:
+        bpy.data.collections.remove(made)
+        raise
+    return Found(_kept(scene, own, made), tuple(sorted(near)), (*_hidden(candidates, path, unit, size), *warnings))
+
+
+def _kept(
+    scene: bpy.types.Scene, own: bpy.types.PropertyGroup, made: bpy.types.Collection
+) -> bpy.types.Collection:
+    """The collection of an earlier time with what is in ``made``, else ``made`` itself, as the character's furniture."""
+    wanted = f"{own.id_data.name} Furniture"
+    earlier = own.furniture
+    if earlier is None or earlier == made or earlier.name != wanted or earlier.library:
+        scene.collection.children.link(made)
+        own.furniture = made
+        return made
+    for each in list(made.objects):
+        if each.name not in earlier.objects:
+            earlier.objects.link(each)
+    for each in list(earlier.objects):
+        if each.name not in made.objects and len(each.users_collection) > 1:
+            earlier.objects.unlink(each)
+    bpy.data.collections.remove(made)
+    return earlier
+
+
+def _path(context: bpy.types.Context, settings: Settings, armature: bpy.types.Object) -> np.ndarray:
+    """Places (N, 3) of the root during the shot, world, metres."""
+    scene = context.scene
+    if settings.root is None:
+        raise InputError(f"The character '{armature.name}' has no root; choose its root object in the DAFNet panel.")
+    step = max(1, round(scene.render.fps / scene.render.fps_base / _LOOKS))
+    frames = [*range(settings.frame_start, settings.frame_end, step), settings.frame_end]
+    return places_of(context, find_object(settings, settings.root, "root"), frames) * metres_per_unit(scene)
+
+
+def _bodies(scene: bpy.types.Scene) -> set[bpy.types.Object]:
+    """Characters and other armatures, with what is parented to them, deformed by them, or directs them."""
+    found: set[bpy.types.Object] = set()
+    for each in scene.objects:
+        if each.type == "ARMATURE":
+            own = each.dafnet
+            found |= {each, *each.children_recursive, own.root, own.head, own.hand_left, own.hand_right}
+        elif any(m.type == "ARMATURE" and m.object is not None for m in each.modifiers):
+            found.add(each)
+    return found
+
+
+def _is_near(meshes: list[Mesh], path: np.ndarray, size: float) -> bool:
+    """Whether something of the meshes stands over the floor beside the path (N, 3)."""
+    points = surface_points(meshes, _SPACING * size)
+    low, high = path.min(0) - _NEAR * size, path.max(0) + _NEAR * size
+    points = points[((points > low) & (points < high))[:, :2].all(1)]
+    points = np.unique(np.round(points / (0.5 * _SPACING * size)), axis=0) * (0.5 * _SPACING * size)
+    over = points[:, None, 2] - path[None, :, 2]
+    beside = np.linalg.norm(points[:, None, :2] - path[None, :, :2], axis=-1) < _NEAR * size
+    return bool((beside & (over > _LOW * size) & (over < _HIGH * size)).any())
+
+
+def _hidden(candidates: list[bpy.types.Object], path: np.ndarray, unit: float, size: float) -> list[str]:
+    """Sentences about what stands beside the path and is hidden, or no mesh."""
+    hidden: list[str] = []
+    others: list[str] = []
+    for each in candidates:
+        seen = each.visible_get()
+        if (each.type == "MESH" and seen) or each.type not in {"MESH", *_UNSEEN}:
+            continue
+        if each.type == "CURVE" and not (each.data.bevel_depth or each.data.extrude or each.data.bevel_object):
+            continue
+        matrix = np.array(each.matrix_world, float)
+        corners = (np.array(each.bound_box) @ matrix[:3, :3].T + matrix[:3, 3]) * unit
+        low, high = corners.min(0), corners.max(0)
+        beyond = np.maximum(np.maximum(low[:2] - path[:, :2], path[:, :2] - high[:2]), 0.0)
+        beside = np.linalg.norm(beyond, axis=1) < _NEAR * size
+        if (beside & (high[2] - path[:, 2] > _LOW * size) & (low[2] - path[:, 2] < _HIGH * size)).any():
+            (others if seen else hidden).append(f"'{each.name}'")
+    out = []
+    if hidden:
+        out.append(f"Hidden beside the path, so not there for the character: {', '.join(hidden)}; show what is to count.")
+    if others:
+        out.append(f"No meshes, so not there for the character: {', '.join(others)}; convert what is to count.")
+    return out

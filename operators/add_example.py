@@ -1,0 +1,46 @@
+"""Add an example scene."""
+
+from typing import Any
+
+import bpy
+from bpy.props import EnumProperty
+
+from ..dafnet_addon.blender.examples import EXAMPLES, add_example
+from .generate import DAFNET_OT_generate
+from .reporting import reported
+
+__all__ = ["DAFNET_OT_add_example"]
+
+
+class DAFNET_OT_add_example(bpy.types.Operator):
+    """Add furniture at the 3D cursor and a character that uses it, keyed and ready to generate"""
+
+    bl_idname = "dafnet.add_example"
+    bl_label = "Add DAFNet Example"
+    bl_options = {"REGISTER", "UNDO"}
+
+    kind: EnumProperty(
+        name="Example", items=[(kind, example.label, example.description) for kind, example in EXAMPLES.items()],
+    )
+
+    @classmethod
+    def description(cls, _context: bpy.types.Context, properties: Any) -> str:
+        """The example's own tooltip."""
+        return f"{EXAMPLES[properties.kind].description}: furniture at the 3D cursor and a character, ready to generate"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """A new armature needs object mode."""
+        if DAFNET_OT_generate.progress is not None:
+            cls.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
+            return False
+        cls.poll_message_set("Leave the current mode for object mode first")
+        return context.mode == "OBJECT"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Add it."""
+        with reported(self):
+            made = add_example(context, self.kind)
+            self.report({"INFO"}, f"'{made.name}' is ready: press Generate in the sidebar's tab DAFNet.")
+            return {"FINISHED"}
+        return {"CANCELLED"}

@@ -1,0 +1,34 @@
+"""Add the targets of head and hands that a character lacks."""
+
+import bpy
+
+from ..dafnet_addon.blender.armature import sent
+from ..dafnet_addon.blender.targets import add_targets, missing_targets
+from .follow_path import may_direct
+from .reporting import reported
+
+__all__ = ["DAFNET_OT_add_targets"]
+
+
+class DAFNET_OT_add_targets(bpy.types.Operator):
+    """Add empties for head and hands where the character has none, where they are now; mode EE follows them"""
+
+    bl_idname = "dafnet.add_targets"
+    bl_label = "Add Targets"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a character that lacks one."""
+        if not may_direct(cls, context):
+            return False
+        cls.poll_message_set("Head and hands have their targets already")
+        return bool(missing_targets(context, sent(context)[0]))
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Add them."""
+        with reported(self):
+            made = add_targets(context, sent(context)[0])
+            self.report({"INFO"}, f"Added {', '.join(each.name for each in made)}.")
+            return {"FINISHED"}
+        return {"CANCELLED"}

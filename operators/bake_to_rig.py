@@ -1,0 +1,48 @@
+"""Bake what a character plays onto the animator's own rig."""
+
+from typing import Any
+
+import bpy
+
+from ..dafnet_addon.blender.onto_rig import bake_onto_rig
+from ..dafnet_addon.blender.rig_properties import character_for, map_of, rig_of
+from .generate import DAFNET_OT_generate
+from .reporting import reported
+
+__all__ = ["DAFNET_OT_bake_to_rig"]
+
+_FAR = 0.02
+"""Metres of mean error at wrists or ankles above which the user is warned."""
+
+
+class DAFNET_OT_bake_to_rig(bpy.types.Operator):
+    """Bake the motion that the character plays, your edits included, into a new action on this armature"""
+
+    bl_idname = "dafnet.bake_to_rig"
+    bl_label = "Bake to Rig"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """An own rig is active, and none is being generated."""
+        if DAFNET_OT_generate.progress is not None:
+            cls.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
+            return False
+        cls.poll_message_set("Select the armature of your rig, in object or pose mode")
+        return rig_of(context) is not None and context.mode in {"OBJECT", "POSE"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Bake, and say how near the result is."""
+        rig: Any = rig_of(context)
+        own = rig.dafnet_rig
+        with reported(self):
+            baked = bake_onto_rig(
+                context, character_for(context, rig), rig, map_of(rig), root_motion=own.root_motion, limbs=own.limbs,
+            )
+            errors = ", ".join(f"{part} {100 * mean:.1f} ({100 * most:.1f})" for part, (mean, most) in baked.errors.items())
+            if max(baked.errors["wrists"][0], baked.errors["ankles"][0]) > _FAR:
+                self.report({"WARNING"}, "Hands or feet are off by more than 2 cm; the rig's limbs are short for this motion")
+            size = "" if baked.ratio == 1.0 else f", motion scaled by {baked.ratio:.2f}"
+            self.report({"INFO"}, f"'{baked.action.name}': off by cm, mean (largest): {errors}{size}")
+            return {"FINISHED"}
+        return {"CANCELLED"}

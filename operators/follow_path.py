@@ -1,0 +1,134 @@
+"""Key the character's root from a curve, something that moves, or points on the floor."""
+
+from collections.abc import Callable
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty
+
+from ..dafnet_addon.blender.armature import sent
+from ..dafnet_addon.blender.path_sources import (
+    along_curve,
+    as_moved,
+    chosen,
+    floor_points,
+    is_curve,
+    may_move,
+    through_points,
+)
+from ..dafnet_addon.blender.walking import Walk
+from ..dafnet_addon.core.trails import FASTEST, SLOWEST
+from .generate import DAFNET_OT_generate
+from .reporting import reported
+
+__all__ = ["DAFNET_OT_root_from_object", "DAFNET_OT_walk_along_curve", "DAFNET_OT_walk_through_points", "may_direct"]
+
+_SPEED = "Of walking, in metres a second for a body of 1.75 m"
+
+
+def may_direct(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Whether there is a character to direct in object mode and none is being generated; says what is missing."""
+    if DAFNET_OT_generate.progress is not None:
+        cls.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
+    elif context.mode != "OBJECT":
+        cls.poll_message_set("Leave the current mode for object mode first")
+    elif (character := sent(context)[0]) is None:
+        cls.poll_message_set("Add a character, or select one")
+    elif character.dafnet.root is None:
+        cls.poll_message_set("Choose the character's root")
+    else:
+        return True
+    return False
+
+
+def _has(
+    cls: type[bpy.types.Operator], context: bpy.types.Context, fits: Callable[[bpy.types.Object], bool], missing: str
+) -> bool:
+    if not may_direct(cls, context):
+        return False
+    cls.poll_message_set(missing)
+    return chosen(context, fits)[1] is not None
+
+
+def _told(operator: bpy.types.Operator, made: Walk) -> set[str]:
+    ended = ", the range now ends there" if made.extended else ""
+    operator.report({"INFO"}, f"Keyed the root from frame {made.first} to {made.last}{ended}.")
+    return {"FINISHED"}
+
+
+class DAFNET_OT_walk_along_curve(bpy.types.Operator):
+    """Key the character's root along the selected curve from the current frame on; keys after that are replaced"""
+
+    bl_idname = "dafnet.walk_along_curve"
+    bl_label = "Walk along Curve"
+    bl_options = {"REGISTER", "UNDO"}
+
+    speed: FloatProperty(name="Speed", default=1.1, min=SLOWEST, max=FASTEST, description=_SPEED)
+    seconds: FloatProperty(
+        name="Stay", default=1.0, min=0.0, max=600.0, subtype="TIME_ABSOLUTE", description="Seconds of rest at the end",
+    )
+    keep_facing: BoolProperty(name="Keep Facing", description="Look where it looks now all the way, not along the curve")
+    backwards: BoolProperty(name="Backwards", description="Walk from the curve's end to its beginning")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a character to send, and a curve."""
+        return _has(cls, context, is_curve, "Select the one curve to walk along, with the character or alone")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Key the walk."""
+        character, curve = chosen(context, is_curve)
+        with reported(self):
+            return _told(self, along_curve(
+                context, character, curve, speed=self.speed, seconds=self.seconds, keep_facing=self.keep_facing,
+                backwards=self.backwards,
+            ))
+        return {"CANCELLED"}
+
+
+class DAFNET_OT_walk_through_points(bpy.types.Operator):
+    """Key the root on through the selected empties in the order of their names; where none is selected, to the 3D cursor"""
+
+    bl_idname = "dafnet.walk_through_points"
+    bl_label = "Walk through Points"
+    bl_options = {"REGISTER", "UNDO"}
+
+    speed: FloatProperty(name="Speed", default=1.1, min=SLOWEST, max=FASTEST, description=_SPEED)
+    seconds: FloatProperty(
+        name="Stay", default=1.0, min=0.0, max=600.0, subtype="TIME_ABSOLUTE", description="Seconds of rest at the last one",
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a character to send."""
+        return may_direct(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Key the walk."""
+        with reported(self):
+            return _told(self, through_points(
+                context, sent(context)[0], floor_points(context), speed=self.speed, seconds=self.seconds,
+            ))
+        return {"CANCELLED"}
+
+
+class DAFNET_OT_root_from_object(bpy.types.Operator):
+    """Key the root where the selected moving object goes, in the same frames; keys from there on are replaced"""
+
+    bl_idname = "dafnet.root_from_object"
+    bl_label = "Root from Object"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a character to send, and something that moves."""
+        return _has(cls, context, may_move, "Select the one animated object to follow, with the character or alone")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Key what it does."""
+        character, source = chosen(context, may_move)
+        with reported(self):
+            made, warning = as_moved(context, character, source)
+            if warning:
+                self.report({"WARNING"}, warning)
+            return _told(self, made)
+        return {"CANCELLED"}

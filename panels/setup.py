@@ -1,0 +1,75 @@
+"""The way from an empty scene to something to generate: a path for the root, furniture, targets."""
+
+import bpy
+
+from ..dafnet_addon.blender.armature import sent
+from ..dafnet_addon.blender.examples import EXAMPLES
+from ..dafnet_addon.blender.path_sources import chosen, floor_points, is_curve, may_move
+from ..operators.add_character import DAFNET_OT_add_character
+from ..operators.add_example import DAFNET_OT_add_example
+from ..operators.add_targets import DAFNET_OT_add_targets
+from ..operators.find_furniture import DAFNET_OT_find_furniture
+from ..operators.follow_path import (
+    DAFNET_OT_root_from_object,
+    DAFNET_OT_walk_along_curve,
+    DAFNET_OT_walk_through_points,
+)
+from ..operators.generate import DAFNET_OT_generate
+from ..operators.walk_to import DAFNET_OT_walk_to
+from .main import CharacterPanel
+
+__all__ = ["DAFNET_MT_add", "DAFNET_PT_setup", "add_menu"]
+
+
+class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
+    """Let the character go somewhere, and tell it what is there"""
+
+    bl_label = "Set Up"
+    bl_idname = "DAFNET_PT_setup"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is a character to direct: the active one, one that is selected beside its goal, or the only one."""
+        return DAFNET_OT_generate.progress is None and sent(context)[0] is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the buttons, with the names of what they would take."""
+        _, seat = sent(context)
+        curve, source = (chosen(context, fits)[1] for fits in (is_curve, may_move))
+        points = floor_points(context)
+        column = self.layout.column(align=True)
+        row = column.row(align=True)
+        row.enabled = seat is not None
+        text = f"Sit on {seat.name}" if seat else "Sit on Selected"
+        row.operator(DAFNET_OT_walk_to.bl_idname, text=text, icon="TRACKING_FORWARDS").goal = "SEAT"
+        column.operator(DAFNET_OT_walk_to.bl_idname, text="Walk to Cursor", icon="PIVOT_CURSOR").goal = "CURSOR"
+        text = f"Walk along {curve.name}" if curve else DAFNET_OT_walk_along_curve.bl_label
+        column.operator(DAFNET_OT_walk_along_curve.bl_idname, text=text, icon="CURVE_DATA")
+        text = f"Walk through {len(points)} Points" if len(points) > 1 else DAFNET_OT_walk_through_points.bl_label
+        column.operator(DAFNET_OT_walk_through_points.bl_idname, text=text, icon="EMPTY_AXIS")
+        text = f"Root from {source.name}" if source else DAFNET_OT_root_from_object.bl_label
+        column.operator(DAFNET_OT_root_from_object.bl_idname, text=text, icon="CON_FOLLOWPATH")
+        column = self.layout.column(align=True)
+        column.operator(DAFNET_OT_find_furniture.bl_idname, icon="VIEWZOOM")
+        column.operator(DAFNET_OT_add_targets.bl_idname, icon="EMPTY_ARROWS")
+
+
+class DAFNET_MT_add(bpy.types.Menu):
+    """Characters and example scenes"""
+
+    bl_idname = "DAFNET_MT_add"
+    bl_label = "DAFNet"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Draw what can be added."""
+        layout = self.layout
+        layout.operator_context = "INVOKE_REGION_WIN"
+        layout.operator(DAFNET_OT_add_character.bl_idname, text="Character", icon="ARMATURE_DATA")
+        layout.separator()
+        for kind, example in EXAMPLES.items():
+            layout.operator(DAFNET_OT_add_example.bl_idname, text=example.label).kind = kind
+
+
+def add_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """Draw the entry in the 3D view's Add menu."""
+    menu.layout.menu(DAFNET_MT_add.bl_idname, icon="ARMATURE_DATA")

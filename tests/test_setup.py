@@ -1,0 +1,420 @@
+"""From an empty scene to a take: root paths from curves, objects and points, furniture found, targets, and the examples."""
+
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dafnet_addon.core.errors import InputError
+from dafnet_addon.core.paths import Stop
+from dafnet_addon.core.trails import followed, trail
+
+
+def test_a_straight_line_is_walked_in_the_time_that_people_take() -> None:
+    made = trail(np.array([[0.0, 0.0], [0.0, 1.0], [0.0, 4.0]]), speed=1.2, fps=30.0, seconds=1.0, floor=0.5)
+    assert abs(len(made.path) / 30 - (4.0 / 1.2 + 0.6 * (1 / 1.4 + 1 / 1.2) + 1.0)) < 0.1
+    speed = np.linalg.norm(np.diff(made.path.position, axis=0), axis=1) * 30
+    assert speed.max() < 1.21 and speed[0] < 0.2 and abs(speed[60] - 1.2) < 0.02 and (speed[-29:] == 0).all()
+    assert np.abs(made.path.yaw).max() < 1e-6 and np.abs(made.path.position[:, 0]).max() < 1e-6
+    assert (made.path.position[:, 2] == 0.5).all() and np.allclose(made.path.position[-1], (0, 4, 0.5), atol=1e-3)
+
+
+def test_corners_are_rounded_and_taken_slowly() -> None:
+    corner = trail(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0]]), speed=1.4, fps=60.0)
+    rate = np.abs(np.diff(corner.path.yaw)) * 60
+    speed = np.linalg.norm(np.diff(corner.path.position, axis=0), axis=1) * 60
+    assert np.degrees(rate.max()) < 125 and speed[np.argmax(rate)] < 0.9
+    assert abs(corner.path.yaw[0] + np.pi / 2) < 0.01 and abs(corner.path.yaw[-1]) < 0.01
+    off = np.abs(corner.path.position[:, :2] - (3.0, 0.0)).min(1)
+    assert off.max() < 0.12, "it keeps to the line"
+
+
+def test_one_may_start_elsewhere_or_keep_looking_where_one_looks() -> None:
+    line = np.array([[0.0, 1.0], [0.0, 4.0]])
+    turned = trail(line, Stop((0.0, 0.0), np.pi, 0.2), fps=30.0)
+    assert abs(turned.path.yaw[0] - np.pi) < 1e-9 and abs(np.cos(turned.path.yaw[-1]) - 1.0) < 1e-6
+    assert np.allclose(turned.path.position[0, :2], 0.0) and np.degrees(np.abs(np.diff(turned.path.yaw)).max() * 30) < 185
+    kept = trail(line, yaw=1.0)
+    assert np.allclose(kept.path.yaw, 1.0)
+
+
+@pytest.mark.parametrize("points, speed, words", [
+    ([[0.0, 0.0], [0.3, 0.0]], 1.0, "only 0.30 m long"), ([[0.0, 0.0]], 1.0, "only 0.00 m"),
+    ([[0.0, 0.0], [np.nan, 0.0]], 1.0, "not a number"), ([[0.0, 0.0], [2.0, 0.0]], 5.0, "People walk at 0.4 to 3.0"),
+])
+def test_lines_that_cannot_be_walked_are_refused(points: list[list[float]], speed: float, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        trail(np.array(points), speed=speed)
+
+
+def test_what_moved_becomes_a_root_that_looks_where_it_goes() -> None:
+    rng = np.random.default_rng(0)
+    there, back = np.linspace(0.0, 3.0, 91)[:, None] * (1.0, 0.0), np.linspace(3.0, 0.0, 91)[:, None] * (1.0, 0.0)
+    way = np.concatenate([np.zeros((60, 2)), there, np.tile([3.0, 0.0], (75, 1)), back])
+    made = followed(way + rng.normal(scale=0.003, size=way.shape), 30.0, yaw=0.5)
+    assert len(made.path) == len(way) and np.abs(made.path.position[:, :2] - way).max() < 0.09
+    assert [(abs(rest.first - a) < 12, abs(rest.last - b) < 12) for rest, a, b in zip(
+        made.rests, (0, 150), (60, 225), strict=True)] == [(True, True)] * 2
+    yaw = made.path.yaw
+    assert abs(yaw[5] - 0.5) < 0.05 and abs(yaw[100] + np.pi / 2) < 0.05, "held, then turned"
+    assert abs(np.cos(yaw[-20] - np.pi / 2) - 1.0) < 0.01 and np.degrees(np.abs(np.diff(yaw)).max() * 30) < 161
+    rest = made.rests[1]
+    assert np.abs(np.diff(made.path.position[rest.first : rest.last + 1], axis=0)).max() < 5e-3
+    with pytest.raises(InputError, match="hardly moves"):
+        followed(np.zeros((50, 2)), 30.0)
+
+
+class Set:
+    """A character of 1.75 m at the origin of an empty scene of 30 frames a second."""
+
+    def __init__(self, bpy: ModuleType, addon: Any) -> None:
+        self.bpy, self.addon, self.scene = bpy, addon, bpy.context.scene
+        self.scene.render.fps, self.scene.frame_end = 30, 40
+        assert bpy.ops.dafnet.add_character(name="Ann") == {"FINISHED"}
+        self.ann = bpy.context.object
+        self.root = self.ann.dafnet.root
+
+    def curve(self, points: list[tuple[float, float, float]], kind: str = "POLY", name: str = "Path") -> Any:
+        data = self.bpy.data.curves.new(name, "CURVE")
+        data.dimensions = "3D"
+        spline = data.splines.new(kind)
+        if kind == "BEZIER":
+            spline.bezier_points.add(len(points) - 1)
+            for point, place in zip(spline.bezier_points, points, strict=True):
+                point.co, point.handle_left_type, point.handle_right_type = place, "AUTO", "AUTO"
+        else:
+            spline.points.add(len(points) - 1)
+            for point, place in zip(spline.points, points, strict=True):
+                point.co = (*place, 1.0)
+            spline.use_endpoint_u = True
+        return self.add(self.bpy.data.objects.new(name, data))
+
+    def add(self, made: Any) -> Any:
+        self.scene.collection.objects.link(made)
+        return made
+
+    def empty(self, name: str, place: tuple[float, float, float]) -> Any:
+        made = self.add(self.bpy.data.objects.new(name, None))
+        made.location = place
+        self.bpy.context.view_layer.update()
+        return made
+
+    def box(self, name: str, low: tuple[float, float, float], high: tuple[float, float, float]) -> Any:
+        mesh = self.bpy.data.meshes.new(name)
+        corners = [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+        mesh.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
+        return self.add(self.bpy.data.objects.new(name, mesh))
+
+    def select(self, *objects: Any) -> None:
+        """The first one is active."""
+        for o in self.scene.objects:
+            o.select_set(o in objects)
+        self.bpy.context.view_layer.objects.active = objects[0] if objects else None
+
+    def place(self, frame: int) -> np.ndarray:
+        self.scene.frame_set(frame)
+        return np.array([*self.root.location, self.root.rotation_euler[2]])
+
+    def path(self, first: int, last: int) -> np.ndarray:
+        return np.array([self.place(frame) for frame in range(first, last + 1)])
+
+    def key(self, frame: int, x: float, y: float, yaw: float = 0.0) -> None:
+        self.root.location, self.root.rotation_euler = (x, y, 0.0), (0.0, 0.0, yaw)
+        for name in ("location", "rotation_euler"):
+            self.root.keyframe_insert(name, frame=frame)
+
+
+@pytest.fixture
+def stage(blender: ModuleType, addon: Any) -> Set:
+    return Set(blender, addon)
+
+
+@pytest.mark.parametrize("kind", ["POLY", "BEZIER", "NURBS"])
+def test_a_curve_is_walked_along_on_the_floor(stage: Set, kind: str) -> None:
+    curve = stage.curve([(1.0, 0.0, 0.3), (1.0, 2.0, 0.9), (1.0, 4.0, 0.3)], kind)
+    stage.scene.frame_set(11)
+    stage.select(curve)
+    assert stage.bpy.ops.dafnet.walk_along_curve(speed=1.2, seconds=1.0) == {"FINISHED"}
+    assert stage.scene.frame_current == 11
+    end = stage.scene.frame_end
+    assert abs((end - 10) / 30 - (4.0 / 1.2 + 0.6 * (1 / 1.4 + 1 / 1.2) + 1.0)) < 0.3, "the curve rises, the floor does not"
+    path = stage.path(11, end)
+    assert np.allclose(path[0], (1, 0, 0, 0), atol=1e-3) and np.allclose(path[-1], (1, 4, 0, 0), atol=1e-3)
+    assert np.abs(path[:, [0, 2, 3]] - (1, 0, 0)).max() < 0.01 and np.diff(path[:, 1]).min() > -1e-3
+
+
+def test_a_curve_with_a_bevel_and_a_transform_counts_as_its_line(stage: Set) -> None:
+    curve = stage.curve([(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)])
+    curve.data.bevel_depth, curve.rotation_euler = 0.05, (0.0, 0.0, np.pi / 2)
+    before = len(stage.bpy.data.objects), len(stage.bpy.data.curves)
+    stage.select(stage.ann, curve)
+    assert stage.bpy.ops.dafnet.walk_along_curve(backwards=True, keep_facing=True) == {"FINISHED"}
+    path = stage.path(1, stage.scene.frame_end)
+    assert np.allclose(path[0], (0, 3, 0, 0), atol=1e-3) and np.allclose(path[-1], 0.0, atol=1e-3), "it goes backwards"
+    assert (len(stage.bpy.data.objects), len(stage.bpy.data.curves)) == before
+
+
+def test_what_was_keyed_before_the_start_stays_and_what_comes_after_goes(stage: Set) -> None:
+    for frame, x in ((1, 0.0), (13, 0.4), (30, 1.0), (60, 5.0)):
+        stage.key(frame, x, 0.1 * x, 0.2 * x)
+    before = stage.path(1, 40)
+    stage.scene.frame_set(40)
+    stage.select(stage.ann, stage.curve([(3.0, 2.0, 0.0), (3.0, 6.0, 0.0)]))
+    assert stage.bpy.ops.dafnet.walk_along_curve() == {"FINISHED"}
+    assert np.allclose(stage.path(1, 40), before, atol=1e-4)
+    path = stage.path(40, stage.scene.frame_end)
+    assert np.allclose(path[-1, :2], (3.0, 6.0), atol=1e-3)
+    assert np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1).max() < 0.06 and np.abs(np.diff(path[:, 3])).max() < 0.12
+    near = np.linalg.norm(path[:, :2] - (3.0, 2.0), axis=1).min()
+    assert near < 0.2, "first it goes to the curve"
+
+
+def test_an_object_that_has_only_places_becomes_a_root(stage: Set) -> None:
+    mover = stage.empty("Mover", (0.0, 0.0, 1.0))
+    for frame, x, y in ((20, 0.0, 0.0), (50, 0.0, 0.0), (140, 3.0, 0.0), (200, 3.0, 0.0), (290, 3.0, 3.0)):
+        mover.location = (x, y, 1.4)
+        mover.keyframe_insert("location", frame=frame)
+    stage.key(5, 0.0, -1.0, 0.3)
+    stage.select(mover)
+    assert stage.bpy.ops.dafnet.root_from_object() == {"FINISHED"}
+    assert stage.scene.frame_end == 290 and np.allclose(stage.place(5), (0, -1, 0, 0.3), atol=1e-5)
+    assert np.allclose(stage.place(19), (0, -1, 0, 0.3), atol=1e-4), "it rests where it was"
+    path = stage.path(20, 290)
+    assert np.allclose(path[[0, -1], :3], [(0, 0, 0), (3, 3, 0)], atol=0.02)
+    assert abs(path[75, 3] + np.pi / 2) < 0.1 and abs(path[-10, 3]) < 0.1 and np.abs(np.diff(path[:, 3])).max() * 30 < 3.0
+    assert np.ptp(path[135:165, :2], axis=0).max() < 0.02, "it stands"
+
+
+def test_selected_empties_are_walked_through_in_the_order_of_their_names(stage: Set) -> None:
+    points = [stage.empty(name, place) for name, place in (
+        ("Point.10", (-2.0, 3.0, 0.0)), ("Point.2", (2.0, 3.0, 1.0)), ("Point.1", (2.0, 0.5, 0.0)))]
+    furniture = stage.bpy.data.collections.new("Furniture")
+    stage.scene.collection.children.link(furniture)
+    block = stage.box("Block", (-0.4, 2.5, 0.0), (0.4, 3.4, 1.0))
+    furniture.objects.link(block)
+    stage.ann.dafnet.furniture = furniture
+    stage.select(stage.ann, *points)
+    assert stage.bpy.ops.dafnet.walk_through_points(speed=1.3, seconds=0.5) == {"FINISHED"}
+    path = stage.path(1, stage.scene.frame_end)
+    nearest = [np.linalg.norm(path[:, :2] - p, axis=1) for p in ((2.0, 0.5), (2.0, 3.0), (-2.0, 3.0))]
+    times = [int(np.argmin(d)) for d in nearest]
+    assert max(d.min() for d in nearest) < 0.3 and times == sorted(times)
+    speed = np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1) * 30
+    assert speed[times[0] - 5 : times[1] + 5].min() > 0.25, "no rests"
+    inside = np.maximum(np.abs(path[:, :2] - (0.0, 2.95)) - (0.4, 0.45), 0.0)
+    assert np.linalg.norm(inside, axis=1).min() > 0.2
+    stage.select(stage.ann)
+    stage.scene.cursor.location = (-2.0, 0.0, 0.0)
+    assert stage.bpy.ops.dafnet.walk_through_points() == {"FINISHED"}
+    assert np.allclose(stage.place(stage.scene.frame_end)[:2], (-2.0, 0.0), atol=1e-3), "none is selected: the cursor"
+
+
+def test_what_cannot_be_walked_changes_nothing(stage: Set) -> None:
+    bpy = stage.bpy
+    short, line = stage.curve([(0.0, 0.0, 0.0), (0.2, 0.0, 0.0)], name="Short"), stage.curve([(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)])
+    still = stage.empty("Still", (1.0, 0.0, 0.0))
+    still.keyframe_insert("location", frame=1)
+
+    def refused(words: str, operator: Any) -> None:
+        with pytest.raises(RuntimeError, match=words):
+            operator()
+        assert not stage.root.animation_data or not stage.root.animation_data.action
+        assert stage.scene.frame_end == 40
+
+    stage.select(short)
+    refused("Short' is only 0.20 m long", bpy.ops.dafnet.walk_along_curve)
+    with pytest.raises(Exception, match="is not a curve"):
+        stage.addon("dafnet_addon.blender.path_sources").along_curve(bpy.context, stage.ann, still)
+    stage.select(still)
+    refused("hardly moves", bpy.ops.dafnet.root_from_object)
+    assert not bpy.ops.dafnet.walk_along_curve.poll()
+    stage.select(line)
+    assert bpy.ops.dafnet.walk_along_curve.poll() and not bpy.ops.dafnet.root_from_object.poll()
+    stage.root.parent = still
+    refused("follows something", bpy.ops.dafnet.walk_along_curve)
+    stage.root.parent = None
+    stage.ann.dafnet.root = None
+    assert not any(getattr(bpy.ops.dafnet, name).poll() for name in ("walk_along_curve", "find_furniture", "add_targets"))
+    for o in list(stage.scene.objects):
+        if o.type == "ARMATURE":
+            bpy.data.objects.remove(o)
+    assert not bpy.ops.dafnet.walk_along_curve.poll() and not bpy.ops.dafnet.walk_through_points.poll(), "no character"
+
+
+def test_a_generated_walk_keeps_to_the_curve(stage: Set) -> None:
+    stage.select(stage.ann, stage.curve([(0.0, 0.0, 0.0), (1.5, 1.5, 0.0), (0.0, 3.0, 0.0), (1.5, 5.0, 0.0)], "BEZIER"))
+    assert stage.bpy.ops.dafnet.walk_along_curve() == {"FINISHED"}
+    stage.select(stage.ann)
+    assert stage.bpy.ops.dafnet.generate() == {"FINISHED"}
+    sliding = stage.ann.dafnet.takes[0].action.dafnet.sliding
+    off = []
+    for frame in range(1, stage.scene.frame_end + 1, 5):
+        root = stage.place(frame)
+        off.append(np.linalg.norm(np.array(stage.ann.matrix_world @ stage.ann.pose.bones["pelvis"].head)[:2] - root[:2]))
+    assert np.mean(off) < 0.01 and max(off) < 0.03
+    stage.root.animation_data_clear()
+    stage.root.location, stage.root.rotation_euler, stage.scene.frame_end = (0, 0, 0), (0, 0, 0), 40
+    stage.scene.frame_set(1)
+    points = [stage.empty(f"Point {k}", place) for k, place in enumerate([(1.5, 1.5, 0), (0, 3, 0), (1.5, 5, 0)])]
+    stage.select(stage.ann, *points)
+    assert stage.bpy.ops.dafnet.walk_through_points(seconds=1.0) == {"FINISHED"}
+    assert stage.bpy.ops.dafnet.generate() == {"FINISHED"}
+    assert sliding < 1.25 * stage.ann.dafnet.takes[1].action.dafnet.sliding, "feet slide as on any other walk"
+
+
+def test_find_furniture_takes_what_stands_beside_the_path(stage: Set) -> None:
+    stage.key(1, 0.0, 0.0)
+    stage.key(40, 0.0, 3.0)
+    near = [stage.box("Chair", (0.8, 1.0, 0.0), (1.3, 1.5, 0.5)), stage.box("Shelf", (-1.6, 2.8, 0.0), (-1.2, 3.4, 1.9))]
+    stage.box("Floor", (-9.0, -9.0, -0.1), (9.0, 9.0, 0.0))
+    stage.box("Lamp", (0.0, 1.0, 2.3), (0.3, 1.3, 2.5))
+    stage.box("Far", (3.0, 1.0, 0.0), (3.4, 1.4, 1.0))
+    hidden = stage.box("Hidden", (0.5, 2.0, 0.0), (0.9, 2.4, 0.6))
+    stage.bpy.context.view_layer.update()
+    hidden.hide_set(True)
+    stage.scene.cursor.location = (0.6, 0.6, 0.0)
+    stage.bpy.ops.dafnet.add_character(name="Bob")
+    stage.select(stage.ann)
+    found = stage.addon("dafnet_addon.blender.surroundings").find_furniture(stage.bpy.context, stage.ann)
+    assert found.taken == ("Chair", "Shelf") and {o.name for o in found.collection.objects} == {"Chair", "Shelf"}
+    assert stage.ann.dafnet.furniture == found.collection and found.collection.name == "Ann Furniture"
+    assert all(stage.scene.collection in o.users_collection for o in near), "linked, not moved"
+    assert any("'Hidden'" in sentence for sentence in found.warnings)
+    stage.bpy.data.objects["Far"].location.x = -1.6
+    assert stage.bpy.ops.dafnet.find_furniture() == {"FINISHED"}
+    assert {o.name for o in found.collection.objects} == {"Chair", "Shelf", "Far"}, "the same collection again"
+    stage.root.animation_data_clear()
+    stage.root.location = (40.0, 0.0, 0.0)
+    with pytest.raises(RuntimeError, match="No visible mesh lies within"):
+        stage.bpy.ops.dafnet.find_furniture()
+    assert len(found.collection.objects) == 3 and len(stage.bpy.data.collections) == 3
+
+
+def test_missing_targets_are_added_where_head_and_hands_are(stage: Set) -> None:
+    assert not stage.bpy.ops.dafnet.add_targets.poll(), "it has all"
+    stage.ann.dafnet.hand_right = None
+    stage.bpy.data.objects.remove(stage.ann.dafnet.head)
+    stage.ann.pose.bones["right_shoulder"].rotation_quaternion = (0.9, 0.3, 0.2, 0.1)
+    stage.ann.location.x = 2.0
+    kept = stage.ann.dafnet.hand_left
+    assert stage.bpy.ops.dafnet.add_targets() == {"FINISHED"}
+    own = stage.ann.dafnet
+    assert own.hand_left == kept and own.head is not None
+    for bone, target in (("right_wrist", own.hand_right), ("head", own.head)):
+        assert (target.location - stage.ann.matrix_world @ stage.ann.pose.bones[bone].head).length < 1e-5
+        assert target.name in stage.ann.users_collection[0].objects
+
+
+def joints(stage: Any, character: Any, frames: range, name: str) -> np.ndarray:
+    found = []
+    for frame in frames:
+        stage.scene.frame_set(frame)
+        found.append(np.array(character.matrix_world @ character.pose.bones[name].head))
+    return np.array(found)
+
+
+@pytest.fixture
+def bare(blender: ModuleType, addon: Any) -> Set:
+    """An empty scene with its cursor off the middle, at 24 frames a second."""
+    made = Set(blender, addon)
+    blender.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    made.scene = blender.context.scene
+    made.scene.cursor.location = (3.0, -2.0, 0.5)
+    return made
+
+
+MIDDLE = np.array([3.0, -2.0, 0.5])
+
+
+def example(stage: Set, kind: str) -> Any:
+    """Add and generate it; its character."""
+    assert stage.bpy.ops.dafnet.add_example(kind=kind) == {"FINISHED"}
+    made = stage.bpy.context.object
+    assert tuple(stage.scene.cursor.location) == tuple(MIDDLE) and stage.scene.frame_end > 250
+    assert stage.bpy.ops.dafnet.generate() == {"FINISHED"}
+    assert made.dafnet.takes[0].action.dafnet.collisions < 1.1
+    return made
+
+
+def test_the_desk_example_sits_and_writes(bare: Set) -> None:
+    made, end = example(bare, "DESK"), bare.scene.frame_end
+    pelvis = joints(bare, made, range(end - 60, end + 1, 10), "pelvis") - MIDDLE
+    assert np.abs(pelvis[:, :2]).max() < 0.05 and np.abs(pelvis[:, 2] - 0.57).max() < 0.05
+    hand = joints(bare, made, range(end - 60, end + 1, 3), "right_wrist") - MIDDLE
+    assert np.abs(hand[:, 2] - 0.785).max() < 0.04 and np.ptp(hand[:, 0]) > 0.08, "over the desk, along a line"
+    assert {o.name for o in made.dafnet.furniture.objects} == {"Chair", "Desk"}
+
+
+def test_the_whiteboard_example_writes_at_the_board(bare: Set) -> None:
+    made = example(bare, "WHITEBOARD")
+    writes = []
+    for frame in range(1, bare.scene.frame_end + 1, 2):
+        bare.scene.frame_set(frame)
+        if made.dafnet.mode == "EE":
+            writes.append((np.array(made.matrix_world @ made.pose.bones["right_wrist"].head) - MIDDLE,
+                           np.array(made.dafnet.hand_right.matrix_world.translation) - MIDDLE))
+    hand, asked = np.array(writes)[8:-8].transpose(1, 0, 2)
+    assert np.linalg.norm(hand - asked, axis=1).mean() < 0.02 and len(hand) > 50
+    assert (np.abs(hand[:, 1] - 0.36) < 0.1).all() and np.ptp(hand[:, 0]) > 0.25 and np.ptp(hand[:, 2]) > 0.12
+    assert made.dafnet.mode == "FREE" and made.dafnet.head_influence == 0.0
+
+
+def test_the_sofa_example_sits_and_gets_up(bare: Set) -> None:
+    made = example(bare, "SOFA")
+    height = joints(bare, made, range(1, bare.scene.frame_end + 1, 4), "pelvis")[:, 2] - MIDDLE[2]
+    assert height[0] > 0.8 and height[-1] > 0.8 and 0.42 < height.min() < 0.6 and (height < 0.62).sum() * 4 > 60
+
+
+def test_the_bed_example_lies_down(bare: Set) -> None:
+    made, end = example(bare, "BED"), bare.scene.frame_end
+    head, pelvis, left, right = (joints(bare, made, range(end - 40, end + 1, 10), name) - MIDDLE for name in (
+        "head", "pelvis", "left_ankle", "right_ankle"))
+    assert np.abs(pelvis - (0.0, -0.3, 0.60)).max() < 0.08
+    assert (head[:, 0] > 0.5).all() and (head[:, 2] < 0.72).all(), "on the pillow"
+    for ankle in (left, right):
+        assert (ankle[:, 0] < -0.6).all() and (ankle[:, 2] > 0.46).all(), "the legs are on the bed"
+
+
+def test_examples_keep_the_scene_s_units(bare: Set) -> None:
+    bare.scene.unit_settings.scale_length = 0.01
+    bare.scene.cursor.location = MIDDLE * 100
+    assert bare.bpy.ops.dafnet.add_example(kind="SOFA") == {"FINISHED"}
+    sofa = bare.bpy.data.objects["Sofa"]
+    assert abs(sofa.dimensions.x - 197) < 3 and np.allclose(sofa.location, MIDDLE * 100 - (40.5, 0, 0), atol=1e-3)
+    root = bare.bpy.context.object.dafnet.root
+    assert np.allclose(root.location, MIDDLE * 100 + (-170, 220, 0), atol=1e-2)
+
+
+def test_each_is_one_step_to_undo(stage: Set) -> None:
+    bpy = stage.bpy
+
+    def state() -> tuple[list[str], int, bool, str]:
+        ann = bpy.data.objects["Ann"]
+        root, furniture = ann.dafnet.root, ann.dafnet.furniture
+        keyed = bool(root.animation_data and root.animation_data.action)
+        return sorted(o.name for o in bpy.data.objects), bpy.context.scene.frame_end, keyed, furniture.name if furniture else ""
+
+    def undone(operator: Any, **arguments: Any) -> None:
+        bpy.ops.ed.undo_push(message="before")
+        before = state()
+        assert operator("EXEC_DEFAULT", True, **arguments) == {"FINISHED"}
+        assert state() != before
+        bpy.ops.ed.undo()
+        assert state() == before
+
+    stage.box("Crate", (0.6, 1.0, 0.0), (1.0, 1.4, 0.5))
+    stage.select(stage.ann, stage.curve([(0.0, 0.0, 0.0), (0.0, 4.0, 0.0)]))
+    undone(bpy.ops.dafnet.walk_along_curve)
+    undone(bpy.ops.dafnet.find_furniture)
+    undone(bpy.ops.dafnet.add_example, kind="BED")
+
+
+def test_the_menu_and_the_panel_are_there(stage: Set) -> None:
+    panels = stage.addon("panels.setup")
+    drawn = stage.bpy.types.VIEW3D_MT_add._dyn_ui_initialize()
+    assert drawn.count(panels.add_menu) == 1
+    children = [cls.bl_idname for cls in stage.addon("panels").CLASSES if getattr(cls, "bl_parent_id", "")]
+    assert children[0] == "DAFNET_PT_setup"
+    stage.select(stage.empty("Other", (0, 0, 0)))
+    assert panels.DAFNET_PT_setup.poll(stage.bpy.context), "the only character is meant"
