@@ -141,6 +141,28 @@ def stage(blender: ModuleType, addon: Callable[[str], Any], takes: dict[str, Any
     return Stage(blender, addon, takes)
 
 
+def test_a_body_of_its_own_keeps_the_motion(addon: Callable[[str], Any], takes: dict[str, Any]) -> None:
+    """Onto itself nothing changes; the same body at rest in an A-pose, with fewer joints, reaches the same places."""
+    retargeting, kinematics, rotations, skeleton = (
+        addon(f"dafnet_addon.core.{name}") for name in ("retargeting", "kinematics", "rotations", "skeleton"))
+    take = takes["write"]
+    frames = kinematics.global_from_local(rotations.matrix_from_quaternion(take.rotations))
+    motion, body, root = retargeting.Motion(take.joints, frames), retargeting.canonical_body(1.0), take.root[:, :3, 3]
+    same = retargeting.onto(motion, body, body, root)
+    assert np.abs(same.motion.joints - take.joints).max() < 2e-3 and np.abs(same.motion.frames - frames).max() < 0.02
+    down = np.array(skeleton.REST)
+    for shoulder, elbow, wrist, sign in ((16, 18, 20, 1.0), (17, 19, 21, -1.0)):
+        turn = rotations.matrix_from_vector(np.array([0.0, -0.8 * sign, 0.0]))
+        down[[elbow, wrist]] = down[shoulder] + (down[[elbow, wrist]] - down[shoulder]) @ turn.T
+    down[[3, 13, 14]] = np.nan
+    lesser = retargeting.Body(retargeting.filled(down), np.isfinite(down).all(axis=1), body.fingers)
+    assert np.abs(lesser.rest - np.where(np.isfinite(down), down, skeleton.REST)).max() < 0.05
+    landed = retargeting.onto(motion, body, lesser, root).motion
+    off = np.linalg.norm(landed.joints - take.joints, axis=-1).mean(axis=0)
+    assert off[[1, 2, 7, 8, 10, 11, 15]].max() < 2e-3 and off[[20, 21]].max() < CENTIMETRE
+    assert np.abs(landed.frames[:, [20, 21]] - frames[:, [20, 21]]).max() < 1e-9
+
+
 GOLDEN = [(kind, "FK") for kind in MEASURED] + [("rigify", "IK")]
 
 
@@ -157,11 +179,15 @@ def test_hands_feet_head_and_pelvis_land(stage: Stage, kind: str, limbs: str) ->
 
 
 @pytest.mark.parametrize(("kind", "arms", "legs"), [
-    ("mixamo", 1.1, 1.0), ("mixamo", 0.9, 1.0), ("mixamo", 1.0, 1.1), ("mixamo", 1.0, 0.9), ("rigify", 0.9, 1.1),
+    ("mixamo", 1.1, 1.0), ("mixamo", 0.9, 1.0), ("mixamo", 1.0, 1.1), ("mixamo", 1.0, 0.9), ("rigify", 0.9, 1.0),
     ("rigify", 1.1, 0.9),
 ])
 def test_limbs_of_other_lengths_still_reach(stage: Stage, kind: str, arms: float, legs: float) -> None:
-    """Other legs make another size: the source is scaled about its root, but steps keep their length."""
+    """Other legs make another size: the source is scaled about its root, but steps keep their length.
+
+    The head is not asked for: a trunk that is a tenth shorter or longer than the legs' size cannot bring it there. Nor are
+    arms a tenth short with legs a tenth long, which would have to reach a fifth further than they are.
+    """
     rig = stage.build(kind, arms=arms, legs=legs)
     for take in ("walk", "write"):
         stage.play(take)
@@ -484,6 +510,34 @@ def test_presets_are_saved_and_found_again(stage: Stage, user_maps: Path) -> Non
     assert stage.rigs.detected(other).name == "Otto's Rig"
     with pytest.raises(stage.error, match=r"'broken\.json'"):
         stage.rigs.load_map(user_maps / "broken.json")
+
+
+def test_the_panel_shows_a_row_for_each_joint(stage: Stage) -> None:
+    """Drawn on a stand-in for Blender's layout; a needed joint without a bone is red."""
+    drawn: list[Any] = []
+
+    class Layout:
+        alert = False
+
+        def __getattr__(self, name: str) -> Any:
+            def note(*values: Any, **options: Any) -> Any:
+                drawn.append((name, *(value for value in values if isinstance(value, str))))
+                return Layout()
+            return note
+
+    rig = stage.build("vrm")
+    stage.bpy.context.view_layer.objects.active = rig
+    panels = stage.addon("panels.rig")
+    owner = type("Owner", (), {"layout": Layout()})()
+    panels.DAFNET_PT_rig.draw(owner, stage.bpy.context)
+    assert ("operator", "dafnet.bake_to_rig") in drawn and not any(each[0] == "template_list" for each in drawn)
+    stage.bpy.ops.dafnet.detect_rig()
+    rig.dafnet_rig.root_motion = "BONE"
+    panels.DAFNET_PT_rig.draw(owner, stage.bpy.context)
+    assert any(each[0] == "template_list" for each in drawn) and ("prop_search", "root_bone", "bones") in drawn
+    for row in rig.dafnet_rig.rows:
+        panels.DAFNET_UL_rig.draw_item(None, stage.bpy.context, Layout(), rig.dafnet_rig, row, 0, None, "")
+    assert drawn.count(("prop_search", "bone", "bones")) == 22
 
 
 def test_presets_lie_in_the_extensions_folder(stage: Stage) -> None:

@@ -5,6 +5,7 @@ kinds of global joint frames occur. *Turns* are the identity in the body's own r
 identity where its limbs lie as in a T-pose. A body's ``alignment`` leads from one to the other: turns = frames @ alignment.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +28,6 @@ _SAME_SIZE = 0.03  # bodies whose legs differ by less count as of one size, so t
 _REACH = 1.0 - 1e-5
 _SINK = 0.3  # of a leg's length: the most by which the pelvis is lowered to let the feet reach
 _TRUNK_TURN, _SHRUG = 0.35, 0.35  # the most that trunk and collars turn out of the source's pose to reach, radians
-_HELP = 0.25  # how much nearer a shrug brings a shoulder, over the collar's length
 _ROUNDS, _LEANS = 24, 8
 _STRAIGHT = 0.03  # a limb bent by less than this (of its length) also takes its plane from its first joint's frame
 
@@ -170,7 +170,7 @@ def onto(source: Motion, source_body: Body, body: Body, root: np.ndarray) -> Lan
     trunk = [j for j in _TRUNK if body.present[j]]
     _bring_head(joints, turns, targets[:, 15], trunk, place)
     place(13, 14, 16, 17)
-    if spine:
+    if spine and not body.present[[13, 14]].any():
         _lean(joints, turns, targets, spine[-1], body)
         _bring_head(joints, turns, targets[:, 15], [j for j in trunk if j != spine[-1]], place)
         place(13, 14, 16, 17)
@@ -224,7 +224,9 @@ def _limited(turn: np.ndarray, most: float) -> np.ndarray:
     return matrix_from_vector(normalised(vector) * np.minimum(angle, most)[:, None])
 
 
-def _bring_head(joints: np.ndarray, turns: np.ndarray, head: np.ndarray, trunk: list[int], place) -> None:  # type: ignore[no-untyped-def]
+def _bring_head(
+    joints: np.ndarray, turns: np.ndarray, head: np.ndarray, trunk: list[int], place: Callable[..., None],
+) -> None:
     """Turn the trunk's joints, each a little, until the head joint lies at ``head`` (T, 3): cyclic coordinate descent."""
     meant = turns[:, trunk].copy()
     place(3, 6, 9, 12, 15)
@@ -238,16 +240,15 @@ def _bring_head(joints: np.ndarray, turns: np.ndarray, head: np.ndarray, trunk: 
 
 
 def _lean(joints: np.ndarray, turns: np.ndarray, targets: np.ndarray, chest: int, body: Body) -> None:
-    """Turn the chest towards the wrists that arms are too short for, by more than what collars can help."""
+    """Without collars: turn the chest towards the wrists that the arms are too short for."""
     meant, center = turns[:, chest].copy(), joints[:, chest]
     turn = np.broadcast_to(np.eye(3), meant.shape)
     for _ in range(_LEANS):
         pull = np.zeros_like(center)
-        for collar, shoulder, elbow, wrist in ((13, 16, 18, 20), (14, 17, 19, 21)):
+        for shoulder, elbow, wrist in ((16, 18, 20), (17, 19, 21)):
             arm = rotate(turn, joints[:, shoulder] - center)
             away = targets[:, wrist] - center - arm
-            reach = _REACH * (body.length(elbow) + body.length(wrist)) + _HELP * body.length(shoulder) * body.present[collar]
-            short = np.linalg.norm(away, axis=-1, keepdims=True) - reach
+            short = np.linalg.norm(away, axis=-1, keepdims=True) - _REACH * (body.length(elbow) + body.length(wrist))
             # A rotation vector that moves the shoulder by what is missing, as far as a turn about the chest can.
             pull += np.cross(arm, np.maximum(short, 0.0) * normalised(away)) / (arm**2).sum(-1, keepdims=True)
         turn = _limited(matrix_from_vector(pull) @ turn, _TRUNK_TURN)
