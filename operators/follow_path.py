@@ -96,6 +96,7 @@ class DAFNET_OT_walk_through_points(bpy.types.Operator):
     seconds: FloatProperty(
         name="Stay", default=1.0, min=0.0, max=600.0, subtype="TIME_ABSOLUTE", description="Seconds of rest at the last one",
     )
+    to_cursor: BoolProperty(name="On to Cursor", description="Walk on from the last empty to the 3D cursor")
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -107,6 +108,7 @@ class DAFNET_OT_walk_through_points(bpy.types.Operator):
         with reported(self):
             return _told(self, through_points(
                 context, sent(context)[0], floor_points(context), speed=self.speed, seconds=self.seconds,
+                to_cursor=self.to_cursor,
             ))
         return {"CANCELLED"}
 

@@ -116,7 +116,7 @@ FURNITURE: dict[str, tuple[Part, ...]] = {
         Part("Oak", (2.05, 0.98, 0.13), (-0.02, -0.30, 0.195), bevel=0.010),
         Part("Oak", (0.045, 1.02, 0.92), (1.025, -0.30, 0.46), bevel=0.015),
         Part("Oak", (0.045, 1.02, 0.50), (-1.06, -0.30, 0.25), bevel=0.015),
-        Part("Slate", (0.38, 0.66, 0.075), (0.77, -0.30, 0.4875), bevel=0.036),
+        Part("Slate", (0.38, 0.66, 0.075), (0.72, -0.30, 0.4875), bevel=0.036),
         Part("Teal", (0.50, 0.945, 0.010), (-0.72, -0.30, 0.461), bevel=0.004),
     ),
 }
@@ -219,6 +219,7 @@ def run_demo(
 
 
 def new_collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
+    """A new collection in the scene."""
     made = bpy.data.collections.new(name)
     scene.collection.children.link(made)
     return made

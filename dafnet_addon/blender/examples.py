@@ -101,30 +101,30 @@ def _sofa(fps: float) -> Plan:
 
 def _bed(fps: float) -> Plan:
     """Sits down on the edge, swings the legs up and lies down, the head on the pillow, led by targets of head and hands."""
-    turn, inward, turning, leaning, stays = 0.5 * np.pi, 0.30, 2.0, 2.0, 4.0
+    turn, inward, lasts, stays = 0.5 * np.pi, 0.30, 3.5, 4.0
     sits = route(Stop((-1.6, 1.6), facing((0.6, -0.4)), 0.3), (-0.9, 1.1), Stop((0.0, 0.0), 0.0, 0.7, seated=True), fps=fps)
     start = len(sits.path)
-    frames = start + round((turning + leaning + stays) * fps)
+    frames = start + round((lasts + stays) * fps)
     after = (np.arange(frames) - start) / fps
 
     def eased(begin: float, seconds: float) -> np.ndarray:
         u = np.clip((after - begin) / seconds, 0.0, 1.0)
         return u * u * (3.0 - 2.0 * u)
 
-    turned = eased(0.15 * turning, 0.85 * turning)
+    # One leans back before one turns: the legs then come up first, else they would swing through the bed.
+    turned = eased(0.7, 1.9)
     yaw = np.concatenate([sits.path.yaw, np.zeros(frames - start)])
     yaw[start:] = sits.path.yaw[-1] + turn * turned[start:]
     position = np.concatenate([sits.path.position, np.tile(sits.path.position[-1], (frames - start, 1))])
     position[:, 1] -= inward * turned
     path = RootPath(position, yaw)
-    # One leans back while the legs come up: else they would swing through the bed.
-    back = 0.5 * eased(0.15, turning) + 0.5 * eased(turning - 1.2, leaning)
+    back = 0.6 * eased(0.15, 1.65) + 0.4 * eased(1.4, 2.0)
     angle = np.radians(88.0) * back
     over = _BED_TOP + 0.12
     head = np.stack([
         np.zeros(frames), 0.06 * (1.0 - back) - 0.60 * np.sin(angle), over + 0.60 * np.cos(angle) + (_PILLOW - 0.02) * back
     ], axis=1)
-    right = np.stack([0.20 + 0.10 * back, 0.28 - 0.28 * back, _BED_TOP + 0.20 - 0.11 * back], axis=1)
+    right = np.stack([0.20 + 0.10 * back, 0.10 - 0.10 * back, _BED_TOP + 0.20 - 0.11 * back], axis=1)
     local = {"head": head, "hand_right": right, "hand_left": right * (-1.0, 1.0, 1.0)}
     targets = {role: rotate(yaw_matrix(yaw), place) + position for role, place in local.items()}
     rests = (sits.rests[0], sits.rests[1], Rest(Stop((0.0, -inward), turn), frames - round(stays * fps), frames - 1))

@@ -252,17 +252,19 @@ def as_moved(context: bpy.types.Context, armature: bpy.types.Object, source: bpy
 
 def through_points(
     context: bpy.types.Context, armature: bpy.types.Object, points: list[bpy.types.Object], *, speed: float = 1.1,
-    seconds: float = 1.0,
+    seconds: float = 1.0, to_cursor: bool = False,
 ) -> Walk:
-    """Let the character walk through the places of ``points``, or to the 3D cursor where there is none, and stand at the last.
+    """Let the character walk through the places of ``points`` and stand at the last.
 
-    Goes on from the root's last key, else from the current frame, round the furniture and without rests in between.
+    ``to_cursor``: the 3D cursor is the last; it is the only one where there are no points. Goes on from the root's last key,
+    else from the current frame, round the furniture and without rests in between.
     ``InputError``: no way, or the root cannot be keyed; nothing is changed then.
     """
     if not points:
         return walk(context, armature, None, seconds, speed)
     at = _directed(context, armature)
-    places = [np.array(point.matrix_world.translation, float)[:2] * at.unit for point in points]
+    spots = [point.matrix_world.translation for point in points] + [context.scene.cursor.location] * to_cursor
+    places = [np.array(spot, float)[:2] * at.unit for spot in spots]
     if len(places) > 1 and np.linalg.norm(places[0] - at.place[:2]) < 0.3:
         del places[0]  # it stands there already
     start = at.start()

@@ -8,6 +8,7 @@ import numpy as np
 from ..core.conditions import shot_steps
 from ..core.errors import InputError
 from ..core.progress import drained
+from ..core.sensor import REACH
 from ..core.solids import Mesh
 from ..director.surfaces import surface_points
 from .armature import character_scale, metres_per_unit
@@ -17,7 +18,7 @@ from .scene_reader import furniture_now, read_scene
 
 __all__ = ["Found", "find_furniture"]
 
-_NEAR = 1.5  # metres over the floor; the sensor reaches to 1 m
+_NEAR = 1.5  # metres over the floor: of what counts as near
 _LOW, _HIGH = 0.07, 2.0  # metres over the floor: floors and rugs are lower, lamps and ceilings higher
 _SPACING = 0.1  # metres between points on a surface
 _LOOKS = 10  # places a second along the path
@@ -54,7 +55,8 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
             if each.visible_get():
                 made.objects.link(each)
         meshes = furniture_now(context, settings_of(armature, scene, furniture=made.name_full))
-        near = {name for name, found in meshes.items() if _is_near(found, path, size)}
+        away = {name: _distance(found, path, size) for name, found in meshes.items()}
+        near = {name for name, distance in away.items() if distance < _NEAR * size}
         if not near:
             raise InputError(
                 f"No visible mesh lies within {_NEAR:g} m of the root's path; key the root to the furniture first."
@@ -63,10 +65,12 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
             if each.name not in near:
                 made.objects.unlink(each)
         read = read_scene(context, settings_of(armature, scene, mode="FREE", furniture=made.name_full))
-        warnings = read.warnings + drained(shot_steps(read.scene, read.controls)).warnings
+        warnings = [*read.warnings, *drained(shot_steps(read.scene, read.controls)).warnings]
     except InputError:
         bpy.data.collections.remove(made)
         raise
+    if unseen := sorted(f"'{name}'" for name in near if away[name] > REACH * size):
+        warnings.append(f"Never nearer than {REACH:g} m, so the character does not see it: {', '.join(unseen)}.")
     return Found(_kept(scene, own, made), tuple(sorted(near)), (*_hidden(candidates, path, unit, size), *warnings))
 
 
@@ -112,15 +116,15 @@ def _bodies(scene: bpy.types.Scene) -> set[bpy.types.Object]:
     return found
 
 
-def _is_near(meshes: list[Mesh], path: np.ndarray, size: float) -> bool:
-    """Whether something of the meshes stands over the floor beside the path (N, 3)."""
+def _distance(meshes: list[Mesh], path: np.ndarray, size: float) -> float:
+    """Metres from the path (N, 3) over the floor to what of the meshes stands on it; infinite beyond what is near."""
     points = surface_points(meshes, _SPACING * size)
     low, high = path.min(0) - _NEAR * size, path.max(0) + _NEAR * size
     points = points[((points > low) & (points < high))[:, :2].all(1)]
     points = np.unique(np.round(points / (0.5 * _SPACING * size)), axis=0) * (0.5 * _SPACING * size)
     over = points[:, None, 2] - path[None, :, 2]
-    beside = np.linalg.norm(points[:, None, :2] - path[None, :, :2], axis=-1) < _NEAR * size
-    return bool((beside & (over > _LOW * size) & (over < _HIGH * size)).any())
+    beside = np.linalg.norm(points[:, None, :2] - path[None, :, :2], axis=-1)
+    return float(np.min(beside, where=(over > _LOW * size) & (over < _HIGH * size), initial=np.inf))
 
 
 def _hidden(candidates: list[bpy.types.Object], path: np.ndarray, unit: float, size: float) -> list[str]:

@@ -52,6 +52,10 @@ class Body:
         """Length of the legs, mean of both, hip to ankle."""
         return 0.5 * sum(self.length(j) for j in (4, 5, 7, 8))
 
+    def trunk(self) -> float:
+        """From the middle of the hip joints to the head joint."""
+        return float(np.linalg.norm(self.rest[15] - 0.5 * (self.rest[1] + self.rest[2])))
+
     def alignment(self) -> np.ndarray:
         """(22, 3, 3) rotations that lay the limbs at rest as in a T-pose: arms to the sides, legs down, feet ahead.
 
@@ -117,7 +121,7 @@ def filled(rest: np.ndarray) -> np.ndarray:
         rest[column, k] = np.interp(along, [place[j] for j in known], rest[known, k])
     for collar, shoulder in ((13, 16), (14, 17)):
         if not np.isfinite(rest[collar]).all():
-            rest[collar] = rest[12] + (rest[shoulder] - rest[12]) / 3.0
+            rest[collar] = rest[shoulder] + size * (REST[collar] - REST[shoulder])
     for ankle in (7, 8):
         if not np.isfinite(rest[ankle + 3]).all():
             rest[ankle + 3] = rest[ankle] + size * (REST[ankle + 3] - REST[ankle])
@@ -134,7 +138,8 @@ def onto(source: Motion, source_body: Body, body: Body, root: np.ndarray) -> Lan
     """The motion on another body. ``root`` (T, 3): the place on the floor under the source, about which it is scaled.
 
     Where the sizes differ (``size_ratio``), the source's joints are scaled about the root, except that steps keep their
-    length, since the root's path keeps its own and feet would slide otherwise. Then hands, feet and head turn as the
+    length, since the root's path keeps its own and feet would slide otherwise, and that the head is put over the hips by the
+    size of the trunk, which would be stretched or bent all the time otherwise. Then hands, feet and head turn as the
     source's do; the middle of the hip joints comes to lie where the source's lies, lower where legs would not reach; the
     trunk turns as the source's and bends by some degrees more to bring the head to its place; limbs reach wrists and ankles
     in the planes of the source's; collars help where an arm is short. An ankle that lies higher over its toes than the
@@ -142,6 +147,9 @@ def onto(source: Motion, source_body: Body, body: Body, root: np.ndarray) -> Lan
     """
     ratio = size_ratio(source_body, body)
     targets = _scaled(source.joints, root, ratio)
+    if ratio != 1.0:
+        upright = source.joints[:, 15] - source.joints[:, [1, 2]].mean(axis=1)
+        targets[:, 15] = targets[:, [1, 2]].mean(axis=1) + body.trunk() / source_body.trunk() * upright
     if body.present[[10, 11]].all():
         rise = (body.rest[[7, 8], 2] - body.rest[[10, 11], 2]) - ratio * (
             source_body.rest[[7, 8], 2] - source_body.rest[[10, 11], 2])

@@ -65,6 +65,8 @@ class Driver:
         """Where the sidebar's button is whose Python command or data path holds ``action``; scrolls down to it."""
         for _page in range(6):
             region = self.region("UI")
+            self.move(region.x - 200, region.y + 100)  # so that no button is taken for under the mouse still
+            yield 0.2
             x = region.x + int(across * (region.width - 20))
             for y in range(region.y + region.height - 30, region.y + 4, -_STEP):
                 self.move(x, y)
@@ -94,6 +96,24 @@ class Driver:
         self.move(x, y)
         yield 0.1
         yield from self.press("LEFTMOUSE")
+
+    def click_near(self, action: str, y: int) -> Waits:
+        """Press the button in the row at height ``y`` that does ``action``."""
+        region = self.region("UI")
+        for x in range(region.x + region.width - 30, region.x + 10, -_STEP):
+            self.move(x, y)
+            yield 0.06
+            if action in self._under_mouse():
+                yield from self.press("LEFTMOUSE")
+                return
+        raise AssertionError(f"no button in that row does '{action}'")
+
+    def key_property(self, path: str, across: float) -> Waits:
+        """Insert a keyframe as users do: the mouse over the property, and I."""
+        x, y = yield from self.find(path, across)
+        self.move(x, y)
+        yield 0.1
+        yield from self.press("I")
 
     def until(self, done: Callable[[], bool], what: str, seconds: float = 60.0) -> Waits:
         """Wait for something."""

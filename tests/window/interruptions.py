@@ -5,18 +5,11 @@ from pathlib import Path
 
 import bpy
 from driver import Driver, Waits
+from first_shot import progress
 
 __all__ = ["interruptions"]
 
 
-
-
-def _progress() -> float | None:
-    """How far the job is, as the panel knows it."""
-    import sys
-
-    module = next(m for name, m in sys.modules.items() if name.endswith(".operators.generate"))
-    return module.DAFNET_OT_generate.progress
 
 
 def _new_shot(user: Driver) -> None:
@@ -73,10 +66,10 @@ def interruptions(folder: Path) -> Waits:
         _new_shot(user)
         yield from user.sidebar("DAFNet")
         yield from user.click("dafnet.generate(task='NEW')")
-        yield from user.until(lambda: (_progress() or 0.0) > 0.2, "progress")
+        yield from user.until(lambda: (progress() or 0.0) > 0.2, "progress")
         with user.override():
             interrupt(folder)
-        yield from user.until(lambda: _progress() is None, f"the end of the job after {interrupt.__name__}")
+        yield from user.until(lambda: progress() is None, f"the end of the job after {interrupt.__name__}")
         yield 0.3
         made = [action for action in bpy.data.actions if "take" in action.name]
         print(f"{interrupt.__name__}: {len(made)} takes", flush=True)
