@@ -83,6 +83,8 @@ class DAFNET_PT_character(bpy.types.Panel):
                 row.prop(settings, f"{role}_influence", text="Influence", slider=True)
         if settings.mode == "FULL" or animated:
             layout.prop(settings, "upper_body_source", icon="ARMATURE_DATA")
+            if settings.upper_body_source is None:
+                layout.prop(settings, "upper_body_take", icon="ACTION")
         if animated:
             layout.prop(settings, "blend_frames")
 

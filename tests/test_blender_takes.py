@@ -273,3 +273,22 @@ def test_presets_set_how_takes_are_made(shot: Shot) -> None:
     shot.bpy.ops.script.execute_preset(filepath=str(mine), menu_idname="DAFNET_MT_presets")
     assert own.temperature == pytest.approx(0.7)
     mine.unlink()
+
+
+def test_full_copies_the_upper_body_of_a_take(shot: Shot) -> None:
+    own = shot.ann.dafnet
+    own.temperature, own.seed, own.plant_feet = 1.0, 2, 0.0
+    shot.bpy.ops.dafnet.generate()
+    source = shot.listed()[0]
+    assert not shot.addon("dafnet_addon.blender.properties")._is_take(own, shot.bpy.data.actions.new("Mine"))
+    own.mode, own.upper_body_take, own.seed, own.temperature = "FULL", source, 8, 0.0
+    shot.bpy.ops.dafnet.generate()
+    upper = list(shot.addon("dafnet_addon.core.skeleton").UPPER)
+    apart = np.linalg.norm(shot.motion(source)[5:, upper] - shot.motion(shot.listed()[1])[5:, upper], axis=-1)
+    assert apart.mean() < 0.02
+    shot.scene.frame_end = 70
+    with pytest.raises(RuntimeError, match="does not cover"):
+        shot.bpy.ops.dafnet.generate()
+    shot.scene.frame_end, shot.scene.render.fps = 55, 24
+    with pytest.raises(RuntimeError, match="30 frames a second, the scene 24"):
+        shot.bpy.ops.dafnet.generate()

@@ -21,7 +21,7 @@ from ..core.take import MODES
 from . import rig_properties
 
 __all__ = [
-    "ADDON", "CLEAN_UP", "CharacterSettings", "Preferences", "Settings", "TakeSettings", "settings_of", "find_scene",
+    "ADDON", "CLEAN_UP", "PACKED", "CharacterSettings", "Preferences", "Settings", "TakeSettings", "settings_of", "find_scene",
     "find_object", "find_action", "find_collection", "names_in_use", "device_of", "register", "unregister",
     "ensure_registered", "weights_path",
 ]
@@ -34,10 +34,16 @@ def _is_armature(_settings: "CharacterSettings", candidate: bpy.types.Object) ->
     return candidate.type == "ARMATURE" and candidate != _settings.id_data
 
 
+def _is_take(_settings: "CharacterSettings", candidate: bpy.types.Action) -> bool:
+    return PACKED in candidate
+
+
 def _is_not_the_character(settings: "CharacterSettings", candidate: bpy.types.Object) -> bool:
     return candidate != settings.id_data
 
 
+PACKED = "dafnet_take"
+"""The property of an action that holds its take (``blender.takes``)."""
 CLEAN_UP = {
     "plant_feet": "feet", "reach_targets": "reach", "rest_on_seats": "seat", "clear_furniture": "clear", "smooth": "smooth",
 }
@@ -111,6 +117,10 @@ class CharacterSettings(bpy.types.PropertyGroup):
     upper_body_source: PointerProperty(
         name="Source", type=bpy.types.Object, poll=_is_armature, options=set(),
         description="Armature whose upper body is copied: another character, or any rig whose bones are known (Your Rig)",
+    )
+    upper_body_take: PointerProperty(
+        name="Take", type=bpy.types.Action, poll=_is_take, options=set(),
+        description="Take whose upper body is copied, where no source armature is chosen",
     )
     use_scene_range: BoolProperty(
         name="Scene Range", default=True, options=set(),
@@ -215,6 +225,7 @@ class Settings:
     hand_left: str | None = None
     hand_right: str | None = None
     upper_body_source: str | None = None
+    upper_body_take: str | None = None
     mode: str | None = None
     frame_start: int = 1
     frame_end: int = 250
@@ -245,7 +256,7 @@ class Settings:
 def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides: Any) -> Settings:
     """The settings of a character (``Object.dafnet``) in a scene; ``overrides`` replace fields of ``Settings``."""
     own = armature.dafnet
-    links = ("root", "furniture", "head", "hand_left", "hand_right", "upper_body_source")
+    links = ("root", "furniture", "head", "hand_left", "hand_right", "upper_body_source", "upper_body_take")
     values: dict[str, Any] = {name: target.name_full if (target := getattr(own, name)) else None for name in links}
     values |= {
         "frame_start": scene.frame_start if own.use_scene_range else own.frame_start,

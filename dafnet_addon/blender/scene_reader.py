@@ -24,10 +24,11 @@ from .armature import metres_per_unit
 from .baker import laid_over, require_bakeable
 from .compat import action_curves
 from .mannequin import FACING
-from .properties import Settings, find_collection, find_object, find_scene
+from .properties import Settings, find_action, find_collection, find_object, find_scene
 from .rig_properties import map_of
 from .rig_reading import joints_of, pose_matrices
 from .rigs import RigMap, is_character, required
+from .takes import stored
 
 __all__ = ["ReadScene", "furniture_now", "read_steps", "read_scene"]
 
@@ -146,6 +147,8 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
             given[f"{role}_rotation"] = matrices[:, :3, :3]
     if source and "FULL" in modes:
         given["upper_body"] = _carried(source, source_map, np.array(bones), np.array(bodies), unit, root_matrices, size, fps)
+    elif settings.upper_body_take and "FULL" in modes:
+        given["upper_body"] = _of_take(settings, np.array([mode == "FULL" for mode in modes]), root_matrices, size, fps)
     elif "FULL" in modes:
         raise InputError(f"The mode of '{armature.name}' is FULL but no source is set; choose one to copy from.")
     for role in targets:
@@ -368,6 +371,28 @@ def _upper_body_source(
     return source, rig_map
 
 
+def _of_take(settings: Settings, full: np.ndarray, root: np.ndarray, size: float, fps: float) -> np.ndarray:
+    """Upper body (T, 14, 3) of the chosen take, frame by frame of the scene, on this character's root and of its ``size``.
+
+    ``InputError``: it is of another frame rate, or does not cover the frames that are ``full`` (T,).
+    """
+    action = find_action(settings.upper_body_take or "")
+    take, _ = stored(action)
+    if abs(take.fps - fps) > 1e-3:
+        raise InputError(f"The take '{action.name}' has {take.fps:g} frames a second, the scene {fps:g}; generate it again.")
+    at = np.arange(len(full)) + settings.frame_start - action.dafnet.frame_start
+    if ((at < 0) | (at >= len(take)))[full].any():
+        raise InputError(f"The take '{action.name}' does not cover the frames whose mode is FULL; choose a longer one.")
+    at = np.clip(at, 0, len(take) - 1)
+    path, _ = root_from_matrices(take.root[at])
+    return _onto(root, fps, size / take.scale * to_root(path, take.joints[at][:, list(UPPER)]))
+
+
+def _onto(root: np.ndarray, fps: float, local: np.ndarray) -> np.ndarray:
+    """Points (T, N, 3) of a root's frames in the world, that root being this character's, ``root`` (T, 4, 4)."""
+    return to_world(smoothed(root_from_matrices(root)[0], POSITION_SIGMA * fps / 30.0, YAW_SIGMA * fps / 30.0), local)
+
+
 def _carried(
     source: bpy.types.Object, rig_map: RigMap | None, bones: np.ndarray, bodies: np.ndarray,
     unit: float, root: np.ndarray, size: float, fps: float,
@@ -395,5 +420,4 @@ def _carried(
     upper = [j - 1 for j in UPPER[1:]]
     lengths = np.linalg.norm(offsets[:, upper], axis=-1).mean(axis=0).sum()
     ratio = size * np.linalg.norm(OFFSETS[1:][upper], axis=-1).sum() / lengths
-    onto = smoothed(root_from_matrices(root)[0], POSITION_SIGMA * fps / 30.0, YAW_SIGMA * fps / 30.0)
-    return to_world(onto, ratio * to_root(path, joints[:, list(UPPER)]))
+    return _onto(root, fps, ratio * to_root(path, joints[:, list(UPPER)]))

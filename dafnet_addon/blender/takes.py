@@ -11,11 +11,9 @@ from ..core.generate import Draw
 from ..core.storage import packed, unpacked
 from ..core.take import Controls, Take
 from .compat import assign_action
+from .properties import PACKED
 
-__all__ = ["PACKED", "active_take", "add_take", "draw_of", "drop_take", "frames_of", "play_take", "stored", "takes_of"]
-
-PACKED = "dafnet_take"
-"""The action's property that holds ``core.storage.packed``."""
+__all__ = ["active_take", "add_take", "draw_of", "drop_take", "frames_of", "play_take", "stored", "takes_of"]
 
 _STATURE = 1.7  # metres, by which ``end_effector_error`` was divided
 _FIGURES = {

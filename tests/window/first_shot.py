@@ -101,8 +101,7 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
     yield from user.click("dafnet.play_take(index=2)", 0.1)
     assert ann.animation_data.action == ann.dafnet.takes[2].action
     chosen = ann.animation_data.action
-    x, y = user.mouse
-    yield from user.click_near("dafnet.accepted", y)
+    yield from user.click_near("dafnet.accepted", user.mouse[1])
     assert chosen.dafnet.accepted, "accepted with the mouse"
     yield from user.picture("takes")
 
@@ -132,11 +131,18 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
         yield 0.3
         yield from user.click("dafnet.detect_rig")
         yield from user.click("dafnet.bake_to_rig")
-        yield from user.until(lambda rig=rig: rig.animation_data is not None and rig.animation_data.action is not None, name, 120)
+        yield from user.until(lambda rig=rig: bool(rig.animation_data and rig.animation_data.action), name, 120)
         scene.frame_set(scene.frame_end - 10)
         yield 0.3
         yield from user.picture(f"rig_{name}")
         rig.hide_set(True)
-    for each in ("sensor", "path", "contacts"):
-        print("overlay switches", [p for p in dir(bpy.context.window_manager.dafnet_overlays) if p[0] not in "_b"], each, flush=True)
-        break
+    _only(ann)
+    overlays = bpy.context.window_manager.dafnet_overlays
+    switches = [name for name, kind in overlays.bl_rna.properties.items() if kind.type == "BOOLEAN"]
+    for name in switches:
+        setattr(overlays, name, True)
+    scene.frame_set(scene.frame_end - 20)
+    yield 0.5
+    yield from user.picture("overlays")
+    for name in switches:
+        setattr(overlays, name, False)
