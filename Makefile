@@ -6,7 +6,7 @@ PYTHON ?= $(shell command -v python3.11 || echo python3)
 TORCH ?= torch==2.13.0
 PIP := bin/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test lint zip setup system clean
+.PHONY: demo test lint zip window setup system clean
 
 demo: setup
 	.venv/bin/python -m dafnet_addon demo -o out/demo
@@ -24,6 +24,13 @@ lint: .venv/.test
 
 zip: setup
 	scripts/build_zip.sh .venv/bin/python
+
+# Real Blenders (4.3 and 5.2) in windows under a virtual screen, driven with mouse and keys; the pictures of docs/guide.md. As root.
+window: setup
+	scripts/debian_blender.sh trixie out/blender-4.3
+	scripts/window.sh out/window-4.3 out/blender-4.3
+	scripts/debian_blender.sh sid out/blender-5.2
+	scripts/window.sh docs/guide out/blender-5.2
 
 system:
 	@scripts/system_packages.sh $(PYTHON)

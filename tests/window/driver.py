@@ -115,7 +115,7 @@ class Driver:
         yield 0.1
         yield from self.press("I")
 
-    def until(self, done: Callable[[], bool], what: str, seconds: float = 60.0) -> Waits:
+    def until(self, done: Callable[[], bool], what: str, seconds: float = 240.0) -> Waits:
         """Wait for something."""
         for _ in range(int(seconds / 0.1)):
             if done():
@@ -127,7 +127,8 @@ class Driver:
         """The whole window as PICTURES/name.png."""
         bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
         yield 0.3
-        subprocess.run(["import", "-window", "root", self.pictures / f"{name}.png"], check=True)
+        small = ["-resize", "1280x", "-colors", "160"]
+        subprocess.run(["import", "-window", "root", *small, f"png8:{self.pictures / name}.png"], check=True)
 
 
 def play(script: Callable[[], Waits]) -> None:
