@@ -438,8 +438,8 @@ def test_conventions_are_detected(stage: Stage, kind: str) -> None:
     rig = stage.build(kind)
     found = stage.rigs.detected(rig)
     assert (found.name, len(found.joints)) == DETECTED[kind]
-    assert not stage.rigs.is_character(rig)
-    assert stage.rigs.is_character(stage.ann)
+    assert not stage.addon("dafnet_addon.blender.armature").is_character(rig)
+    assert stage.addon("dafnet_addon.blender.armature").is_character(stage.ann)
 
 
 @pytest.mark.parametrize("prefix", ["", "mixamorig1:", "mixamorig_", "Mia:"])

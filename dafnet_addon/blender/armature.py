@@ -12,7 +12,7 @@ from ..core.errors import InputError
 from ..core.skeleton import JOINTS, OFFSETS, PARENTS, REST, STATURE, joint
 from .mannequin import FACING, add_body
 
-__all__ = ["create_character", "character_of", "character_scale", "metres_per_unit", "missing_bones", "sent"]
+__all__ = ["create_character", "character_of", "character_scale", "is_character", "metres_per_unit", "missing_bones", "sent"]
 
 _CHAIN = {  # the joint at which each bone's tail lies
     "pelvis": "spine1", "spine1": "spine2", "spine2": "spine3", "spine3": "neck", "neck": "head",
@@ -34,14 +34,27 @@ def missing_bones(armature: bpy.types.Object) -> list[str]:
     return [name for name in JOINTS if name not in armature.data.bones]
 
 
+def is_character(candidate: bpy.types.Object) -> bool:
+    """Whether an object is a character's armature; SMPL-X has bones of the same names in other places, and no root of ours."""
+    if candidate.type != "ARMATURE" or missing_bones(candidate):
+        return False
+    if candidate.dafnet.root is not None or candidate.mode == "EDIT":
+        return True
+    try:
+        character_scale(candidate)
+    except InputError:
+        return False
+    return True
+
+
 def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
     """The character that the active object is or belongs to: its armature, its body, its root or one of its targets."""
     active = context.object
     if active is None:
         return None
     if active.type == "ARMATURE":
-        return None if missing_bones(active) else active
-    if active.parent and active.parent.type == "ARMATURE" and not missing_bones(active.parent):
+        return active if is_character(active) else None
+    if active.parent and is_character(active.parent):
         return active.parent
     for candidate in context.scene.objects:
         own = candidate.dafnet
@@ -56,7 +69,7 @@ def sent(context: bpy.types.Context) -> tuple[bpy.types.Object | None, bpy.types
     The character is the active one, else a selected one, else the only one of the scene. The mesh is the active or the only
     selected object that is no part of a character.
     """
-    characters = [o for o in context.scene.objects if o.type == "ARMATURE" and not missing_bones(o)]
+    characters = [o for o in context.scene.objects if is_character(o)]
     chosen = [character_of(context), *(o for o in context.selected_objects if o in characters)]
     character = next((o for o in chosen if o is not None), characters[0] if len(characters) == 1 else None)
     meshes = [o for o in context.selected_objects if o.type == "MESH" and o.parent not in characters]

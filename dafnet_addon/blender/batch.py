@@ -9,7 +9,7 @@ import bpy
 from ..core.errors import InputError
 from ..core.progress import drained
 from . import job
-from .armature import missing_bones
+from .armature import is_character
 from .properties import ensure_registered
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def _character(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
         if not named:
             raise InputError(f"The scene has no armature '{name}'; give --character the name of one that it has.")
         return named[0]
-    characters = [ob for ob in armatures if not missing_bones(ob)]
+    characters = [ob for ob in armatures if is_character(ob)]
     directed = [ob for ob in characters if ob.dafnet.root is not None] or characters
     if not directed:
         raise InputError("The scene has no character; add one in Blender with Add Character and save the file.")

@@ -25,7 +25,7 @@ from ..core.sensor import SPHERES
 from ..core.skeleton import END_EFFECTORS, PARENTS, joint
 from ..core.solids import Box, Mesh, Scene
 from ..core.take import Controls, Take
-from .armature import character_scale, metres_per_unit, missing_bones, sent
+from .armature import character_scale, is_character, metres_per_unit, sent
 from .compat import action_curves
 from .properties import settings_of
 from .scene_reader import furniture_now, read_scene
@@ -136,7 +136,7 @@ def _may_be_furniture(update: bpy.types.DepsgraphUpdate) -> bool:
     if changed.type in {"ARMATURE", "CAMERA", "LIGHT"} or (changed.type == "EMPTY" and changed.instance_type == "NONE"):
         return False
     wearer = changed.parent
-    return not (wearer and wearer.type == "ARMATURE" and not missing_bones(wearer))
+    return not (wearer and is_character(wearer))
 
 
 def _remembered(name: str, key: Any, make: Callable[[], _T]) -> _T:
@@ -157,7 +157,7 @@ def watched(context: bpy.types.Context) -> bpy.types.Object | None:
     if last is not None and _looked_at[0] == key:
         return last
     character, _ = sent(context)
-    if character is None and last is not None and last.type == "ARMATURE" and not missing_bones(last):
+    if character is None and last is not None and is_character(last):
         character = last
     _looked_at[:] = key, character.name if character else ""
     return character

@@ -15,7 +15,7 @@ from ..core.trails import FASTEST, followed, trail
 from ..director.seats import on_a_seat
 from ..director.surfaces import surface_points
 from ..director.walks import way_round
-from .armature import character_scale, metres_per_unit, missing_bones, sent
+from .armature import character_scale, is_character, metres_per_unit, sent
 from .compat import action_curves
 from .properties import settings_of
 from .scene_reader import furniture_now
@@ -62,7 +62,7 @@ def chosen(
 
 def floor_points(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The selected empties that are no part of a character, in the order of their names; 10 comes after 9."""
-    characters = [o for o in context.scene.objects if o.type == "ARMATURE" and not missing_bones(o)]
+    characters = [o for o in context.scene.objects if is_character(o)]
     parts = {part for character in characters for part in _parts_of(character)}
     found = [o for o in context.selected_objects if o.type == "EMPTY" and o not in parts]
     return sorted(found, key=lambda o: [(not t.isdigit(), int(t) if t.isdigit() else 0, t.lower())

@@ -8,12 +8,13 @@ from bpy.props import CollectionProperty, EnumProperty, IntProperty, PointerProp
 from ..core.errors import InputError
 from ..core.skeleton import JOINTS
 from . import rigs
+from .armature import is_character
 
 __all__ = ["character_for", "map_of", "presets", "register", "rig_of", "show_map", "unregister"]
 
 
 def _is_character(_settings: "RigSettings", candidate: bpy.types.Object) -> bool:
-    return rigs.is_character(candidate)
+    return is_character(candidate)
 
 
 class RigRow(bpy.types.PropertyGroup):
@@ -73,7 +74,7 @@ def rig_of(context: bpy.types.Context) -> bpy.types.Object | None:
     active = context.object
     if active is not None and active.type != "ARMATURE":
         active = active.parent
-    return active if active is not None and active.type == "ARMATURE" and not rigs.is_character(active) else None
+    return active if active is not None and active.type == "ARMATURE" and not is_character(active) else None
 
 
 def character_for(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.types.Object:
@@ -82,7 +83,7 @@ def character_for(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.type
     ``InputError`` where there is none, or more than one to choose from.
     """
     chosen = rig.dafnet_rig.character
-    there = [o for o in context.scene.objects if rigs.is_character(o)]
+    there = [o for o in context.scene.objects if is_character(o)]
     if chosen is not None:
         if chosen not in there:
             raise InputError(f"The character '{chosen.name}' is not in the scene; choose another one in the Your Rig panel.")

@@ -18,10 +18,9 @@ import bpy
 
 from ..core.errors import InputError
 from ..core.skeleton import JOINTS
-from .armature import character_scale, missing_bones
 
 __all__ = [
-    "NEEDED", "RigMap", "as_text", "detected", "edited", "from_text", "in_names_of", "is_character", "load_map", "map_files",
+    "NEEDED", "RigMap", "as_text", "detected", "edited", "from_text", "in_names_of", "load_map", "map_files",
     "required", "save_map", "user_folder",
 ]
 
@@ -56,19 +55,6 @@ class RigMap:
     def place(self, joint: str) -> str | None:
         """The bone at whose head a joint lies."""
         return self.places.get(joint) or self.joints.get(joint)
-
-
-def is_character(armature: bpy.types.Object) -> bool:
-    """Whether an object is a DAFNet character's armature; SMPL-X has bones of the same names in other places."""
-    if armature.type != "ARMATURE" or missing_bones(armature):
-        return False
-    if armature.mode == "EDIT":
-        return len(armature.data.bones) == len(JOINTS)
-    try:
-        character_scale(armature)
-    except InputError:
-        return False
-    return True
 
 
 def user_folder(create: bool = False) -> Path:

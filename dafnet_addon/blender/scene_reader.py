@@ -20,14 +20,14 @@ from ..core.root import POSITION_SIGMA, YAW_SIGMA, root_from_joints, root_from_m
 from ..core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
 from ..core.solids import Mesh, Scene
 from ..core.take import Controls
-from .armature import metres_per_unit
+from .armature import is_character, metres_per_unit
 from .baker import laid_over, require_bakeable
 from .compat import action_curves
 from .mannequin import FACING
 from .properties import Settings, find_action, find_collection, find_object, find_scene
 from .rig_properties import map_of
 from .rig_reading import joints_of, pose_matrices
-from .rigs import RigMap, is_character, required
+from .rigs import RigMap, required
 from .takes import stored
 
 __all__ = ["ReadScene", "furniture_now", "read_steps", "read_scene"]
