@@ -16,11 +16,12 @@ def register() -> None:
 
     from . import operators, panels
     from .dafnet_addon import cli
-    from .dafnet_addon.blender import overlays, properties
+    from .dafnet_addon.blender import overlays, properties, translations
 
     properties.register()
     overlays.register()
     bpy.utils.register_preset_path(_FILES)
+    translations.register()
     for cls in operators.CLASSES + panels.CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.VIEW3D_MT_add.append(panels.add_menu)
@@ -32,13 +33,14 @@ def unregister() -> None:
     import bpy
 
     from . import operators, panels
-    from .dafnet_addon.blender import overlays, properties
+    from .dafnet_addon.blender import overlays, properties, translations
 
     while _commands:
         bpy.utils.unregister_cli_command(_commands.pop())
     bpy.types.VIEW3D_MT_add.remove(panels.add_menu)
     for cls in reversed(operators.CLASSES + panels.CLASSES):
         bpy.utils.unregister_class(cls)
+    translations.unregister()
     bpy.utils.unregister_preset_path(_FILES)
     overlays.unregister()
     properties.unregister()

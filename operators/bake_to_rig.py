@@ -12,7 +12,7 @@ from .reporting import reported
 __all__ = ["DAFNET_OT_bake_to_rig"]
 
 _FAR = 0.02
-"""Metres of mean error at wrists or ankles above which the user is warned."""
+"""Metres of mean error above which the user is warned."""
 
 
 class DAFNET_OT_bake_to_rig(bpy.types.Operator):
@@ -40,7 +40,10 @@ class DAFNET_OT_bake_to_rig(bpy.types.Operator):
                 context, character_for(context, rig), rig, map_of(rig), root_motion=own.root_motion, limbs=own.limbs,
             )
             errors = ", ".join(f"{part} {100 * mean:.1f} ({100 * most:.1f})" for part, (mean, most) in baked.errors.items())
-            if max(baked.errors["wrists"][0], baked.errors["ankles"][0]) > _FAR:
+            if max(mean for mean, _ in baked.errors.values()) > _FAR and baked.overruled:
+                bones = ", ".join(f"'{bone}'" for bone in baked.overruled[:3])
+                self.report({"WARNING"}, f"The body is off by more than 2 cm; mute constraints and drivers of {bones}, bake again")
+            elif max(baked.errors["wrists"][0], baked.errors["ankles"][0]) > _FAR:
                 self.report({"WARNING"}, "Hands or feet are off by more than 2 cm; the rig's limbs are short for this motion")
             size = "" if baked.ratio == 1.0 else f", motion scaled by {baked.ratio:.2f}"
             self.report({"INFO"}, f"'{baked.action.name}': off by cm, mean (largest): {errors}{size}")

@@ -132,3 +132,16 @@ def test_the_extension_imports_itself_relatively(path: Path) -> None:
     assert "dafnet_addon" not in {name.split(".")[0] for name in imports(path)}
     if re.search(r"class \w+\(bpy\.types\.", text):
         assert "from __future__ import annotations" not in text
+
+
+def test_what_is_translated_is_said_somewhere() -> None:
+    """Every word of the translation tables is one that the add-on shows."""
+    sources = "\n".join(
+        file.read_text(encoding="utf-8") for folder in ("operators", "panels", "dafnet_addon/blender")
+        for file in (ROOT / folder).glob("*.py") if file.name != "translations.py"
+    )
+    tables = ast.parse((ROOT / "dafnet_addon/blender/translations.py").read_text(encoding="utf-8"))
+    words = [key.value for node in ast.walk(tables) if isinstance(node, ast.Dict) for key in node.keys
+             if isinstance(key, ast.Constant) and key.value != "de_DE"]
+    assert len(words) > 50
+    assert not [word for word in words if f'"{word}"' not in sources]

@@ -425,6 +425,64 @@ def test_what_cannot_be_baked_is_refused_and_left_alone(stage: Stage) -> None:
     rig.data.pose_position = "POSE"
     rig.constraints.new("COPY_LOCATION")
     refused("Hips", root_motion="OBJECT")
+    stage.ann.data.pose_position = "REST"
+    refused("'Ann' shows its rest position", root_motion="HIPS")
+    stage.ann.data.pose_position = "POSE"
+
+
+def test_an_object_that_drivers_move_is_refused(stage: Stage) -> None:
+    stage.play("walk")
+    rig = stage.build("mixamo")
+    rig.driver_add("location", 0).driver.expression = "0.5"
+    with pytest.raises(stage.error, match="drivers"):
+        stage.bake("mixamo", rig)
+
+
+def test_hips_beside_the_trunk_do_not_tear_it(stage: Stage) -> None:
+    """A bone "pelvis" for the hips' own turns, and the trunk, both on "hip": the guess takes that; the other is refused.
+
+    What was played before is played again then, in its own slot.
+    """
+    stage.play("walk")
+    rig = rig_builders.mixamo(stage.bpy, prefix="")
+    stage.bpy.ops.object.mode_set(mode="EDIT")
+    bones = rig.data.edit_bones
+    for old, new in (("Hips", "pelvis"), ("Spine", "abdomenLower"), ("Spine1", "abdomenUpper"), ("Spine2", "chest")):
+        bones[old].name = new
+    hip = bones.new("hip")
+    hip.head, hip.tail = bones["pelvis"].head, bones["pelvis"].tail
+    bones["pelvis"].parent = bones["abdomenLower"].parent = hip
+    stage.bpy.ops.object.mode_set(mode="OBJECT")
+    found = stage.rigs.detected(rig)
+    assert (found.name, found.joints["pelvis"], found.joints["spine1"]) == ("Guessed", "hip", "abdomenLower")
+
+    rig.pose.bones["Head"].keyframe_insert("location", frame=1)
+    data = rig.animation_data
+    mine, slot = data.action, getattr(data, "action_slot", None)
+    if slot is not None:
+        mine.slots.new(id_type="OBJECT", name="Another")
+    torn = type(found)("Mine", joints=found.joints | {"pelvis": "pelvis"})
+    with pytest.raises(stage.error, match="'pelvis' does not carry 'abdomenLower'"):
+        stage.onto.bake_onto_rig(stage.bpy.context, stage.ann, rig, torn)
+    assert data.action == mine and getattr(data, "action_slot", None) == slot
+    assert all(bone.matrix_basis == bone.matrix_basis.Identity(4) for bone in rig.pose.bones)
+
+    stage.onto.bake_onto_rig(stage.bpy.context, stage.ann, rig, found)
+    assert np.abs(stage.heads(rig, ["Head", "LeftHand"], 30) - stage.take.joints[29, [15, 20]]).max() < CENTIMETRE
+
+
+def test_constraints_that_move_keyed_bones_are_named(stage: Stage) -> None:
+    stage.play("walk")
+    rig = stage.build("mixamo")
+    assert stage.bake("mixamo", rig).overruled == ()
+    constraint = rig.pose.bones["mixamorig:LeftLeg"].constraints.new("IK")
+    constraint.target, constraint.chain_count = stage.ann.dafnet.hand_left, 2
+    rig.pose.bones["mixamorig:RightArm"].driver_add("rotation_quaternion", 1)
+    baked = stage.bake("mixamo", rig)
+    assert set(baked.overruled) == {"mixamorig:LeftLeg", "mixamorig:RightArm"}
+    assert baked.errors["ankles"][0] > 0.05, "and the report is honest"
+    constraint.mute = rig.animation_data.drivers[0].mute = True
+    assert stage.bake("mixamo", rig).errors["ankles"][0] < CENTIMETRE
 
 
 DETECTED = {

@@ -13,9 +13,10 @@ from .armature import character_scale
 from .compat import action_curves, assign_action, new_action
 from .mannequin import FACING
 
-__all__ = ["bake", "key_curves", "laid_over", "require_bakeable"]
+__all__ = ["TRANSFORMS", "bake", "driven", "key_curves", "laid_over", "require_bakeable"]
 
-_TRANSFORMS = ("location", "rotation", "scale")
+TRANSFORMS = ("location", "rotation", "scale")
+"""How the data paths of an object's own transform begin."""
 
 
 def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
@@ -26,7 +27,7 @@ def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
         raise InputError(f"The armature '{armature.name}' is linked or a library override; make it local first.")
     if armature.parent:
         raise InputError(f"The armature '{armature.name}' has a parent; clear it, and parent the root object instead.")
-    if any(not constraint.mute for constraint in armature.constraints) or _driven(armature, _TRANSFORMS):
+    if any(not constraint.mute for constraint in armature.constraints) or driven(armature, TRANSFORMS):
         raise InputError(
             f"The armature '{armature.name}' has object constraints or drivers; mute them and constrain the root."
         )
@@ -44,10 +45,11 @@ def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
 def laid_over(armature: bpy.types.Object) -> bool:
     """Whether constraints or drivers of bones change what an action plays."""
     constraints = (constraint for name in JOINTS for constraint in armature.pose.bones[name].constraints)
-    return any(not constraint.mute for constraint in constraints) or _driven(armature, "pose.bones[")
+    return any(not constraint.mute for constraint in constraints) or driven(armature, "pose.bones[")
 
 
-def _driven(armature: bpy.types.Object, paths: str | tuple[str, ...]) -> bool:
+def driven(armature: bpy.types.Object, paths: str | tuple[str, ...]) -> bool:
+    """Whether drivers that are not muted move anything whose data path begins like one of these."""
     drivers = armature.animation_data.drivers if armature.animation_data else ()
     return any(not driver.mute and driver.data_path.startswith(paths) for driver in drivers)
 

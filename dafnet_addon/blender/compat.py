@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import bpy
 
-__all__ = ["new_action", "assign_action", "action_curves", "output_video"]
+__all__ = ["new_action", "assign_action", "playing", "action_curves", "output_video"]
 
 _SLOTS = bpy.app.version >= (4, 4, 0)
 
@@ -38,6 +38,23 @@ def assign_action(owner: bpy.types.Object, action: bpy.types.Action) -> None:
     data.action_blend_type, data.action_influence = "REPLACE", 1.0
     if _SLOTS:
         data.action_slot = action.slots[0]
+
+
+def playing(owner: bpy.types.Object) -> Callable[[], None]:
+    """A function that lets ``owner`` play again what it plays now."""
+    data = owner.animation_data
+    action = data.action if data else None
+    slot = data.action_slot if _SLOTS and action else None
+
+    def again() -> None:
+        if data is None:
+            owner.animation_data_clear()
+            return
+        data.action = action
+        if slot is not None:
+            data.action_slot = slot
+
+    return again
 
 
 def action_curves(owner: bpy.types.Object) -> list[bpy.types.FCurve]:

@@ -16,8 +16,8 @@ from ..core.root import root_from_matrices
 from ..core.rotations import continuous_signs, normalised, quaternion_from_matrix
 from ..core.skeleton import JOINTS
 from .armature import character_scale, metres_per_unit
-from .baker import key_curves
-from .compat import action_curves, assign_action, new_action
+from .baker import TRANSFORMS, driven, key_curves
+from .compat import action_curves, assign_action, new_action, playing
 from .mannequin import FACING
 from .rig_controls import Attachments, Channels, Control, channels, controls_of, posed, probe, settled
 from .rig_reading import character_motion, pose_matrices, rigid_parts, shape_of
@@ -35,12 +35,13 @@ Curves = Callable[[str, int, str], bpy.types.FCurve]
 class Baked:
     """The new ``action``; ``errors``: mean and largest distance (metres) of wrists, ankles, head and pelvis (the middle of the
     hip joints) from where they were to lie, measured on the rig as Blender plays it. ``ratio``: the rig's size over the
-    character's, by which the motion was scaled.
+    character's, by which the motion was scaled. ``overruled``: keyed bones that constraints or drivers of their own move, too.
     """
 
     action: bpy.types.Action
     errors: dict[str, tuple[float, float]]
     ratio: float
+    overruled: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,8 @@ def bake_onto_rig(
     unit = metres_per_unit(context.scene)
     size = character_scale(character, 1.0)
     _require_bakeable(context, rig, root_motion)
+    if character.data.pose_position == "REST":
+        raise InputError(f"The character '{character.name}' shows its rest position; set it to Pose Position.")
     rig_map = in_names_of(rig_map, rig.data.bones.keys()) if rig.mode != "EDIT" else rig_map
     required(rig, rig_map)
     controls = controls_of(rig, rig_map, limbs, root_motion == "BONE")
@@ -137,7 +140,16 @@ def _bake(
         previous.use_fake_user = True
     if held.loose:
         _settle_loose(context, rig, controls, held, made, curves, wish.frames)
-    return Baked(action, _measured(context, rig, rig_map, landed, wish), landed.ratio)
+    return Baked(action, _measured(context, rig, rig_map, landed, wish), landed.ratio, _overruled(rig, controls))
+
+
+def _overruled(rig: bpy.types.Object, controls: list[Control]) -> tuple[str, ...]:
+    """Controls that their own constraints or drivers move, besides their keys."""
+    def moved(name: str) -> bool:
+        own = any(not constraint.mute and constraint.influence > 0.0 for constraint in rig.pose.bones[name].constraints)
+        return own or driven(rig, tuple(f'pose.bones["{bpy.utils.escape_identifier(name)}"].{part}' for part in TRANSFORMS))
+
+    return tuple(control.bone for control in controls if moved(control.bone))
 
 
 def _facing(bodies: np.ndarray) -> np.ndarray:
@@ -159,6 +171,8 @@ def _require_bakeable(context: bpy.types.Context, rig: bpy.types.Object, root_mo
     data = rig.animation_data
     if data and (data.use_tweak_mode or any(track.is_solo for track in data.nla_tracks)):
         raise InputError(f"The armature '{rig.name}' plays an NLA strip in tweak or solo mode; leave it first.")
+    if driven(rig, TRANSFORMS):
+        raise InputError(f"The object '{rig.name}' is moved by drivers; mute them and bake again.")
     delta = (*rig.delta_location, *rig.delta_rotation_euler, *(s - 1.0 for s in rig.delta_scale))
     if root_motion == "OBJECT" and (any(not c.mute for c in rig.constraints) or any(delta)):
         raise InputError(f"The object '{rig.name}' has constraints or delta transforms; choose Hips as the root motion.")
@@ -190,8 +204,7 @@ def _undone_on_failure(context: bpy.types.Context, rig: bpy.types.Object) -> Ite
     """The rig's action, pose, settings and the current frame as they were where the block fails; the frame in any case."""
     scene = context.scene
     now, within = scene.frame_current, scene.frame_subframe
-    data = rig.animation_data
-    action = data.action if data else None
+    again, basis = playing(rig), rig.matrix_basis.copy()
     poses = {bone.name: bone.matrix_basis.copy() for bone in rig.pose.bones}
     values = {
         (bone.name, key): value for bone in rig.pose.bones for key, value in bone.items() if isinstance(value, int | float)
@@ -200,12 +213,10 @@ def _undone_on_failure(context: bpy.types.Context, rig: bpy.types.Object) -> Ite
     try:
         yield
     except BaseException:
-        if rig.animation_data:
-            rig.animation_data.action = action
+        again()
         for made in set(bpy.data.actions) - before:
             bpy.data.actions.remove(made)
-        if data is None:
-            rig.animation_data_clear()
+        rig.matrix_basis = basis
         for bone, matrix in poses.items():
             rig.pose.bones[bone].matrix_basis = matrix
         for (bone, key), value in values.items():

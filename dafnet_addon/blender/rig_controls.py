@@ -23,6 +23,7 @@ __all__ = ["Attachments", "Channels", "Control", "channels", "controls_of", "pos
 _TRIES, _TURN = 4, 0.7  # random poses, and how far they turn, radians
 _RIGID = 0.01
 _ROOT, _OBJECT = -1, -1
+_CARRIED = (1, 2, 3, 6, 9)  # joints that have to go where the pelvis goes
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,10 @@ def settled(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.types.Obje
 
 
 def probe(context: bpy.types.Context, rig: bpy.types.Object, controls: list[Control]) -> Attachments:
-    """Find what the controls move with; leaves all of their channels empty."""
+    """Find what the controls move with; leaves all of their channels empty.
+
+    ``InputError``: trunk or legs stay behind when the pelvis is moved.
+    """
     names: list[str | None] = [control.bone for control in controls]
     rng = np.random.default_rng(0)
     poses, channels = [], []
@@ -117,6 +121,7 @@ def probe(context: bpy.types.Context, rig: bpy.types.Object, controls: list[Cont
     neutral, rotation, place = poses[-1], _rotations(np.array(poses)), np.array(poses)[..., :3, 3]
     bare = rotation @ transpose(np.array(channels))  # without the control's own rotation
     size = np.ptp(neutral[:, :3, 3], axis=0).max() or 1.0
+    _require_carried(context, rig, controls, neutral[:, :3, 3], 0.1 * size)
 
     turned_by, moved_by, loose = [], [], []
     for i in range(len(controls)):
@@ -131,6 +136,20 @@ def probe(context: bpy.types.Context, rig: bpy.types.Object, controls: list[Cont
             loose.append(i)
     axes = np.array([_location_axes(rig, control.bone) for control in controls])
     return Attachments(neutral, turned_by, moved_by, loose, axes)
+
+
+def _require_carried(
+    context: bpy.types.Context, rig: bpy.types.Object, controls: list[Control], start: np.ndarray, way: float,
+) -> None:
+    """``InputError`` where hips or trunk do not go along when the pelvis is moved by ``way``; ``start`` (N, 3): all places."""
+    pelvis = next(k for k, control in enumerate(controls) if control.joint == 0)
+    bone = rig.pose.bones[controls[pelvis].bone]
+    bone.matrix_basis = Matrix.Translation((0.0, way, 0.0))
+    moved = pose_matrices(settled(context, rig), [control.bone for control in controls])[:, :3, 3] - start
+    bone.matrix_basis = Matrix.Identity(4)
+    for control, by in zip(controls, moved, strict=True):
+        if control.joint in _CARRIED and np.linalg.norm(by - moved[pelvis]) > 0.5 * np.linalg.norm(moved[pelvis]):
+            raise InputError(f"The bone '{bone.name}' does not carry '{control.bone}'; choose the one above both as pelvis.")
 
 
 def _spread(values: np.ndarray) -> float:

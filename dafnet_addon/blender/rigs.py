@@ -255,4 +255,20 @@ def _guessed(armature: bpy.types.Object) -> RigMap:
         put(f"{side}_knee", first(side, _WORDS["knee"]) or first(side, {"leg"}, {thigh or ""}))
         for joint in ("elbow", "wrist", "ankle", "foot"):
             put(f"{side}_{joint}", first(side, _WORDS[joint], joints.values()))
-    return RigMap("Guessed", joints=joints, root=first(None, {"root", "master"}))
+    above = [joints[joint] for joint in ("spine1", "spine2", "neck", "left_hip", "right_hip") if joint in joints]
+    put("pelvis", _carrier(armature, joints.get("pelvis"), above))
+    return RigMap("Guessed", joints=joints, root=first(None, {"root", "master"}, [joints.get("pelvis", "")]))
+
+
+def _carrier(armature: bpy.types.Object, bone: str | None, others: list[str]) -> str | None:
+    """The bone itself, or the nearest one above it of which all the others are descendants; itself where there is none.
+
+    Some rigs have a bone for the hips' own turns beside the trunk, and both hang on the one that moves the body.
+    """
+    if bone is None:
+        return None
+    own = armature.data.bones
+    return next((
+        each.name for each in (own[bone], *own[bone].parent_recursive)
+        if all(each in own[other].parent_recursive for other in others)
+    ), bone)

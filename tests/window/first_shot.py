@@ -146,3 +146,11 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
     yield from user.picture("overlays")
     for name in switches:
         setattr(overlays, name, False)
+
+    view = bpy.context.preferences.view
+    language = view.language
+    view.language, view.use_translate_interface = "de_DE", True
+    yield 0.5
+    assert bpy.app.translations.pgettext_iface("Vary the Legs") == "Beine variieren"
+    yield from user.picture("german")
+    view.language = language
