@@ -42,7 +42,7 @@ class DAFNET_OT_bake_to_rig(bpy.types.Operator):
             errors = ", ".join(f"{part} {100 * mean:.1f} ({100 * most:.1f})" for part, (mean, most) in baked.errors.items())
             if max(mean for mean, _ in baked.errors.values()) > _FAR and baked.overruled:
                 bones = ", ".join(f"'{bone}'" for bone in baked.overruled[:3])
-                self.report({"WARNING"}, f"The body is off by more than 2 cm; mute constraints and drivers of {bones}, bake again")
+                self.report({"WARNING"}, f"Off by more than 2 cm; mute the constraints and drivers of {bones} and bake again")
             elif max(baked.errors["wrists"][0], baked.errors["ankles"][0]) > _FAR:
                 self.report({"WARNING"}, "Hands or feet are off by more than 2 cm; the rig's limbs are short for this motion")
             size = "" if baked.ratio == 1.0 else f", motion scaled by {baked.ratio:.2f}"
