@@ -57,7 +57,7 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
     yield from user.sidebar("DAFNet")
     yield from user.click("dafnet.add_character")
     ann = scene.objects["Character"]
-    _look(user, (0.8, 0.6, 0.7), 5.5)
+    _look(user, (0.9, 0.7, 0.6), 4.5)
     yield from user.picture("add_character")
 
     with user.override():
@@ -97,7 +97,7 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
 
     ann.dafnet.take_count = 3
     yield from user.click("dafnet.generate(task='NEW')")
-    yield from user.until(lambda: len(ann.dafnet.takes) == 4, "three more takes")
+    yield from user.until(lambda: progress() is None and len(ann.dafnet.takes) == 4, "three more takes")
     yield from user.click("dafnet.play_take(index=2)", 0.1)
     assert ann.animation_data.action == ann.dafnet.takes[2].action
     chosen = ann.animation_data.action
@@ -118,7 +118,7 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
     scene.frame_set(2)
     assert ann.dafnet.mode == "FREE", "the mode is keyed"
     yield from user.click("dafnet.generate(task='NEW')")
-    yield from user.until(lambda: len(ann.dafnet.takes) == 5, "the take with two modes")
+    yield from user.until(lambda: progress() is None and len(ann.dafnet.takes) == 5, "the take with two modes")
     scene.frame_set(scene.frame_end - 10)
     wrist = ann.matrix_world @ ann.pose.bones["right_wrist"].head
     assert (wrist - ann.dafnet.hand_right.location).length < 0.02, "the hand is at its target"
