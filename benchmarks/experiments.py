@@ -203,8 +203,8 @@ def _ratio(worse: np.ndarray, better: np.ndarray) -> float:
 
 
 def paired(clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path, draws: int = 4000) -> str:
-    """AP-P's figures over DAFNet's in EE on the same clips, for each budget, with the 95 % interval of the ratio over pairs drawn
-    anew, and in how many clips AP-P is the worse; writes ``output``/paired.md. What is measured is kept in paired.json.
+    """AP-P's figures over DAFNet's in EE on the same clips, for each budget, with the 95 % interval of the ratio over pairs
+    drawn anew, and in how many clips AP-P is the worse; writes ``output``/paired.md. What is measured is kept in paired.json.
     """
     file = output / "paired.json"
     known: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
