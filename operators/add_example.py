@@ -6,7 +6,7 @@ import bpy
 from bpy.props import EnumProperty
 
 from ..dafnet_addon.blender.examples import EXAMPLES, add_example
-from .generate import DAFNET_OT_generate
+from .generate import idle
 from .reporting import reported
 
 __all__ = ["DAFNET_OT_add_example"]
@@ -31,8 +31,7 @@ class DAFNET_OT_add_example(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """A new armature needs object mode."""
-        if DAFNET_OT_generate.progress is not None:
-            cls.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
+        if not idle(cls):
             return False
         cls.poll_message_set("Leave the current mode for object mode first")
         return context.mode == "OBJECT"

@@ -6,7 +6,7 @@ import bpy
 
 from ..dafnet_addon.blender.onto_rig import bake_onto_rig
 from ..dafnet_addon.blender.rig_properties import character_for, map_of, rig_of
-from .generate import DAFNET_OT_generate
+from .generate import idle
 from .reporting import reported
 
 __all__ = ["DAFNET_OT_bake_to_rig"]
@@ -25,8 +25,7 @@ class DAFNET_OT_bake_to_rig(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """An own rig is active, and none is being generated."""
-        if DAFNET_OT_generate.progress is not None:
-            cls.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
+        if not idle(cls):
             return False
         cls.poll_message_set("Select the armature of your rig, in object or pose mode")
         return rig_of(context) is not None and context.mode in {"OBJECT", "POSE"}

@@ -17,7 +17,7 @@ from ..dafnet_addon.blender.path_sources import (
 )
 from ..dafnet_addon.blender.walking import Walk
 from ..dafnet_addon.core.trails import FASTEST, SLOWEST
-from .generate import DAFNET_OT_generate
+from .generate import idle
 from .reporting import reported
 
 __all__ = ["DAFNET_OT_root_from_object", "DAFNET_OT_walk_along_curve", "DAFNET_OT_walk_through_points", "may_direct"]
@@ -27,9 +27,9 @@ _SPEED = "Of walking, in metres a second for a body of 1.75 m"
 
 def may_direct(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Whether there is a character to direct in object mode and none is being generated; says what is missing."""
-    if DAFNET_OT_generate.progress is not None:
-        cls.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
-    elif context.mode != "OBJECT":
+    if not idle(cls):
+        return False
+    if context.mode != "OBJECT":
         cls.poll_message_set("Leave the current mode for object mode first")
     elif (character := sent(context)[0]) is None:
         cls.poll_message_set("Add a character, or select one")

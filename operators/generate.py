@@ -14,7 +14,7 @@ from ..dafnet_addon.blender.takes import active_take, draw_of, frames_of
 from ..dafnet_addon.core.errors import InputError
 from .reporting import reported
 
-__all__ = ["DAFNET_OT_cancel", "DAFNET_OT_generate"]
+__all__ = ["DAFNET_OT_cancel", "DAFNET_OT_generate", "idle"]
 
 _TICK = 0.02
 """Seconds of work between two looks at the user's input."""
@@ -182,6 +182,14 @@ class DAFNET_OT_generate(bpy.types.Operator):
         seconds = sum(result.seconds.values())
         takes = f"'{result.action.name}'" if len(result.takes) == 1 else f"{len(result.takes)} takes"
         self.report({"INFO"}, f"{len(result.take)} frames in {seconds:.1f} s: {takes}")
+
+
+def idle(operator: Any) -> bool:
+    """Whether nothing is being generated; else the operator's button says why it waits."""
+    if DAFNET_OT_generate.progress is None:
+        return True
+    operator.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
+    return False
 
 
 class DAFNET_OT_cancel(bpy.types.Operator):

@@ -6,7 +6,7 @@ from ..dafnet_addon.blender import overlays
 from ..dafnet_addon.blender.armature import character_of
 from ..dafnet_addon.blender.overlay_data import faults_of, playing
 from ..dafnet_addon.blender.takes import PACKED, takes_of
-from .generate import DAFNET_OT_generate
+from .generate import idle
 from .reporting import reported
 
 __all__ = ["DAFNET_OT_mark_frames"]
@@ -21,8 +21,7 @@ class DAFNET_OT_mark_frames(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """A take plays, and none is being generated."""
-        if DAFNET_OT_generate.progress is not None:
-            cls.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
+        if not idle(cls):
             return False
         cls.poll_message_set("Let the character play a take first")
         character = character_of(context)

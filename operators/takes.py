@@ -8,7 +8,7 @@ from bpy.props import EnumProperty, IntProperty
 from ..dafnet_addon.blender import job
 from ..dafnet_addon.blender.armature import character_of
 from ..dafnet_addon.blender.takes import active_take, drop_take, play_take, takes_of
-from .generate import DAFNET_OT_generate
+from .generate import idle
 from .reporting import reported
 
 __all__ = ["DAFNET_OT_clean_again", "DAFNET_OT_keep_accepted", "DAFNET_OT_play_take", "DAFNET_OT_reject_take"]
@@ -26,8 +26,7 @@ class _OfTakes:
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a take, and time for it."""
         character = character_of(context)
-        if DAFNET_OT_generate.progress is not None:
-            cls.poll_message_set("Wait for the take to be generated, or cancel it with Esc")  # type: ignore[attr-defined]
+        if not idle(cls):
             return False
         cls.poll_message_set("Generate a take first")  # type: ignore[attr-defined]
         return character is not None and bool(takes_of(character))
@@ -77,7 +76,7 @@ class DAFNET_OT_reject_take(_OfTakes, bpy.types.Operator):
         """There is a row, be its action there or not."""
         character = character_of(context)
         cls.poll_message_set("There is no take in the list")
-        return DAFNET_OT_generate.progress is None and character is not None and len(character.dafnet.takes) > 0
+        return idle(cls) and character is not None and len(character.dafnet.takes) > 0
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Drop it."""

@@ -5,7 +5,7 @@ from bpy.props import EnumProperty, FloatProperty
 
 from ..dafnet_addon.blender.armature import sent
 from ..dafnet_addon.blender.walking import walk
-from .generate import DAFNET_OT_generate
+from .generate import idle
 from .reporting import reported
 
 __all__ = ["DAFNET_OT_walk_to"]
@@ -33,8 +33,7 @@ class DAFNET_OT_walk_to(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a character to send, and none is being generated."""
-        if DAFNET_OT_generate.progress is not None:
-            cls.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
+        if not idle(cls):
             return False
         cls.poll_message_set("Add a character, or select one beside its goal")
         return context.mode == "OBJECT" and sent(context)[0] is not None

@@ -1,6 +1,6 @@
 """What a user may do to Blender while a take is made: each time the job ends by itself or goes on, and nothing breaks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 import bpy
@@ -52,6 +52,18 @@ def _close(_folder: Path) -> None:
     bpy.ops.wm.read_homefile(app_template="")
 
 
+def _started(folder: Path) -> Generator[float, None, Driver]:
+    """A take begun in a new file."""
+    bpy.ops.wm.read_homefile(app_template="")
+    yield 0.5
+    user = Driver(folder)
+    yield from user.press("ESC")
+    _new_shot(user)
+    yield from user.sidebar("DAFNet")
+    yield from user.click("dafnet.generate(task='NEW')")
+    return user
+
+
 def interruptions(folder: Path) -> Waits:
     """Run through them, one after the other."""
     done: list[tuple[Callable[[Path], None], bool]] = [
@@ -59,13 +71,7 @@ def interruptions(folder: Path) -> Waits:
         (_close, False),
     ]
     for interrupt, finishes in done:
-        bpy.ops.wm.read_homefile(app_template="")
-        yield 0.5
-        user = Driver(folder)
-        yield from user.press("ESC")
-        _new_shot(user)
-        yield from user.sidebar("DAFNet")
-        yield from user.click("dafnet.generate(task='NEW')")
+        user = yield from _started(folder)
         yield from user.until(lambda: (progress() or 0.0) > 0.2, "progress")
         with user.override():
             interrupt(folder)
@@ -75,11 +81,5 @@ def interruptions(folder: Path) -> Waits:
         print(f"{interrupt.__name__}: {len(made)} takes", flush=True)
         assert len(made) == finishes, interrupt.__name__
     # And after all of it, a take is made as ever.
-    bpy.ops.wm.read_homefile(app_template="")
-    yield 0.5
-    user = Driver(folder)
-    yield from user.press("ESC")
-    _new_shot(user)
-    yield from user.sidebar("DAFNet")
-    yield from user.click("dafnet.generate(task='NEW')")
+    user = yield from _started(folder)
     yield from user.until(lambda: len(bpy.data.objects["Ann"].dafnet.takes) == 1, "the take")
