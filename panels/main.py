@@ -4,7 +4,11 @@ import bpy
 
 from ..dafnet_addon.blender.armature import character_of, sent
 from ..dafnet_addon.blender.compat import action_curves
+from ..dafnet_addon.blender.targets import lacks_root, missing_targets
 from ..operators.add_character import DAFNET_OT_add_character
+from ..operators.add_root import DAFNET_OT_add_root
+from ..operators.add_targets import DAFNET_OT_add_targets
+from ..operators.find_furniture import DAFNET_OT_find_furniture
 from ..operators.generate import DAFNET_OT_cancel, DAFNET_OT_generate
 from ..operators.walk_to import DAFNET_OT_walk_to
 from .presets import DAFNET_PT_presets
@@ -71,8 +75,14 @@ class DAFNET_PT_character(bpy.types.Panel):
         animated = any(curve.data_path == "dafnet.mode" for curve in action_curves(character))
 
         column = layout.column()
-        column.prop(settings, "furniture")
-        column.prop(settings, "root", icon="EMPTY_ARROWS")
+        row = column.row(align=True)
+        row.prop(settings, "furniture")
+        if settings.furniture is None:
+            row.operator(DAFNET_OT_find_furniture.bl_idname, text="", icon="VIEWZOOM")
+        row = column.row(align=True)
+        row.prop(settings, "root", icon="EMPTY_ARROWS")
+        if lacks_root(context, character):
+            row.operator(DAFNET_OT_add_root.bl_idname, text="", icon="ADD")
         if settings.mode == "EE" or animated:
             column = layout.column()
             for role in ("head", "hand_left", "hand_right"):
@@ -81,6 +91,8 @@ class DAFNET_PT_character(bpy.types.Panel):
                 row.use_property_decorate = True
                 row.active = getattr(settings, role) is not None
                 row.prop(settings, f"{role}_influence", text="Influence", slider=True)
+            if missing_targets(context, character):
+                column.operator(DAFNET_OT_add_targets.bl_idname, icon="EMPTY_ARROWS")
         if settings.mode == "FULL" or animated:
             layout.prop(settings, "upper_body_source", icon="ARMATURE_DATA")
             if settings.upper_body_source is None:

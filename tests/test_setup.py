@@ -321,6 +321,17 @@ def test_missing_targets_are_added_where_head_and_hands_are(stage: Set) -> None:
         assert target.name in stage.ann.users_collection[0].objects
 
 
+def test_a_missing_root_is_added_where_the_character_stands(stage: Set) -> None:
+    assert not stage.bpy.ops.dafnet.add_root.poll(), "it has one"
+    stage.bpy.data.objects.remove(stage.ann.dafnet.root)
+    stage.bpy.context.view_layer.objects.active = stage.ann
+    stage.ann.location, stage.ann.rotation_euler.z = (1.0, 2.0, 0.0), np.pi + 0.5
+    assert stage.bpy.ops.dafnet.add_root() == {"FINISHED"}
+    root = stage.ann.dafnet.root
+    assert (root.location - stage.ann.location).length < 1e-6 and root.rotation_euler.z == pytest.approx(0.5)
+    assert stage.bpy.ops.dafnet.generate.poll() and not stage.bpy.ops.dafnet.add_root.poll()
+
+
 def joints(stage: Any, character: Any, frames: range, name: str) -> np.ndarray:
     found = []
     for frame in frames:

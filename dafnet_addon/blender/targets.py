@@ -1,15 +1,42 @@
-"""The empties that head and hands follow, made where a character has none."""
+"""The empties that a character follows, made where it has none: the root, and the targets of head and hands."""
 
 import bpy
+import numpy as np
 
 from ..core.errors import InputError
 from .armature import character_scale
 
-__all__ = ["add_targets", "missing_targets"]
+__all__ = ["add_root", "add_targets", "lacks_root", "missing_targets"]
 
 _TARGETS = {"head": ("head", "Head", 0.2), "hand_left": ("left_wrist", "Left Hand", 0.15),
             "hand_right": ("right_wrist", "Right Hand", 0.15)}
 """The bone of each, its name, and the size that it is shown at, metres of a body of 1.75 m."""
+
+
+def lacks_root(context: bpy.types.Context, armature: bpy.types.Object) -> bool:
+    """Whether the root is not set or not in the scene."""
+    root = armature.dafnet.root
+    return root is None or root.name not in context.scene.objects
+
+
+def add_root(context: bpy.types.Context, armature: bpy.types.Object) -> bpy.types.Object:
+    """Make the root where the armature stands and looks in the current frame, in its collection.
+
+    ``InputError``: it has one already, or is no character or linked; nothing is changed then.
+    """
+    if not lacks_root(context, armature):
+        raise InputError(f"'{armature.name}' has a root already; animate '{armature.dafnet.root.name}'.")
+    if armature.library:
+        raise InputError(f"The character '{armature.name}' is linked; make it local to add a root.")
+    size = character_scale(armature)
+    place = armature.evaluated_get(context.evaluated_depsgraph_get()).matrix_world
+    root = bpy.data.objects.new(f"{armature.name} Root", None)
+    root.empty_display_type, root.empty_display_size = "ARROWS", 0.4 * size
+    root.location = place.translation
+    root.rotation_euler = (0.0, 0.0, place.to_euler().z % (2.0 * np.pi) - np.pi)  # armatures look along -y, roots along y
+    armature.users_collection[0].objects.link(root)
+    armature.dafnet.root = root
+    return root
 
 
 def missing_targets(context: bpy.types.Context, armature: bpy.types.Object) -> list[str]:
