@@ -5,7 +5,8 @@ import bpy
 __all__ = ["register", "unregister"]
 
 _GERMAN = {
-    "Add Character": "Figur hinzufügen", "Add Root": "Wurzel hinzufügen", "Add DAFNet Example": "DAFNet-Beispiel hinzufügen", "Add Preset": "Vorgabe hinzufügen",
+    "Add Character": "Figur hinzufügen", "Add Root": "Wurzel hinzufügen",
+    "Add DAFNet Example": "DAFNet-Beispiel hinzufügen", "Add Preset": "Vorgabe hinzufügen",
     "Add Targets": "Ziele hinzufügen", "Accepted": "Angenommen", "Backwards": "Rückwärts", "Bake to Rig": "Auf Rig backen",
     "Blend": "Überblenden", "Bone": "Knochen", "Cancel": "Abbrechen", "Character": "Figur", "Clean Up Again": "Neu bereinigen",
     "Clean-Up": "Bereinigen", "Clear Furniture": "Aus Möbeln lösen", "Collisions": "Berührungen", "Contacts": "Kontakte",
