@@ -78,7 +78,7 @@ def _rotation(controls: Controls, name: str, target: np.ndarray) -> np.ndarray |
 def targets_of(shot: Shot) -> dict[str, np.ndarray]:
     """Where head and wrists have to be: world positions (N, 3), canonical metres, NaN where they are free, even in part."""
     places = to_world(shot.path, shot.conditions.observation[PREROLL:].reshape(-1, 22, 3))
-    given = shot.share[PREROLL:] >= 1.0
+    given = (shot.conditions.given[PREROLL:] > 0) & (shot.share[PREROLL:] >= 1.0)
     slots = {name: MODEL_ORDER.index(j) for name, j in END_EFFECTORS.items()}
     return {name: np.where(given[:, slot, None], places[:, slot], np.nan) for name, slot in slots.items()}
 
