@@ -167,6 +167,8 @@ def test_beside_measures_all_modes_and_the_likelihood_of_real_poses():
     runs = e.beside(sampler, clip, seeds=2).runs
     assert set(runs) == {"ground_truth", "legs", *(f"{m}_t{t}" for m in ("free", "ee", "full") for t in ("0", "0_clean", "1"))}
     assert _figure(runs["ee_t0_clean"], "end_effector_error") < 0.5 * _figure(runs["ee_t0"], "end_effector_error")
+    untouched = _figure(runs["free_t0_clean"], "end_effector_error"), _figure(runs["free_t0"], "end_effector_error")
+    assert abs(untouched[0] - untouched[1]) < 0.2 * untouched[1], "in FREE the clean-up knows of no target"
     assert _figure(runs["legs"], "apd_upper") < 0.1 * _figure(runs["free_t1"], "apd_upper")
     own = _followed(sampler, (clip, None))
     assert own.actions.shape == (40, 10) and np.allclose(own.actions.sum(1), 1.0, atol=1e-4)
