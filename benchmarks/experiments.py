@@ -197,9 +197,9 @@ def measure(table: str, clips: Mapping[str, Sequence[HeldClip]], runs: Path, out
 
 
 def _ratio(worse: np.ndarray, better: np.ndarray) -> float:
-    """Ratio of two systems' figures over clips, (N, 2) totals and weights."""
+    """Ratio of two systems' figures over clips, (N, 2) totals and weights; NaN where the second has none."""
     (a, m), (b, n) = worse.sum(0), better.sum(0)
-    return float((a / m) / (b / n))
+    return float((a / m) / (b / n)) if b else float("nan")
 
 
 def paired(clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path, draws: int = 4000) -> str:
