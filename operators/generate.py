@@ -163,12 +163,14 @@ class DAFNET_OT_generate(bpy.types.Operator):
 
     def _pump(self, context: bpy.types.Context) -> job.Result | None:
         """Work for a tick; the result once it is there."""
-        until = perf_counter() + _TICK
-        while perf_counter() < until:
+        now = perf_counter()
+        until, step = now + _TICK, 0.0
+        while now < until and step < _TICK / 2:  # after a long step another one is likely, which had better have its own tick
             try:
                 type(self).progress = next(self._steps)
             except StopIteration as done:
                 return done.value
+            step, now = perf_counter() - now, perf_counter()
         share, spent = self.progress or 0.0, perf_counter() - self._started
         type(self).left = spent * (1.0 - share) / max(share, 0.01)
         context.window_manager.progress_update(100 * share)
