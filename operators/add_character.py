@@ -23,6 +23,11 @@ class DAFNET_OT_add_character(bpy.types.Operator):
         description="Crown to sole, in metres",
     )
 
+    build: FloatProperty(
+        name="Build", default=1.0, min=0.5, soft_min=0.7, soft_max=1.4, max=2.0,
+        description="How stout the body is; the motion is the same",
+    )
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """A new armature needs object mode."""
@@ -32,6 +37,6 @@ class DAFNET_OT_add_character(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Add it."""
         with reported(self):
-            create_character(context, self.name, self.height)
+            create_character(context, self.name, self.height, self.build)
             return {"FINISHED"}
         return {"CANCELLED"}

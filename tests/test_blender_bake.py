@@ -58,8 +58,21 @@ def test_character_stands_in_the_rest_pose(blender, addon) -> None:
     assert None not in (ann.dafnet.head, ann.dafnet.hand_left, ann.dafnet.hand_right)
 
 
-def test_body_is_a_closed_person_of_the_stature(blender, addon) -> None:
-    ann = character(blender, addon, height=1.6)
+def test_build_makes_the_body_stouter_and_leaves_the_bones(blender, addon) -> None:
+    wide = {}
+    for build in (0.8, 1.0, 1.4):
+        ann = character(blender, addon, build=build)
+        body = next(child for child in ann.children if child.type == "MESH")
+        points = np.array([v.co for v in body.data.vertices])
+        waist = points[(np.abs(points[:, 2] - 1.1) < 0.05) & (np.abs(points[:, 0]) < 0.3)]
+        wide[build] = np.ptp(waist[:, 0]), np.ptp(points[:, 2]), ann.data.bones["spine1"].head_local.copy()
+    assert wide[0.8][0] < 0.9 * wide[1.0][0] and wide[1.4][0] > 1.3 * wide[1.0][0]
+    assert wide[0.8][1:] == wide[1.0][1:] == wide[1.4][1:], "as tall, on the same bones"
+
+
+@pytest.mark.parametrize("build", [0.7, 1.0, 1.4])
+def test_body_is_a_closed_person_of_the_stature(blender, addon, build: float) -> None:
+    ann = character(blender, addon, height=1.6, build=build)
     body = next(child for child in ann.children if child.type == "MESH")
     points = np.array([v.co for v in body.data.vertices])
     assert np.ptp(points[:, 2]) == pytest.approx(1.6, abs=0.01)

@@ -104,8 +104,12 @@ def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:
     return scale * float(size[0]) * unit
 
 
-def create_character(context: bpy.types.Context, name: str = "Character", height: float = STATURE) -> bpy.types.Object:
+def create_character(
+    context: bpy.types.Context, name: str = "Character", height: float = STATURE, build: float = 1.0,
+) -> bpy.types.Object:
     """A character of this height (metres) at the 3D cursor: armature, body, and root, head and hand empties.
+
+    ``build``: thickness of trunk and limbs over the usual; bones and motion are the same.
 
     It stands in a T-pose looking along the world's +y, in a new collection of its own. Returns the armature, whose
     ``dafnet`` settings name the empties. ``InputError``: Blender is not in object mode.
@@ -120,7 +124,7 @@ def create_character(context: bpy.types.Context, name: str = "Character", height
     armature = _armature_object(context, collection, name, scale)
     armature.location = place
     armature.rotation_euler = (0.0, 0.0, np.pi)
-    add_body(collection, armature, scale)
+    add_body(collection, armature, scale, build)
 
     def empty(role: str, point: tuple[float, float, float], size: float) -> bpy.types.Object:
         made = bpy.data.objects.new(f"{name} {role}", None)

@@ -15,6 +15,8 @@ FACING = np.diag([-1.0, -1.0, 1.0])
 _LIGHT, _DARK = 0, 1
 _MATERIALS = (("Mannequin", (0.62, 0.56, 0.50, 1.0)), ("Mannequin Joints", (0.16, 0.15, 0.15, 1.0)))
 _RINGS, _SEGMENTS = 14, 16
+_LEAN = ("head", "left_wrist", "left_ankle", "left_foot")
+"""Parts that are as they are on any build."""
 
 # Bone, material, axis, and sections along that axis: the place on it, the centre's two other coordinates, half widths.
 _PARTS = (
@@ -117,9 +119,13 @@ def _catmull_rom(rows: np.ndarray, at: np.ndarray) -> np.ndarray:
     return b + 0.5 * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a)))
 
 
-def _part(axis: str, sections: tuple[tuple[float, ...], ...]) -> tuple[np.ndarray, list[tuple[int, ...]]]:
-    """Vertices and faces of a tube with round ends through elliptic sections; a sole is flat on the floor."""
-    rows = np.asarray(sections, float)
+def _part(
+    axis: str, sections: tuple[tuple[float, ...], ...], build: float
+) -> tuple[np.ndarray, list[tuple[int, ...]]]:
+    """Vertices and faces of a tube with round ends through elliptic sections, ``build`` times as thick; a sole is flat on the
+    floor.
+    """
+    rows = np.asarray(sections, float) * (1.0, 1.0, 1.0, build, build)
     u = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, _RINGS + 2)[1:-1])
     rings = _catmull_rom(rows, u * (len(rows) - 1))
     cap = np.array([rows[1, 0] - rows[0, 0], rows[-1, 0] - rows[-2, 0]])
@@ -150,15 +156,17 @@ def _part(axis: str, sections: tuple[tuple[float, ...], ...]) -> tuple[np.ndarra
     return points, faces
 
 
-def add_body(collection: bpy.types.Collection, armature: bpy.types.Object, scale: float) -> bpy.types.Object:
-    """The mannequin: one mesh, each part bound rigidly to its bone."""
+def add_body(
+    collection: bpy.types.Collection, armature: bpy.types.Object, scale: float, build: float = 1.0
+) -> bpy.types.Object:
+    """The mannequin: one mesh, each part bound rigidly to its bone; trunk and limbs ``build`` times as thick."""
     vertices: list[np.ndarray] = []
     faces: list[tuple[int, ...]] = []
     materials: list[int] = []
     groups: dict[str, list[int]] = {}
     count = 0
     for bone, material, axis, sections in _PARTS:
-        points, shape = _part(axis, sections)
+        points, shape = _part(axis, sections, 1.0 if bone in _LEAN else build)
         for side in ("left", "right") if bone.startswith("left_") else ("middle",):
             if side == "right":
                 points, shape = points * (-1.0, 1.0, 1.0), [face[::-1] for face in shape]
