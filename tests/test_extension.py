@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).absolute().parents[1]
 SHIPPED = {"__init__.py", "blender_manifest.toml", "dafnet_addon", "operators", "panels", "weights_stub", "LICENSE",
-           "LICENSE-WEIGHTS.md", "README.md"}
+           "LICENSE-WEIGHTS.md", "README.md", "docs"}
 LEFT_OUT = {"model", "data", "training", "baselines"}
 
 LIFE = """
@@ -68,8 +68,12 @@ def test_the_zip_holds_what_an_animator_needs(zipped: Path) -> None:
     names = [PurePosixPath(name) for name in zipfile.ZipFile(zipped).namelist()]
     assert {name.parts[0] for name in names} <= SHIPPED
     assert not {name.parts[1] for name in names if name.parts[0] == "dafnet_addon"} & LEFT_OUT
+    assert {name.parts[1] for name in names if name.parts[0] == "docs"} == {"guide.md", "guide"}
     assert not [name for name in names if "__pycache__" in name.parts or name.suffix in {".pyc", ".zip", ".blend"}]
     shipped = {str(name) for name in names}
+    for folder in ("rig_maps", "presets/dafnet"):
+        files = {path for path in (ROOT / "dafnet_addon/blender" / folder).iterdir() if path.is_file()}
+        assert files and {str(path.relative_to(ROOT)) for path in files} <= shipped
     for package in ("dafnet_addon/core", "dafnet_addon/blender", "operators", "panels"):
         assert {str(path.relative_to(ROOT)) for path in (ROOT / package).glob("*.py")} <= shipped
     assert any(name.parts[0] == "weights_stub" and name.suffix == ".safetensors" for name in names)

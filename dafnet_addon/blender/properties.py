@@ -3,6 +3,7 @@
 import atexit
 import importlib.util
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -42,6 +43,7 @@ def _is_not_the_character(settings: "CharacterSettings", candidate: bpy.types.Ob
     return candidate != settings.id_data
 
 
+_GUIDE = Path(__file__).parents[2] / "docs" / "guide.md"
 PACKED = "dafnet_take"
 """The property of an action that holds its take (``blender.takes``)."""
 CLEAN_UP = {
@@ -205,6 +207,7 @@ class Preferences(bpy.types.AddonPreferences):
         self.layout.use_property_split = True
         self.layout.prop(self, "weights")
         self.layout.prop(self, "engine")
+        self.layout.operator("wm.path_open", text="Open the Guide", icon="HELP").filepath = str(_GUIDE)
 
 
 @dataclass(frozen=True)
