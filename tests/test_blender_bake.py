@@ -221,4 +221,4 @@ def test_three_hundred_frames_bake_fast(blender, addon) -> None:
     take = made_take(addon, frames=300)
     started = perf_counter()
     addon("dafnet_addon.blender.baker").bake(take, ann, 1, "Walk")
-    assert perf_counter() - started < 0.5, "0.05 s on an idle machine"
+    assert perf_counter() - started < 3.0, "0.05 s on an idle machine, over 5 s key by key"
