@@ -15,10 +15,9 @@ from ..dafnet_addon.blender.path_sources import (
     may_move,
     through_points,
 )
-from ..dafnet_addon.blender.walking import Walk
 from ..dafnet_addon.core.trails import FASTEST, SLOWEST
 from .generate import idle
-from .reporting import reported
+from .reporting import keyed, reported
 
 __all__ = ["DAFNET_OT_root_from_object", "DAFNET_OT_walk_along_curve", "DAFNET_OT_walk_through_points", "may_direct"]
 
@@ -49,12 +48,6 @@ def _has(
     return chosen(context, fits)[1] is not None
 
 
-def _told(operator: bpy.types.Operator, made: Walk) -> set[str]:
-    ended = ", the range now ends there" if made.extended else ""
-    operator.report({"INFO"}, f"Keyed the root from frame {made.first} to {made.last}{ended}.")
-    return {"FINISHED"}
-
-
 class DAFNET_OT_walk_along_curve(bpy.types.Operator):
     """Key the character's root along the selected curve from the current frame on; keys after that are replaced"""
 
@@ -78,7 +71,7 @@ class DAFNET_OT_walk_along_curve(bpy.types.Operator):
         """Key the walk."""
         character, curve = chosen(context, is_curve)
         with reported(self):
-            return _told(self, along_curve(
+            return keyed(self, along_curve(
                 context, character, curve, speed=self.speed, seconds=self.seconds, keep_facing=self.keep_facing,
                 backwards=self.backwards,
             ))
@@ -106,7 +99,7 @@ class DAFNET_OT_walk_through_points(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Key the walk."""
         with reported(self):
-            return _told(self, through_points(
+            return keyed(self, through_points(
                 context, sent(context)[0], floor_points(context), speed=self.speed, seconds=self.seconds,
                 to_cursor=self.to_cursor,
             ))
@@ -132,5 +125,5 @@ class DAFNET_OT_root_from_object(bpy.types.Operator):
             made, warning = as_moved(context, character, source)
             if warning:
                 self.report({"WARNING"}, warning)
-            return _told(self, made)
+            return keyed(self, made)
         return {"CANCELLED"}

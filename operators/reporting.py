@@ -5,9 +5,10 @@ from contextlib import contextmanager
 
 import bpy
 
+from ..dafnet_addon.blender.walking import Walk
 from ..dafnet_addon.core.errors import DafnetError
 
-__all__ = ["reported"]
+__all__ = ["keyed", "reported"]
 
 
 @contextmanager
@@ -17,3 +18,10 @@ def reported(operator: bpy.types.Operator) -> Iterator[None]:
         yield
     except DafnetError as error:
         operator.report({"ERROR"}, str(error))
+
+
+def keyed(operator: bpy.types.Operator, made: Walk) -> set[str]:
+    """Say where the root was keyed; what the operator returns."""
+    ended = ", the range now ends there" if made.extended else ""
+    operator.report({"INFO"}, f"Keyed the root from frame {made.first} to {made.last}{ended}.")
+    return {"FINISHED"}

@@ -6,7 +6,7 @@ from bpy.props import EnumProperty, FloatProperty
 from ..dafnet_addon.blender.armature import sent
 from ..dafnet_addon.blender.walking import walk
 from .generate import idle
-from .reporting import reported
+from .reporting import keyed, reported
 
 __all__ = ["DAFNET_OT_walk_to"]
 
@@ -46,7 +46,5 @@ class DAFNET_OT_walk_to(bpy.types.Operator):
             return {"CANCELLED"}
         with reported(self):
             made = walk(context, character, seat if self.goal == "SEAT" else None, self.seconds, self.speed)
-            ended = ", the range now ends there" if made.extended else ""
-            self.report({"INFO"}, f"Keyed the root from frame {made.first} to {made.last}{ended}.")
-            return {"FINISHED"}
+            return keyed(self, made)
         return {"CANCELLED"}

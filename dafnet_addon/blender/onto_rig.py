@@ -22,6 +22,7 @@ from .mannequin import FACING
 from .rig_controls import Attachments, Channels, Control, channels, controls_of, posed, probe, settled
 from .rig_reading import character_motion, pose_matrices, rigid_parts, shape_of
 from .rigs import RigMap, in_names_of, required
+from .scene_reader import frame_kept
 
 __all__ = ["Baked", "bake_onto_rig", "frames_played"]
 
@@ -82,7 +83,7 @@ def bake_onto_rig(
     required(rig, rig_map)
     controls = controls_of(rig, rig_map, limbs, root_motion == "BONE")
     read = _read(context, character, rig, frames)
-    with _undone_on_failure(context, rig):
+    with frame_kept(context.scene), _undone_on_failure(rig):
         return _bake(context, character, rig, rig_map, controls, read, _Wish(
             root_motion, limbs, np.array(frames, float), name or f"{character.name} on {rig.name}", size, unit))
 
@@ -180,19 +181,15 @@ def _require_bakeable(context: bpy.types.Context, rig: bpy.types.Object, root_mo
 
 def _read(context: bpy.types.Context, character: bpy.types.Object, rig: bpy.types.Object, frames: range) -> _Read:
     """Play the frames and note what is needed; the current frame is as it was afterwards."""
-    scene = context.scene
-    now, within = scene.frame_current, scene.frame_subframe
     bodies, poses, above = [], [], []
-    try:
+    with frame_kept(context.scene):
         for frame in frames:
-            scene.frame_set(frame)
+            context.scene.frame_set(frame)
             depsgraph = context.evaluated_depsgraph_get()
             evaluated, own = character.evaluated_get(depsgraph), rig.evaluated_get(depsgraph)
             bodies.append(np.array(evaluated.matrix_world, float))
             poses.append(pose_matrices(evaluated, list(JOINTS)))
             above.append(np.array(own.matrix_world @ own.matrix_basis.inverted_safe(), float))
-    finally:
-        scene.frame_set(now, subframe=within)
     read = _Read(np.array(bodies), np.array(poses), np.array(above))
     if not all(np.isfinite(values).all() for values in (read.bodies, read.poses, read.above)):
         raise InputError(f"'{character.name}' or '{rig.name}' has a transform that is not a number; fix what drives it.")
@@ -200,10 +197,8 @@ def _read(context: bpy.types.Context, character: bpy.types.Object, rig: bpy.type
 
 
 @contextmanager
-def _undone_on_failure(context: bpy.types.Context, rig: bpy.types.Object) -> Iterator[None]:
-    """The rig's action, pose, settings and the current frame as they were where the block fails; the frame in any case."""
-    scene = context.scene
-    now, within = scene.frame_current, scene.frame_subframe
+def _undone_on_failure(rig: bpy.types.Object) -> Iterator[None]:
+    """The rig's action, pose and settings as they were where the block fails."""
     again, basis = playing(rig), rig.matrix_basis.copy()
     poses = {bone.name: bone.matrix_basis.copy() for bone in rig.pose.bones}
     values = {
@@ -222,8 +217,6 @@ def _undone_on_failure(context: bpy.types.Context, rig: bpy.types.Object) -> Ite
         for (bone, key), value in values.items():
             rig.pose.bones[bone][key] = value
         raise
-    finally:
-        scene.frame_set(now, subframe=within)
 
 
 def _animated(rig: bpy.types.Object) -> tuple[set[str], set[tuple[str, str]]]:

@@ -18,7 +18,7 @@ from ..director.walks import way_round
 from .armature import character_scale, is_character, metres_per_unit, sent
 from .compat import action_curves
 from .properties import settings_of
-from .scene_reader import furniture_now
+from .scene_reader import frame_kept, furniture_now
 from .walking import MOVES, Walk, extended_to, keyable_root, last_key, walk, write_keys
 
 __all__ = ["along_curve", "as_moved", "chosen", "floor_points", "is_curve", "may_move", "places_of", "through_points"]
@@ -99,16 +99,14 @@ def _directed(context: bpy.types.Context, armature: bpy.types.Object, first: int
     settings = settings_of(armature, scene)
     root = keyable_root(settings)
     fps, size = scene.render.fps / scene.render.fps_base, character_scale(armature, metres_per_unit(scene))
-    unit, before, subframe = metres_per_unit(scene) / size, scene.frame_current, scene.frame_subframe
+    unit = metres_per_unit(scene) / size
     if first is None:
         keyed = last_key(root)
-        first = before if keyed is None else keyed
-    try:
+        first = scene.frame_current if keyed is None else keyed
+    with frame_kept(scene):
         scene.frame_set(first)
         place, yaw = np.array(root.location, float) * unit, float(root.rotation_euler[2])
         meshes = [mesh for found in furniture_now(context, settings).values() for mesh in found]
-    finally:
-        scene.frame_set(before, subframe=subframe)
     return _Directed(root, first, unit, fps, place, yaw, scaled(Scene(tuple(meshes)), 1.0 / size))
 
 
@@ -220,15 +218,11 @@ def _way(at: _Directed, start: Stop, goals: list[np.ndarray]) -> np.ndarray:
 
 def places_of(context: bpy.types.Context, source: bpy.types.Object, frames: Iterable[int]) -> np.ndarray:
     """Where an object is in some frames (N, 3), world, Blender units; the current frame stays."""
-    scene = context.scene
-    before, subframe = scene.frame_current, scene.frame_subframe
     places = []
-    try:
+    with frame_kept(context.scene):
         for frame in frames:
-            scene.frame_set(frame)
+            context.scene.frame_set(frame)
             places.append(tuple(source.evaluated_get(context.evaluated_depsgraph_get()).matrix_world.translation))
-    finally:
-        scene.frame_set(before, subframe=subframe)
     return np.array(places, float)
 
 

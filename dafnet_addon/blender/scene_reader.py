@@ -30,7 +30,7 @@ from .rig_reading import joints_of, pose_matrices
 from .rigs import RigMap, required
 from .takes import stored
 
-__all__ = ["ReadScene", "furniture_now", "read_steps", "read_scene"]
+__all__ = ["ReadScene", "frame_kept", "furniture_now", "read_steps", "read_scene"]
 
 _BATCH = 16
 _TURNED = np.radians(0.1)
@@ -111,7 +111,7 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     bones: list[np.ndarray] = []
     bodies: list[np.ndarray] = []
     for start in range(0, len(frames), _BATCH):
-        with _frame_kept(scene):
+        with frame_kept(scene):
             for frame in frames[start : start + _BATCH]:
                 scene.frame_set(frame)
                 depsgraph = context.evaluated_depsgraph_get()
@@ -135,7 +135,7 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
 
     warnings = tuple(_told(armature, pieces))
     if furniture:
-        with _frame_kept(scene):
+        with frame_kept(scene):
             warnings += furniture.deforming(context, frames, pieces)
     fps = scene.render.fps / scene.render.fps_base
     root_matrices = _rigid(np.array(tracks["root"]), unit, f"root '{root.name}'")
@@ -163,7 +163,7 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
 
 
 @contextmanager
-def _frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
+def frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
     """Return to the current frame at the end, whatever happens."""
     frame, subframe = scene.frame_current, scene.frame_subframe
     try:

@@ -14,7 +14,7 @@ from ..director.walks import walk_to
 from .armature import character_scale, metres_per_unit
 from .compat import action_curves
 from .properties import Settings, find_object, settings_of
-from .scene_reader import furniture_now
+from .scene_reader import frame_kept, furniture_now
 
 __all__ = ["MOVES", "Walk", "extended_to", "keyable_root", "last_key", "walk", "write_keys"]
 
@@ -63,16 +63,14 @@ def walk(
     settings = settings_of(armature, scene)
     root = keyable_root(settings)
     keyed = last_key(root)
-    before, first = scene.frame_current, scene.frame_current if keyed is None else keyed
-    try:
+    first = scene.frame_current if keyed is None else keyed
+    with frame_kept(scene):
         scene.frame_set(first)
         unit = metres_per_unit(scene)
         size = character_scale(armature, unit)
         found = furniture_now(context, settings)
         place, yaw = np.array(root.location, float) * unit / size, float(root.rotation_euler[2])
         goal = np.array(scene.cursor.location, float) * unit / size
-    finally:
-        scene.frame_set(before)
     route = _route(found, seat, place, yaw, goal, seconds, speed, scene.render.fps / scene.render.fps_base, size)
     last = first + len(route.path) - 1
     write_keys(root, route, first, size / unit, scene.render.fps / scene.render.fps_base)
