@@ -12,7 +12,10 @@ from ..core.errors import InputError
 from ..core.skeleton import JOINTS, OFFSETS, PARENTS, REST, STATURE, joint
 from .mannequin import FACING, add_body
 
-__all__ = ["create_character", "character_of", "character_scale", "is_character", "metres_per_unit", "missing_bones", "sent"]
+__all__ = [
+    "create_character", "character_of", "character_scale", "is_character", "metres_per_unit", "missing_bones", "parts_of",
+    "sent",
+]
 
 _CHAIN = {  # the joint at which each bone's tail lies
     "pelvis": "spine1", "spine1": "spine2", "spine2": "spine3", "spine3": "neck", "neck": "head",
@@ -45,6 +48,12 @@ def is_character(candidate: bpy.types.Object) -> bool:
     except InputError:
         return False
     return True
+
+
+def parts_of(character: bpy.types.Object) -> set[bpy.types.Object]:
+    """An armature, what hangs on it, its root and its targets."""
+    own = character.dafnet
+    return {character, *character.children_recursive, own.root, own.head, own.hand_left, own.hand_right} - {None}
 
 
 def character_of(context: bpy.types.Context) -> bpy.types.Object | None:

@@ -15,7 +15,7 @@ from ..core.trails import FASTEST, followed, trail
 from ..director.seats import on_a_seat
 from ..director.surfaces import surface_points
 from ..director.walks import way_round
-from .armature import character_scale, is_character, metres_per_unit, sent
+from .armature import character_scale, is_character, metres_per_unit, parts_of, sent
 from .compat import action_curves
 from .properties import settings_of
 from .scene_reader import frame_kept, furniture_now
@@ -42,11 +42,6 @@ def may_move(candidate: bpy.types.Object) -> bool:
     )
 
 
-def _parts_of(character: bpy.types.Object) -> set[bpy.types.Object]:
-    own = character.dafnet
-    return {character, *character.children_recursive, own.root, own.head, own.hand_left, own.hand_right} - {None}
-
-
 def chosen(
     context: bpy.types.Context, fits: Callable[[bpy.types.Object], bool]
 ) -> tuple[bpy.types.Object | None, bpy.types.Object | None]:
@@ -54,7 +49,7 @@ def chosen(
     character = sent(context)[0]
     if character is None:
         return None, None
-    parts = _parts_of(character)
+    parts = parts_of(character)
     others = [o for o in context.selected_objects if o not in parts and fits(o)]
     active = context.object
     return character, active if active in others else others[0] if len(others) == 1 else None
@@ -63,7 +58,7 @@ def chosen(
 def floor_points(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The selected empties that are no part of a character, in the order of their names; 10 comes after 9."""
     characters = [o for o in context.scene.objects if is_character(o)]
-    parts = {part for character in characters for part in _parts_of(character)}
+    parts = {part for character in characters for part in parts_of(character)}
     found = [o for o in context.selected_objects if o.type == "EMPTY" and o not in parts]
     return sorted(found, key=lambda o: [(not t.isdigit(), int(t) if t.isdigit() else 0, t.lower())
                                         for t in re.split(r"(\d+)", o.name)])

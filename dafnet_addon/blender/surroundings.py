@@ -11,7 +11,7 @@ from ..core.progress import drained
 from ..core.sensor import REACH
 from ..core.solids import Mesh
 from ..director.surfaces import surface_points
-from .armature import character_scale, metres_per_unit
+from .armature import character_scale, metres_per_unit, parts_of
 from .path_sources import places_of
 from .properties import Settings, find_object, settings_of
 from .scene_reader import furniture_now, read_scene
@@ -109,8 +109,7 @@ def _bodies(scene: bpy.types.Scene) -> set[bpy.types.Object]:
     found: set[bpy.types.Object] = set()
     for each in scene.objects:
         if each.type == "ARMATURE":
-            own = each.dafnet
-            found |= {each, *each.children_recursive, own.root, own.head, own.hand_left, own.hand_right}
+            found |= parts_of(each)
         elif any(m.type == "ARMATURE" and m.object is not None for m in each.modifiers):
             found.add(each)
     return found
