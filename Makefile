@@ -41,15 +41,15 @@ system:
 	@touch $@
 
 .venv/.test: pyproject.toml .venv/.demo
-	.venv/$(PIP) '$(TORCH)' 'numpy>=1.26,<2' matplotlib pytest trimesh rtree scipy safetensors tensorboard ruff mypy
+	.venv/$(PIP) '$(TORCH)' 'numpy>=1.26,<2' matplotlib pytest trimesh rtree scipy safetensors tensorboard ruff mypy hypothesis
 	@touch $@
 
 # Both generations of NumPy are in use: 4.2 takes either.
 .venv-4.2/.test: HOST = 'bpy==4.2.*' 'numpy>=2,<3'
 .venv-5.0/.test: HOST = 'bpy==5.0.*' 'numpy>=1.26,<2'
-.venv-4.2/.test .venv-5.0/.test: | system
+.venv-4.2/.test .venv-5.0/.test: pyproject.toml | system
 	$(PYTHON) -m venv $(@D)
-	$(@D)/$(PIP) $(HOST) pytest trimesh rtree scipy
+	$(@D)/$(PIP) $(HOST) pytest trimesh rtree scipy hypothesis
 	@touch $@
 
 clean:
