@@ -122,8 +122,8 @@ def main() -> None:
             continue
         predictor = first / "predictor.pt"
         results[name] = variant(name, options.dataset, options.output, options.minutes, predictor, clips, begin_with)
-        (options.output / "ablation.json").write_text(json.dumps(results, indent=1))
-        (options.output / "ablation.md").write_text(table(results) + "\n")
+        (options.output / "ablation.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
+        (options.output / "ablation.md").write_text(table(results) + "\n", encoding="utf-8")
     print(table(results))
 
 

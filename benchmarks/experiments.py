@@ -173,7 +173,7 @@ def measure(table: str, clips: Mapping[str, Sequence[HeldClip]], runs: Path, out
     kept, for either table.
     """
     file = output / "measured.json"
-    known: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
+    known: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     systems = systems_of(table, runs)
     for name, (steps, measuring) in systems.items():
         if name in known:
@@ -189,10 +189,10 @@ def measure(table: str, clips: Mapping[str, Sequence[HeldClip]], runs: Path, out
             settings = [key for key in results[0].runs if key != "legs"]
             known[name]["groups"][group] = {key: row([each.runs[key] for each in chosen]) for key in settings}
         output.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps(known, indent=1))
+        file.write_text(json.dumps(known, indent=1), encoding="utf-8")
     found = {name: known[name] for name in systems}
-    (output / f"{table}.json").write_text(json.dumps(found, indent=1))
-    (output / f"{table}.md").write_text(markdown(table, found))
+    (output / f"{table}.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
+    (output / f"{table}.md").write_text(markdown(table, found), encoding="utf-8")
     return found
 
 
@@ -207,7 +207,7 @@ def paired(clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path, dr
     drawn anew, and in how many clips AP-P is the worse; writes ``output``/paired.md. What is measured is kept in paired.json.
     """
     file = output / "paired.json"
-    known: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
+    known: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     every = [clip for group in clips.values() for clip in group]
     rows = ["| budget | clips | EED, z = 0 | EED, temperature 1 | FS, z = 0 | FS, temperature 1 |", "|---" * 6 + "|"]
     rng = np.random.default_rng(0)
@@ -217,7 +217,7 @@ def paired(clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path, dr
                 weights = load_weights(_at(runs, budget) / FLOWS[name]["system"] / "weights.safetensors")
                 results = measured(weights, every, modes=("EE",), clean=False)
                 known[f"{name}, {budget}"] = [{key: each.runs[key].sums for key in ("ee_t0", "ee_t1")} for each in results]
-                file.write_text(json.dumps(known))
+                file.write_text(json.dumps(known), encoding="utf-8")
         at = 0
         for group, members in clips.items():
             chosen, at = slice(at, at + len(members)), at + len(members)
@@ -232,7 +232,7 @@ def paired(clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path, dr
                 cells.append(f"×{_ratio(*pair):.2f} ({low:.2f} to {high:.2f}), {count}")
             rows.append(f"| {budget} | {group} | " + " | ".join(cells) + " |")
     text = "\n".join(rows) + "\n"
-    (output / "paired.md").write_text(text)
+    (output / "paired.md").write_text(text, encoding="utf-8")
     return text
 
 
@@ -310,7 +310,7 @@ def main() -> int:
     except InputError as error:
         print(f"experiments: {error}", file=sys.stderr)
         return 1
-    print((options.output / f"{options.command}.md").read_text())
+    print((options.output / f"{options.command}.md").read_text(encoding="utf-8"))
     return 0
 
 

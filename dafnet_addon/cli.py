@@ -232,9 +232,10 @@ def _prepare(options: argparse.Namespace) -> None:
     with _Bar() as bar:
         prepare(options.folder, options.output, options.windows, options.processes, options.seed, bar)
     if options.json:
-        print((options.output / "dataset.json").read_text())
+        print((options.output / "dataset.json").read_text(encoding="utf-8"))
     else:
-        print((options.output / "summary.txt").read_text() + (options.output / "fits.txt").read_text())
+        for report in ("summary.txt", "fits.txt"):
+            print((options.output / report).read_text(encoding="utf-8"), end="")
         print(f"Written to {options.output}; look at its preview.png")
 
 
@@ -281,8 +282,8 @@ def _evaluate(options: argparse.Namespace) -> None:
         annotate(weights.path, {"ground_truth": json.dumps(rows["ground_truth"]), "held_out": json.dumps(rows)})
     if options.output:
         options.output.mkdir(parents=True, exist_ok=True)
-        (options.output / "evaluation.json").write_text(json.dumps(found, indent=2))
-        (options.output / "evaluation.md").write_text(text(found) + "\n")
+        (options.output / "evaluation.json").write_text(json.dumps(found, indent=2), encoding="utf-8")
+        (options.output / "evaluation.md").write_text(text(found) + "\n", encoding="utf-8")
         plot(found, options.output / "evaluation.png")
     if options.sheets:
         contact_sheets(weights, clips, options.sheets)

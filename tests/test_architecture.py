@@ -89,6 +89,26 @@ def test_nothing_names_the_data_beside_the_repository() -> None:
         assert "../shared" not in file.read_text(encoding="utf-8"), file
 
 
+def _opens_text(call: ast.Call) -> bool:
+    """Whether a call reads or writes text with the encoding of the machine's locale."""
+    function = call.func
+    name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+    given = {keyword.arg: keyword.value for keyword in call.keywords}
+    if name in ("read_text", "write_text"):
+        return "encoding" not in given
+    if name != "open" or ast.unparse(function) == "Image.open":
+        return False
+    words = [a.value for a in [*call.args, *given.values()] if isinstance(a, ast.Constant) and isinstance(a.value, str)]
+    return "encoding" not in given and not any(word in ("rb", "wb", "ab", "xb", "r+b") for word in words)
+
+
+@pytest.mark.parametrize("file", sources(*FOLDERS, "tests"), ids=lambda file: file.relative_to(ROOT).as_posix())
+def test_text_is_read_and_written_in_one_encoding_everywhere(file: Path) -> None:
+    calls = [node for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if isinstance(node, ast.Call)]
+    lines = [call.lineno for call in calls if _opens_text(call)]
+    assert not lines, f"{file.name}: say encoding=\"utf-8\" in line {lines}"
+
+
 def test_the_package_imports_quickly_and_without_blender_or_torch() -> None:
     code = (
         "import sys, time; import numpy; start = time.perf_counter(); import dafnet_addon;"

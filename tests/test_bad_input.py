@@ -492,7 +492,7 @@ def test_whatever_becomes_a_mesh_is_read_and_moves(shot: Shot) -> None:
 def test_an_output_that_cannot_be_written(
     shot: Shot, capfd: pytest.CaptureFixture[str], output: str, words: str,
 ) -> None:
-    (shot.tmp_path / "file").write_text("in the way")
+    (shot.tmp_path / "file").write_text("in the way", encoding="utf-8")
     (shot.tmp_path / "folder.blend").mkdir()
     code, out, err = shot.command(capfd, "-o", output.format(tmp=shot.tmp_path))
     assert code == 1 and out == "" and words in err and err.startswith("dafnet: ")

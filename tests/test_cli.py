@@ -172,7 +172,7 @@ def test_the_demo_runs_in_a_process_of_its_own(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)
-    assert (tmp_path / "demo.blend").is_file() and report == json.loads((tmp_path / "report.json").read_text())
+    assert (tmp_path / "demo.blend").is_file() and report == json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     heights = {seat["name"]: seat["seat_height"] for seat in report["seats"]}
     assert len(set(heights.values())) == 2 and all(abs(seat["error"]) <= 0.05 for seat in report["seats"])
     assert 0.88 < report["standing_pelvis_height"] < 1.0 and report["metrics"]["ground_truth"]["clips"] > 0

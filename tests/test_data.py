@@ -186,11 +186,11 @@ def test_a_dataset_is_made_and_gone_on_with(tmp_path):
     pool = load_pool([out / "pool-0000.npz"])
     assert pool["poses"].shape == (24, 80, 66) and pool["poses"].dtype == np.int16
     assert {"walk", "stand"} & set(pool["kinds"]) and {"approach", "descend", "sit"} & set(pool["kinds"])
-    described = json.loads((out / "dataset.json").read_text())
+    described = json.loads((out / "dataset.json").read_text(encoding="utf-8"))
     assert described["train"] == ["rocketbox/male"] and described["held_out"] == ["rocketbox/female"]
-    summary = (out / "summary.txt").read_text()
+    summary = (out / "summary.txt").read_text(encoding="utf-8")
     assert "sit_down" in summary and "MIT" in summary and "minutes" in summary
-    assert "no seat" in (out / "fits.txt").read_text() and (out / "preview.png").stat().st_size > 10_000
+    assert "no seat" in (out / "fits.txt").read_text(encoding="utf-8") and (out / "preview.png").stat().st_size > 10_000
     stamp = (out / "pool-0000.npz").stat().st_mtime_ns
     prepare(folder, out, windows=24)
     assert (out / "pool-0000.npz").stat().st_mtime_ns == stamp, "finished shards are kept"
@@ -211,10 +211,11 @@ def test_a_dataset_of_raw_files_needs_a_licence_and_a_held_out_body(tmp_path):
         (folder / name).symlink_to(raw / name)
     free = {"licence": "CC0", "category": "locomotion"}
     for stated, lacking in ({}, "test"), ({"*": free}, "test"), ({"*": {**free, "split": "test"}}, "train"):
-        (folder / "clips.json").write_text(json.dumps(stated))
+        (folder / "clips.json").write_text(json.dumps(stated), encoding="utf-8")
         with pytest.raises(InputError, match=f"split '{lacking}'.*clips.json"):
             prepare(folder, out, windows=4)
     (out / "test.npz").unlink()
-    (folder / "clips.json").write_text(json.dumps({"*": free, "accad*": {"subject": "a", "split": "test"}}))
+    (folder / "clips.json").write_text(json.dumps({"*": free, "accad*": {"subject": "a", "split": "test"}}), encoding="utf-8")
     prepare(folder, out, windows=4)
-    assert (out / "pool-0000.npz").exists() and json.loads((out / "dataset.json").read_text())["held_out"] == ["mocap/a"]
+    assert (out / "pool-0000.npz").exists()
+    assert json.loads((out / "dataset.json").read_text(encoding="utf-8"))["held_out"] == ["mocap/a"]

@@ -62,7 +62,7 @@ def test_a_test_clip_that_is_not_the_frozen_one_is_refused(monkeypatch, tmp_path
     monkeypatch.setattr(h, "FROZEN", tmp_path / "held_out.json")
 
     def read(clip: dict[str, object], motions: dict[str, h.Motion]) -> list[h.HeldClip]:
-        h.FROZEN.write_text(json.dumps({"version": 1, "clips": [clip]}))
+        h.FROZEN.write_text(json.dumps({"version": 1, "clips": [clip]}), encoding="utf-8")
         monkeypatch.setattr(h, "test_motions", lambda folder: motions)
         return h.held_out(tmp_path)
 
@@ -81,7 +81,7 @@ def test_no_body_of_the_unseen_test_clips_is_in_training():
     trained = {f"{clip.source}/{clip.subject}" for clip in read_clips(MOCAP) if clip.split == "train"}
     assert trained.isdisjoint(clip.body for clip in _clips() if clip.unseen)
     assert {clip.body for clip in _clips() if not clip.unseen} <= trained
-    walkers = [c["composed"]["walk"] for c in json.loads(h.FROZEN.read_text())["clips"] if "composed" in c]
+    walkers = [c["composed"]["walk"] for c in json.loads(h.FROZEN.read_text(encoding="utf-8"))["clips"] if "composed" in c]
     names = {f"{clip.source}/{clip.name}": f"{clip.source}/{clip.subject}" for clip in read_clips(MOCAP)}
     assert walkers and trained.isdisjoint(names[walker] for walker in walkers)
 
@@ -89,7 +89,7 @@ def test_no_body_of_the_unseen_test_clips_is_in_training():
 @needs_mocap
 def test_the_frozen_furniture_is_under_those_who_sit():
     clips = _clips()
-    assert len(clips) == len(json.loads(h.FROZEN.read_text())["clips"])
+    assert len(clips) == len(json.loads(h.FROZEN.read_text(encoding="utf-8"))["clips"])
     assert sum(len(clip.rests) for clip in e.captured(clips)) >= 40
     for clip in clips:
         for rest in clip.rests:

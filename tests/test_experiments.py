@@ -62,20 +62,20 @@ def test_all_systems_train_and_land_in_the_tables(dataset: Path, tmp_path: Path,
     ):
         found = experiments.measure(table, clips, tmp_path, tmp_path)
         assert list(found) == [*systems, f"DAFNet, {experiments.SHIPPED}"]
-        text = (tmp_path / f"{table}.md").read_text()
+        text = (tmp_path / f"{table}.md").read_text(encoding="utf-8")
         sections = text.split("### ")[1:]
         assert len(sections) == 2, "temperature 0 and 1"
         for section in sections:
             lines = section.splitlines()
             assert lines[4].startswith("| **ground truth**"), "the real motion comes first"
             assert [line.split(" | ")[0].strip("| ") for line in lines[5:] if line] == list(found)
-        again = json.loads((tmp_path / f"{table}.json").read_text())
+        again = json.loads((tmp_path / f"{table}.json").read_text(encoding="utf-8"))
         assert again == json.loads(json.dumps(found))
         truth = found[systems[0]]["groups"]["made up"]["ground_truth"]
         assert truth["clips"] == 1 and truth["sits_within_6cm"] == 1.0 and truth["foot_sliding_per_frame"] < 0.2
     rows = experiments.paired(clips, tmp_path, tmp_path, draws=20).splitlines()[2:]
     assert [row.split(" | ")[0].strip("| ") for row in rows] == list(experiments.BUDGETS)
-    of_one, kept = (json.loads((tmp_path / f"{name}.json").read_text()) for name in ("paired", "table2"))
+    of_one, kept = (json.loads((tmp_path / f"{name}.json").read_text(encoding="utf-8")) for name in ("paired", "table2"))
     total, weight = of_one["AP-P, equal time"][0]["ee_t0"]["end_effector_error"]
     there = kept["AP-P, equal time"]["groups"]["made up"]["ee_t0"]["end_effector_error"]
     assert total / weight == pytest.approx(there, abs=1e-4)

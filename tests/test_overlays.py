@@ -117,7 +117,7 @@ def test_nothing_is_touched_before_a_switch_goes_on(shot: Shot) -> None:
     assert hooks() == [1, len(overlays._LISTENERS)]
     overlays.hide_faults()
     assert hooks() == [0, 0]
-    body = ast.parse(Path(overlays.__file__).read_text()).body
+    body = ast.parse(Path(overlays.__file__).read_text(encoding="utf-8")).body
     top = [node for node in body if isinstance(node, ast.Import | ast.ImportFrom)]
     named = {alias.name for node in top for alias in node.names} | {getattr(node, "module", "") for node in top}
     assert not named & {"gpu", "gpu_extras.batch", "blf"}

@@ -41,7 +41,7 @@ def _motions() -> dict[str, Motion]:
 
 
 def _frozen() -> list[dict[str, Any]]:
-    clips: list[dict[str, Any]] = json.loads(p.FROZEN.read_text())["clips"]
+    clips: list[dict[str, Any]] = json.loads(p.FROZEN.read_text(encoding="utf-8"))["clips"]
     return clips
 
 
@@ -184,7 +184,7 @@ def test_motion_that_is_missing_or_not_the_same_is_refused(monkeypatch, tmp_path
     shorter = replace(captured[walk], joints=captured[walk].joints[: recipe["walk"]["at"]])
     never = replace(captured[sit], rests=())
     monkeypatch.setattr(p, "FROZEN", tmp_path / "paper_test.json")
-    p.FROZEN.write_text(json.dumps({"clips": [recipe]}))
+    p.FROZEN.write_text(json.dumps({"clips": [recipe]}), encoding="utf-8")
     for changed, told in (
         ({walk: stretched}, "is not the motion"), ({walk: shorter}, "is not the motion"), ({sit: never}, "is not the motion"),
         ({walk: None}, f"needs '{walk}', which is not in"),

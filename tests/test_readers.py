@@ -69,7 +69,7 @@ def _bvh(
     for t, turned in enumerate(angles):
         numbers = list(way[t] / unit) + [float(turned[j, c]) for j in written for c in columns]
         lines.append(" ".join(f"{n:.9f}" for n in numbers))
-    file.write_text("\n".join(lines))
+    file.write_text("\n".join(lines), encoding="utf-8")
 
     out = np.zeros((len(angles), 22, 3))
     for t in range(len(angles)):
@@ -207,7 +207,7 @@ def _asf(file: Path) -> np.ndarray:
             "dof rx ry rz\n limits (-180 180)\n (-180 180)\n (-180 180)\n  end\n"
         )
         lines += [f"    {parent} {link}", f"    {link} {VICON[JOINTS[j]]}"]
-    file.write_text(ASF.format(bones=bones, lines="\n".join(lines)))
+    file.write_text(ASF.format(bones=bones, lines="\n".join(lines)), encoding="utf-8")
     return rest
 
 
@@ -216,7 +216,7 @@ def _amc(file: Path, angles: np.ndarray, way: np.ndarray) -> None:
     for t, turned in enumerate(angles):
         lines.append(f"{t + 1}\nroot {' '.join(f'{x:.9f}' for x in [*way[t], *turned[0]])}")
         lines += [f"{VICON[JOINTS[j]]} {' '.join(f'{x:.9f}' for x in turned[j])}" for j in range(1, 22)]
-    file.write_text("\n".join(lines))
+    file.write_text("\n".join(lines), encoding="utf-8")
 
 
 def test_asf_and_amc_give_the_joints_of_their_angles(tmp_path):
@@ -296,20 +296,20 @@ def test_what_is_known_of_a_clip_is_stated_beside_it(tmp_path):
 
     (tmp_path / "clips.json").write_text(json.dumps({
         "*": {"licence": "CC0", "subject": "me"}, "s1/*": {"split": "test", "category": "work"},
-    }))
+    }), encoding="utf-8")
     clips = {c.name: c for c in read_clips(tmp_path)}
     assert [clips["s1/WalkUp_01"].split, clips["sit_on_chair"].split] == ["test", "train"]
     assert clips["s1/WalkUp_01"].category == "work" and {c.subject for c in clips.values()} == {"me"}
     (tmp_path / "clips.json").rename(tmp_path / "other.json")
-    (tmp_path / "clips.csv").write_text("file,licence,fps,up\n*,CC BY,60,\n")
+    (tmp_path / "clips.csv").write_text("file,licence,fps,up\n*,CC BY,60,\n", encoding="utf-8")
     assert {c.licence for c in read_clips(tmp_path)} == {"CC BY"} and {len(c.joints) for c in read_clips(tmp_path)} == {6}
     for wrong in ("file,split\n*,all\n", "file,fps\n*,fast\n", "file,up\n*,x\n", "file,colour\n*,red\n", "file,up\n*,z,more\n"):
-        (tmp_path / "clips.csv").write_text(wrong)
+        (tmp_path / "clips.csv").write_text(wrong, encoding="utf-8")
         with pytest.raises(InputError, match="states for '\\*' what cannot be used") as error:
             list(read_clips(tmp_path))
         _one_sentence(error)
     for wrong in ("[1]", "{", '{"a.bvh": 3}'):
-        (tmp_path / "clips.json").write_text(wrong)
+        (tmp_path / "clips.json").write_text(wrong, encoding="utf-8")
         with pytest.raises(InputError, match="does not list clips") as error:
             list(read_clips(tmp_path))
         _one_sentence(error)
@@ -329,7 +329,7 @@ def _one_sentence(error: pytest.ExceptionInfo[InputError]) -> None:
 def test_a_damaged_bvh_is_refused_in_one_sentence(tmp_path, damage):
     angles, way = _walk(12, "y")
     _bvh(tmp_path / "a.bvh", angles, way)
-    (tmp_path / "a.bvh").write_text(damage((tmp_path / "a.bvh").read_text()))
+    (tmp_path / "a.bvh").write_text(damage((tmp_path / "a.bvh").read_text(encoding="utf-8")), encoding="utf-8")
     with pytest.raises(InputError) as error:
         list(read_clips(tmp_path))
     _one_sentence(error)
@@ -346,7 +346,7 @@ def test_damaged_acclaim_files_are_refused_in_one_sentence(tmp_path, file, damag
     _asf(tmp_path / "s.asf")
     angles, way = _walk(5, "y")
     _amc(tmp_path / "s_a.amc", angles, way)
-    (tmp_path / file).write_text(damage((tmp_path / file).read_text()))
+    (tmp_path / file).write_text(damage((tmp_path / file).read_text(encoding="utf-8")), encoding="utf-8")
     with pytest.raises(InputError) as error:
         list(read_clips(tmp_path))
     _one_sentence(error)

@@ -566,7 +566,7 @@ def test_presets_are_saved_and_found_again(stage: Stage, user_maps: Path) -> Non
     stage.bpy.context.view_layer.objects.active = other
     assert stage.bpy.ops.dafnet.load_rig_map(preset=key) == {"FINISHED"}
     assert properties.map_of(other).joints == rig_builders.ODD
-    (user_maps / "broken.json").write_text("{}")
+    (user_maps / "broken.json").write_text("{}", encoding="utf-8")
     assert stage.rigs.detected(other).name == "Otto's Rig"
     with pytest.raises(stage.error, match=r"'broken\.json'"):
         stage.rigs.load_map(user_maps / "broken.json")

@@ -239,7 +239,7 @@ def test_configurations_are_read_and_bad_ones_refused(tmp_path):
         assert model.actions == 10 and config.batch > 0
     bad = tmp_path / "bad.toml"
     for text, words in (("preset = 'huge'", "unknown"), ("[model]\nwidht = 3", "unknown setting"), ("= 3", "cannot be read")):
-        bad.write_text(text)
+        bad.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=words):
             read_config(bad)
     with pytest.raises(InputError, match="holds no windows"):
@@ -300,11 +300,12 @@ def test_running_on_is_the_likelihood_and_the_inverse(dataset):
 
 
 def test_two_processes_train_one_model(dataset, tmp_path):
-    (dataset / "dataset.json").write_text("{}")
+    (dataset / "dataset.json").write_text("{}", encoding="utf-8")
     config = tmp_path / "tiny.toml"
     config.write_text(
         'preset = "small"\n[model]\npredictor_code = 8\npredictor_width = 16\nwidth = 16\ncode = 8\nsteps_upper = 1\n'
-        "steps_lower = 1\n[training]\nminutes_predictor = 0.02\nminutes_flow = 0.02\nbatch = 4\n"
+        "steps_lower = 1\n[training]\nminutes_predictor = 0.02\nminutes_flow = 0.02\nbatch = 4\n",
+        encoding="utf-8",
     )
     command = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2", "-m", "dafnet_addon"]
     done = subprocess.run(
@@ -312,7 +313,7 @@ def test_two_processes_train_one_model(dataset, tmp_path):
         env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    lines = [json.loads(line) for line in (tmp_path / "run" / "log.jsonl").read_text().splitlines()]
+    lines = [json.loads(line) for line in (tmp_path / "run" / "log.jsonl").read_text(encoding="utf-8").splitlines()]
     assert len(lines) == len({(line["part"], line["step"]) for line in lines}), "one process keeps the run"
     assert {line["part"] for line in lines} == {"predictor", "upper", "lower"}
     assert load_weights(tmp_path / "run" / "dafnet.safetensors").config["model"]["width"] == 16

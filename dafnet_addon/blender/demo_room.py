@@ -207,7 +207,7 @@ def run_demo(
     folder.mkdir(parents=True, exist_ok=True)
     read = read_scene(bpy.context, settings)
     report = demo_report(result.take, read.scene, read.controls, loaded, result.seconds)
-    (folder / "report.json").write_text(json.dumps(report, indent=2) + "\n")
+    (folder / "report.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
     scene_file = (folder / "demo.blend").resolve()
     scene_file.unlink(missing_ok=True)  # else Blender would keep the old one as demo.blend1
     bpy.ops.wm.save_as_mainfile(filepath=str(scene_file), compress=True)

@@ -127,7 +127,7 @@ def held_out(folder: Path) -> list[HeldClip]:
     """The frozen clips, cut from the motion files in ``folder``. Raises InputError where one is missing or not the same."""
     motions = test_motions(folder)
     clips = []
-    for frozen in json.loads(FROZEN.read_text())["clips"]:
+    for frozen in json.loads(FROZEN.read_text(encoding="utf-8"))["clips"]:
         recipe = frozen.get("composed")
         needed = [recipe["walk"], recipe["sit"]] if recipe else [frozen["name"]]
         for name in needed:

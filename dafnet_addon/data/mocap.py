@@ -120,9 +120,10 @@ def _stated(folder: Path) -> list[tuple[str, dict[str, str]]]:
     rows: list[tuple[str, dict[str, str]]] = []
     try:
         if as_json.exists():
-            rows = [(name, {k: str(v) for k, v in fields.items()}) for name, fields in json.loads(file.read_text()).items()]
+            stated = json.loads(file.read_text(encoding="utf-8"))
+            rows = [(name, {k: str(v) for k, v in fields.items()}) for name, fields in stated.items()]
         elif as_csv.exists():
-            with file.open(newline="") as lines:
+            with file.open(newline="", encoding="utf-8") as lines:
                 rows = [(row.pop("file"), {str(k): v for k, v in row.items() if v}) for row in csv.DictReader(lines)]
     except (ValueError, AttributeError, KeyError) as error:
         raise InputError(

@@ -205,7 +205,7 @@ def paper_test(folder: Path) -> list[HeldClip]:
     """
     motions = _unseen(folder)
     clips = []
-    for recipe in json.loads(FROZEN.read_text())["clips"]:
+    for recipe in json.loads(FROZEN.read_text(encoding="utf-8"))["clips"]:
         for name in (recipe[part]["clip"] for part in ("walk", "sit", "upper", "stand") if part in recipe):
             if name not in motions:
                 raise InputError(
@@ -409,7 +409,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
-    FROZEN.write_text(_written(frozen))
+    FROZEN.write_text(_written(frozen), encoding="utf-8")
     return 0
 
 

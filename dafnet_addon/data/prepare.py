@@ -181,7 +181,7 @@ def _shard(task: tuple[Path, int, int]) -> Path:
 def _written(file: Path, text: Callable[[], str]) -> None:
     """Write what ``text`` gives, unless the file is there already."""
     if not file.exists():
-        file.write_text(text() + "\n")
+        file.write_text(text() + "\n", encoding="utf-8")
 
 
 def prepare(
@@ -221,7 +221,7 @@ def prepare(
     _written(out / "fits.txt", lambda: fit_report(*read_motions(out / "train.npz"), np.random.default_rng(seed), _FIT_TRIES))
     if not (out / "preview.png").exists():
         preview(out / "preview.png", *read_motions(out / "train.npz"), np.random.default_rng(seed))
-    (out / "dataset.json").write_text(json.dumps(described, indent=1))
+    (out / "dataset.json").write_text(json.dumps(described, indent=1), encoding="utf-8")
 
 
 def load_pool(files: Iterable[Path]) -> dict[str, np.ndarray]:

@@ -44,7 +44,7 @@ def rigs() -> tuple[Rig, ...]:
     """Every convention that is known, those that ask for most names first."""
     found = []
     for file in sorted((Path(__file__).parent / "rigs").glob("*.json")):
-        data = json.loads(file.read_text())
+        data = json.loads(file.read_text(encoding="utf-8"))
         joints = {
             ours: {_plain(name): weight for name, weight in (theirs if isinstance(theirs, dict) else {theirs: 1.0}).items()}
             for ours, theirs in data["joints"].items()

@@ -81,7 +81,7 @@ class TrainingConfig:
 def read_config(file: Path) -> tuple[ModelConfig, TrainingConfig]:
     """Model and training configuration of a TOML file: ``preset``, ``[model]`` and ``[training]`` override the defaults."""
     try:
-        table = tomllib.loads(Path(file).read_text())
+        table = tomllib.loads(Path(file).read_text(encoding="utf-8"))
     except (OSError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"The configuration '{file}' cannot be read ({error}); check the path and its TOML.") from error
     presets = {"paper": PAPER, "small": SMALL}
@@ -341,7 +341,7 @@ def train_part(
                     "part": part, "step": run.step, "minutes": run.seconds / 60, "loss": mean, "held_out": held_out,
                     "windows": len(pool),
                 }
-                with (folder / "log.jsonl").open("a") as f:
+                with (folder / "log.jsonl").open("a", encoding="utf-8") as f:
                     f.write(json.dumps(values) + "\n")
                 for name in ("loss", "held_out", "windows"):
                     writer.add_scalar(name, values[name], run.step)
@@ -412,6 +412,6 @@ def account(folder: Path, dataset: Path) -> dict[str, str]:
         training["begun_with"] = last.adopted
     return {
         "licence": "CC-BY-4.0; provenance in LICENSE-WEIGHTS.md",
-        "data": (dataset / "dataset.json").read_text(),
+        "data": (dataset / "dataset.json").read_text(encoding="utf-8"),
         "training": json.dumps({**training, "settings": asdict(last.config)}),
     }
