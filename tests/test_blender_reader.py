@@ -255,15 +255,88 @@ def test_the_upper_body_of_another_character(stage: Stage) -> None:
     stage.refused("no source")
 
 
-def test_changing_shapes_are_warned_about(stage: Stage) -> None:
+@pytest.mark.parametrize("values", [((1, 0.0), (10, 1.0)), ((1, 0.0), (3, 1.0), (5, 0.0)), ((1, 0.0), (9, 1.0), (10, 0.0))])
+def test_changing_shapes_are_warned_about(stage: Stage, values: tuple[tuple[int, float], ...]) -> None:
+    """Also where the shape is the first one again in the middle and at the end."""
     stage.cube("Rigid")
     soft = stage.cube("Soft")
     soft.shape_key_add(name="Basis")
     pressed = soft.shape_key_add(name="Pressed")
     pressed.data[0].co.z += 0.5
-    key(pressed, "value", (1, 0.0), (10, 1.0))
-    warnings = stage.read().warnings
-    assert len(warnings) == 1 and "'Soft'" in warnings[0]
+    key(pressed, "value", *values)
+    assert stage.read().warnings == ("The shape of 'Soft' changes during the shot; its shape at the first frame is used.",)
+
+
+def test_shapes_that_others_change_and_instances_are_warned_about(stage: Stage) -> None:
+    """A modifier's object moves; a node group builds another mesh from frame 4 on."""
+    plate = stage.cube("Plate")
+    hook = stage.put(stage.bpy.data.objects.new("Hook", None), stage.scene.collection)
+    key(hook, "location", (1, (0, 0, 0)), (4, (0, 0, 1)), (5, (0, 0, 0)))
+    modifier = plate.modifiers.new("Hook", "HOOK")
+    modifier.object, modifier.strength = hook, 1.0
+    modifier.vertex_indices_set([0, 1, 2])
+    chairs = stage.bpy.data.collections.new("Chairs")
+    seat = stage.cube("Seat", collection=chairs)
+    seat.shape_key_add(name="Basis")
+    sunk = seat.shape_key_add(name="Sunk")
+    sunk.data[0].co.z -= 0.5
+    key(sunk, "value", (1, 0.0), (6, 1.0), (7, 0.0))
+    chair = stage.put(stage.bpy.data.objects.new("Chair", None), instance_type="COLLECTION")
+    chair.instance_collection = chairs
+    array = stage.cube("Row").modifiers.new("Array", "ARRAY")
+    key(array, "count", (1, 2), (8, 3), (9, 2))
+    changed = [each for each in stage.read().warnings if "shape" in each]
+    assert len(changed) == 3 and all(any(f"'{name}'" in each for each in changed) for name in ("Plate", "Chair", "Row"))
+
+
+def test_what_is_shown_or_hidden_during_the_shot_is_said(stage: Stage) -> None:
+    stage.cube("Always")
+    leaves, comes, flickers = (stage.cube(name) for name in ("Leaves", "Comes", "Flickers"))
+    key(leaves, "hide_viewport", (1, False), (6, True))
+    key(comes, "hide_viewport", (1, True), (6, False))
+    key(flickers, "hide_viewport", (1, False), (4, True), (5, False))
+    read = stage.read()
+    assert {solid.name for solid in read.scene.solids} == {"Always", "Leaves", "Flickers"}
+    assert set(read.warnings) == {
+        f"'{name}' is shown or hidden during the shot; it counts for all of it as at the first frame."
+        for name in ("Leaves", "Comes", "Flickers")
+    }
+    assert not stage.read(frame_start=6).warnings, "nothing of it changes any more"
+
+
+def test_instances_that_come_and_go_are_said(stage: Stage) -> None:
+    chairs = stage.bpy.data.collections.new("Chairs")
+    blinking = stage.cube("Seat", collection=chairs)
+    stage.cube("Leg", collection=chairs)
+    key(blinking, "hide_viewport", (1, False), (5, True), (6, False))
+    chair = stage.put(stage.bpy.data.objects.new("Chair", None), instance_type="COLLECTION")
+    chair.instance_collection = chairs
+    read = stage.read()
+    assert len(read.scene.solids) == 2
+    assert [each for each in read.warnings if "shown or hidden" in each and "'Chair'" in each]
+
+
+def test_helpers_are_no_furniture_and_doubtful_objects_are_named(stage: Stage) -> None:
+    """What no picture shows and the viewport draws through, or what cuts, is there for the modeller alone."""
+    wall = stage.cube("Wall")
+    modifier = wall.modifiers.new("Door", "BOOLEAN")
+    modifier.object = stage.cube("Cutter", display_type="WIRE", hide_render=True)
+    cutters = stage.bpy.data.collections.new("Cutters")
+    stage.furniture.children.link(cutters)
+    cutters.hide_render = True
+    stage.cube("Window Cutter", collection=cutters)
+    second = wall.modifiers.new("Windows", "BOOLEAN")
+    second.operand_type, second.collection = "COLLECTION", cutters
+    stage.cube("Cage", display_type="BOUNDS", hide_render=True)
+    stage.cube("Heavy Sofa", display_type="BOUNDS")
+    stage.cube("Proxy", hide_render=True)
+    union = wall.modifiers.new("Shelf", "BOOLEAN")
+    union.object, union.operation = stage.cube("Shelf"), "UNION"
+    read = stage.read()
+    assert {solid.name for solid in read.scene.solids} == {"Wall", "Heavy Sofa", "Proxy", "Shelf"}
+    helpers, doubtful = read.warnings
+    assert "'Cage', 'Cutter', 'Window Cutter'; show" in helpers
+    assert "'Heavy Sofa', 'Proxy'; hide" in doubtful
 
 
 def test_bad_input_is_refused_in_one_sentence(stage: Stage) -> None:

@@ -7,7 +7,9 @@ from collections.abc import Callable
 
 import bpy
 
-__all__ = ["new_action", "assign_action", "playing", "action_curves", "output_video"]
+__all__ = [
+    "new_action", "assign_action", "playing", "action_curves", "animated_paths", "shares_curves", "output_video",
+]
 
 _SLOTS = bpy.app.version >= (4, 4, 0)
 
@@ -68,6 +70,32 @@ def action_curves(owner: bpy.types.Object) -> list[bpy.types.FCurve]:
         return []
     bags = (strip.channelbag(data.action_slot) for layer in data.action.layers for strip in layer.strips)
     return [curve for bag in bags if bag for curve in bag.fcurves]
+
+
+def animated_paths(owner: bpy.types.ID) -> set[str]:
+    """The data paths that the action of ``owner``, its NLA strips or its drivers may move."""
+    data = getattr(owner, "animation_data", None)
+    if data is None:
+        return set()
+    actions = {data.action, *(strip.action for track in data.nla_tracks for strip in track.strips)} - {None}
+    paths = {curve.data_path for action in actions for curve in _all_curves(action)}
+    return paths | {driver.data_path for driver in data.drivers}
+
+
+def _all_curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:
+    """The curves of all slots."""
+    if not _SLOTS:
+        return list(action.fcurves)
+    strips = (strip for layer in action.layers for strip in layer.strips)
+    return [curve for strip in strips for bag in strip.channelbags for curve in bag.fcurves]
+
+
+def shares_curves(owner: bpy.types.ID, other: bpy.types.ID) -> bool:
+    """Whether both play the same curves of one action."""
+    mine, theirs = owner.animation_data, getattr(other, "animation_data", None)
+    if mine is None or theirs is None or mine.action is None or theirs.action != mine.action:
+        return False
+    return not _SLOTS or theirs.action_slot_handle == mine.action_slot_handle
 
 
 def output_video(scene: bpy.types.Scene) -> None:

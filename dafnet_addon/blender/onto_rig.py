@@ -19,10 +19,10 @@ from .armature import character_scale, metres_per_unit
 from .baker import TRANSFORMS, driven, key_curves
 from .compat import action_curves, assign_action, new_action, playing
 from .mannequin import FACING
+from .playback import frame_kept
 from .rig_controls import Attachments, Channels, Control, channels, controls_of, posed, probe, settled
 from .rig_reading import character_motion, pose_matrices, rigid_parts, shape_of
 from .rigs import RigMap, in_names_of, required
-from .scene_reader import frame_kept
 
 __all__ = ["Baked", "bake_onto_rig", "frames_played"]
 

@@ -1,7 +1,7 @@
 """Keys on a character's root from what the animator has already: a drawn curve, something that moves, points on the floor."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -17,8 +17,10 @@ from ..director.surfaces import surface_points
 from ..director.walks import way_round
 from .armature import character_scale, is_character, metres_per_unit, parts_of, sent
 from .compat import action_curves
+from .dependencies import Dependencies
+from .furniture import furniture_now
+from .playback import frame_kept, in_order
 from .properties import settings_of
-from .scene_reader import frame_kept, furniture_now
 from .walking import MOVES, Walk, extended_to, keyable_root, last_key, walk, write_keys
 
 __all__ = ["along_curve", "as_moved", "chosen", "floor_points", "is_curve", "may_move", "places_of", "through_points"]
@@ -211,14 +213,14 @@ def _way(at: _Directed, start: Stop, goals: list[np.ndarray]) -> np.ndarray:
     return np.array(corners)
 
 
-def places_of(context: bpy.types.Context, source: bpy.types.Object, frames: Iterable[int]) -> np.ndarray:
-    """Where an object is in some frames (N, 3), world, Blender units; the current frame stays."""
-    places = []
+def places_of(context: bpy.types.Context, source: bpy.types.Object, frames: Sequence[int]) -> np.ndarray:
+    """Where an object is in some rising frames (N, 3), world, Blender units; the current frame stays."""
+    places = {}
     with frame_kept(context.scene):
-        for frame in frames:
+        for frame in in_order(frames, Dependencies(context.scene).simulations([source], shaped=False)):
             context.scene.frame_set(frame)
-            places.append(tuple(source.evaluated_get(context.evaluated_depsgraph_get()).matrix_world.translation))
-    return np.array(places, float)
+            places[frame] = tuple(source.evaluated_get(context.evaluated_depsgraph_get()).matrix_world.translation)
+    return np.array([places[frame] for frame in frames], float)
 
 
 def as_moved(context: bpy.types.Context, armature: bpy.types.Object, source: bpy.types.Object) -> tuple[Walk, str]:

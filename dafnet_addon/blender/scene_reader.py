@@ -6,31 +6,33 @@ read, so keys, constraints, drivers, modifiers and instances all count; what is 
 
 from collections import defaultdict
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from contextlib import nullcontext
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
 from ..core.errors import InputError
 from ..core.progress import drained
 from ..core.root import POSITION_SIGMA, YAW_SIGMA, root_from_joints, root_from_matrices, smoothed, to_root, to_world
 from ..core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
-from ..core.solids import Mesh, Scene
+from ..core.solids import Scene
 from ..core.take import Controls
 from .armature import is_character, metres_per_unit
 from .baker import laid_over, require_bakeable
 from .compat import action_curves
+from .dependencies import Dependencies, Simulation
+from .furniture import Furniture, array, furniture_of, reshaped
 from .mannequin import FACING
-from .properties import Settings, find_action, find_collection, find_object, find_scene
+from .playback import frame_kept, in_order
+from .properties import Settings, find_action, find_object, find_scene
 from .rig_properties import map_of
 from .rig_reading import joints_of, pose_matrices
 from .rigs import RigMap, required
 from .takes import stored
 
-__all__ = ["ReadScene", "frame_kept", "furniture_now", "read_steps", "read_scene"]
+__all__ = ["ReadScene", "read_steps", "read_scene"]
 
 _BATCH = 16
 _TURNED = np.radians(0.1)
@@ -46,21 +48,6 @@ class ReadScene:
     warnings: tuple[str, ...]
 
 
-@dataclass
-class _Piece:
-    """One evaluated mesh, an object's own (``source``) or an instance, with its matrix in each frame.
-
-    ``key`` finds it again. ``vertices`` (V, 3), ``triangles`` (F, 3): in its own space, Blender units.
-    """
-
-    key: tuple
-    name: str
-    source: bpy.types.Object | None
-    vertices: np.ndarray
-    triangles: np.ndarray
-    matrices: list[np.ndarray] = field(default_factory=list)
-
-
 def read_scene(context: bpy.types.Context, settings: Settings) -> ReadScene:
     """``read_steps`` drained."""
     return drained(read_steps(context, settings))
@@ -69,9 +56,12 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> ReadScene:
 def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[float, None, ReadScene]:
     """Read the scene; yields progress in [0, 1], at which the current frame is as it was.
 
+    Only where a simulation that is not baked moves what is read, the frames run on in order from the simulation's start, and
+    the current one comes back at the end, also of a generator that is closed.
+
     Furniture: every mesh of the collection and of the collections in it, as the viewport evaluates it at the first
-    frame, with its matrix for each frame if it moves; shapes that change over time are warned about. The character,
-    what is parented to it or deformed by it, the root and the targets are never furniture.
+    frame, with its matrix for each frame if it moves; shapes that change over time are warned about. The character, whatever
+    follows it in any way, the root and the targets are never furniture, nor are helpers: see ``furniture``.
 
     Targets: the empties' places. Their rotations count where they are keyed, or where a target was ever turned in its
     parent's space; a target that was only moved leaves head and hands free to turn.
@@ -80,7 +70,7 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     another character or any rig whose bones are known (``rig_properties.map_of``). Its root is its object if it is one of
     our characters, else it is found from hips and shoulders.
 
-    ``InputError``: something that is needed is missing, gone, linked, empty or not a number.
+    ``InputError``: something that is needed is missing, gone, linked, empty or not a number, or follows the character itself.
     """
     scene = find_scene(settings)
     if context.scene != scene:
@@ -95,48 +85,58 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     root = find_object(settings, settings.root, "root")
     names = {role: name for role in _TARGETS if (name := getattr(settings, role))}
     targets = {role: find_object(settings, name, _TARGETS[role]) for role, name in names.items()}
-    for driver, role in ((root, "root"), *((target, _TARGETS[name]) for name, target in targets.items())):
-        if armature in _followed(driver):
-            raise InputError(f"The {role} '{driver.name}' follows the character itself; let it follow something else.")
     source, source_map = _upper_body_source(settings, armature)
     places = [source_map.place(name) if source_map else name for name in JOINTS]
-    own = {armature, root, *targets.values(), *armature.children_recursive}
-    furniture = _Furniture(find_collection(settings.furniture), armature, own) if settings.furniture else None
+    dependencies = Dependencies(scene)
+    leading = {f"root '{root.name}'": root}
+    leading |= {f"{_TARGETS[role]} '{target.name}'": target for role, target in targets.items()}
+    _require_independent(dependencies, armature, leading)
+    furniture = furniture_of(settings, dependencies)
+    sources = [source] if source else []
+    simulations = dependencies.simulations([root, *targets.values()], shaped=False)
+    simulations += dependencies.simulations([*sources, *(furniture.members if furniture else ())])
 
     frames = range(settings.frame_start, settings.frame_end + 1)
-    pieces: list[_Piece] = []
     modes: list[str] = []
     influences: dict[str, list[float]] = defaultdict(list)
     tracks = defaultdict(list)
     bones: list[np.ndarray] = []
     bodies: list[np.ndarray] = []
-    for start in range(0, len(frames), _BATCH):
-        with frame_kept(scene):
-            for frame in frames[start : start + _BATCH]:
-                scene.frame_set(frame)
-                depsgraph = context.evaluated_depsgraph_get()
-                if frame == frames[0]:
-                    _require_alive(depsgraph, [armature, root, *targets.values(), *([source] if source else [])])
-                    pieces = furniture.pieces(depsgraph) if furniture else []
-                _follow(depsgraph, pieces)
-                modes.append(settings.mode or armature.dafnet.mode)
-                for role in targets:
-                    influences[role].append(getattr(armature.dafnet, f"{role}_influence"))
-                tracks["root"].append(_array(root.evaluated_get(depsgraph).matrix_world))
-                for role, target in targets.items():
-                    evaluated = target.evaluated_get(depsgraph)
-                    tracks[role].append(_array(evaluated.matrix_world))
-                    tracks[f"{role} local"].append(_array(evaluated.matrix_local))
-                if source:
-                    evaluated = source.evaluated_get(depsgraph)
-                    bodies.append(_array(evaluated.matrix_world))
-                    bones.append(pose_matrices(evaluated, places))
-        yield min(start + _BATCH, len(frames)) / (len(frames) + 1)
+    played = in_order(frames, simulations)
+    last = scene.frame_current
+    with frame_kept(scene) if simulations else nullcontext():
+        for start in range(0, len(played), _BATCH):
+            if simulations and scene.frame_current != last:
+                raise InputError("The current frame was changed while a simulation was read; generate again.")
+            with nullcontext() if simulations else frame_kept(scene), reshaped(scene) as shaped:
+                for frame in played[start : start + _BATCH]:
+                    shaped.clear()
+                    scene.frame_set(frame)
+                    if frame < frames[0]:
+                        continue
+                    depsgraph = context.evaluated_depsgraph_get()
+                    if frame == frames[0]:
+                        _require_alive(depsgraph, [armature, root, *targets.values(), *sources])
+                    if furniture and frame == frames[0]:
+                        furniture.begin(depsgraph)
+                    elif furniture:
+                        furniture.add(depsgraph, shaped)
+                    modes.append(settings.mode or armature.dafnet.mode)
+                    for role in targets:
+                        influences[role].append(getattr(armature.dafnet, f"{role}_influence"))
+                    tracks["root"].append(array(root.evaluated_get(depsgraph).matrix_world))
+                    for role, target in targets.items():
+                        evaluated = target.evaluated_get(depsgraph)
+                        tracks[role].append(array(evaluated.matrix_world))
+                        tracks[f"{role} local"].append(array(evaluated.matrix_local))
+                    if source:
+                        evaluated = source.evaluated_get(depsgraph)
+                        bodies.append(array(evaluated.matrix_world))
+                        bones.append(pose_matrices(evaluated, places))
+                last = scene.frame_current
+            yield min(start + _BATCH, len(played)) / (len(played) + 1)
 
-    warnings = tuple(_told(armature, pieces))
-    if furniture:
-        with frame_kept(scene):
-            warnings += furniture.deforming(context, frames, pieces)
+    warnings = tuple(_told(armature, furniture, dependencies, simulations))
     fps = scene.render.fps / scene.render.fps_base
     root_matrices = _rigid(np.array(tracks["root"]), unit, f"root '{root.name}'")
     given: dict[str, Any] = {}
@@ -157,19 +157,27 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     mode = modes[0] if len(set(modes)) == 1 else tuple(modes)
     controls = Controls(fps=fps, root=root_matrices, mode=mode, blend=settings.blend_frames / fps, scale=size, **given)
 
-    solids = tuple(_solid(piece, unit) for piece in pieces)
+    solids = furniture.solids(unit) if furniture else ()
     yield 1.0
     return ReadScene(Scene(solids), controls, warnings)
 
 
-@contextmanager
-def frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
-    """Return to the current frame at the end, whatever happens."""
-    frame, subframe = scene.frame_current, scene.frame_subframe
-    try:
-        yield
-    finally:
-        scene.frame_set(frame, subframe=subframe)
+def _require_independent(
+    dependencies: Dependencies, armature: bpy.types.Object, leading: dict[str, bpy.types.Object],
+) -> None:
+    """What leads the character may not follow it, nor be pushed by it, or each take would change the next."""
+    for what, leader in leading.items():
+        if dependencies.follows(leader, armature, shaped=False):
+            raise InputError(f"The {what} follows the character itself; let it follow something else.")
+        for simulation in dependencies.simulations([leader], shaped=False):
+            if _meets(simulation, dependencies, armature):
+                raise InputError(
+                    f"The character itself may push '{simulation.name}', which moves the {what}; bake the simulation."
+                )
+
+
+def _meets(simulation: Simulation, dependencies: Dependencies, armature: bpy.types.Object) -> bool:
+    return any(dependencies.follows(each, armature) for each in simulation.met)
 
 
 def _require_alive(depsgraph: bpy.types.Depsgraph, needed: list[bpy.types.Object]) -> None:
@@ -180,157 +188,17 @@ def _require_alive(depsgraph: bpy.types.Depsgraph, needed: list[bpy.types.Object
             raise InputError(f"'{each.name}' or its collection is disabled in viewports; enable it, or hide it with H.")
 
 
-def _followed(follower: bpy.types.Object) -> set[bpy.types.Object]:
-    """The object itself and all that it follows by parents and constraints, and what those follow."""
-    found: set[bpy.types.Object] = set()
-    waiting = [follower]
-    while waiting:
-        each = waiting.pop()
-        if each is not None and each not in found:
-            found.add(each)
-            waiting += [each.parent, *(getattr(c, "target", None) for c in each.constraints if not c.mute)]
-    return found
-
-
-def _told(armature: bpy.types.Object, pieces: list[_Piece]) -> Iterator[str]:
+def _told(
+    armature: bpy.types.Object, furniture: Furniture | None, dependencies: Dependencies, simulations: list[Simulation],
+) -> Iterator[str]:
     """Warnings about what can be used, but hardly as it was meant."""
     if laid_over(armature):
         yield f"Bones of '{armature.name}' have constraints or drivers, which change the take; mute them to see it as made."
-    for name in dict.fromkeys(p.name for p in pieces if not np.any(np.abs(np.array(p.matrices)[:, :3, :3]) > 1e-9)):
-        yield f"'{name}' is scaled to zero, so it is not there for the character; give it a scale."
-
-
-def _array(matrix: Matrix) -> np.ndarray:
-    return np.array(matrix, float)
-
-
-def _owner(instance: bpy.types.DepsgraphObjectInstance) -> bpy.types.Object:
-    return (instance.parent or instance.object).original
-
-
-def _key(instance: bpy.types.DepsgraphObjectInstance) -> tuple:
-    """Names one evaluated mesh of the scene, the same in every frame."""
-    place = tuple(instance.persistent_id) if instance.is_instance else ()
-    return (_owner(instance).name_full, instance.object.original.name_full, place)
-
-
-def _geometry(evaluated: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (V, 3) and triangles (F, 3) in the object's own space."""
-    mesh = evaluated.to_mesh()
-    try:
-        mesh.calc_loop_triangles()
-        vertices = np.empty(3 * len(mesh.vertices), np.float32)
-        triangles = np.empty(3 * len(mesh.loop_triangles), np.int32)
-        mesh.vertices.foreach_get("co", vertices)
-        mesh.loop_triangles.foreach_get("vertices", triangles)
-    finally:
-        evaluated.to_mesh_clear()
-    return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3)
-
-
-def furniture_now(context: bpy.types.Context, settings: Settings) -> dict[str, list[Mesh]]:
-    """The furniture's meshes in the current frame by the names of the objects that they belong to; world, metres.
-
-    ``InputError`` where there is none to be seen, as for ``read_steps``.
-    """
-    scene = find_scene(settings)
-    armature = find_object(settings, settings.armature, "character")
-    if settings.furniture is None:
-        return {}
-    names = (settings.root, settings.head, settings.hand_left, settings.hand_right)
-    own = {armature, *armature.children_recursive, *(o for o in scene.objects if o.name_full in names)}
-    depsgraph = context.evaluated_depsgraph_get()
-    pieces = _Furniture(find_collection(settings.furniture), armature, own).pieces(depsgraph)
-    _follow(depsgraph, pieces)
-    found: dict[str, list[Mesh]] = defaultdict(list)
-    for piece in pieces:
-        found[piece.name].append(_solid(piece, metres_per_unit(scene)))
-    return dict(found)
-
-
-class _Furniture:
-    """A collection's evaluated meshes, without the character and what is its ``own``."""
-
-    def __init__(
-        self, collection: bpy.types.Collection, armature: bpy.types.Object, own: set[bpy.types.Object],
-    ) -> None:
-        self.collection, self.armature, self.own = collection, armature, own
-        self.members = set(collection.all_objects) - own
-
-    def _deformed(self, candidate: bpy.types.Object) -> bool:
-        """Whether the character's armature deforms it, as clothes are."""
-        return any(m.type == "ARMATURE" and m.object == self.armature for m in candidate.modifiers)
-
-    def meshes(self, depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.DepsgraphObjectInstance]:
-        """Every evaluated mesh that is furniture, instances among them."""
-        for instance in depsgraph.object_instances:
-            if instance.object.type != "MESH" or not (instance.is_instance or instance.show_self):
-                continue
-            owner, made_of = _owner(instance), instance.object.original
-            if owner in self.members and owner.visible_get() and made_of not in self.own and not self._deformed(made_of):
-                yield instance
-
-    def pieces(self, depsgraph: bpy.types.Depsgraph) -> list[_Piece]:
-        """The meshes with faces; instances of one mesh share its arrays."""
-        shapes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-        pieces: list[_Piece] = []
-        seen = False
-        for instance in self.meshes(depsgraph):
-            seen = True
-            pointer = instance.object.data.as_pointer()
-            if pointer not in shapes:
-                shapes[pointer] = _geometry(instance.object)
-            vertices, triangles = shapes[pointer]
-            if len(triangles):
-                source = None if instance.is_instance else instance.object.original
-                pieces.append(_Piece(_key(instance), _owner(instance).name, source, vertices, triangles))
-        name = self.collection.name
-        if not seen:
-            raise InputError(
-                f"The furniture collection '{name}' has no visible mesh besides the character's own; fill it or choose none."
-            )
-        if not pieces:
-            raise InputError(f"The meshes of the furniture collection '{name}' have no faces; give them some.")
-        return pieces
-
-    def deforming(self, context: bpy.types.Context, frames: range, pieces: list[_Piece]) -> tuple[str, ...]:
-        """Warnings about meshes whose shape differs in the middle or at the end of the range."""
-        shapes = {piece.key: piece for piece in pieces}
-        changed: dict[str, None] = {}
-        for frame in dict.fromkeys((frames[len(frames) // 2], frames[-1])):
-            context.scene.frame_set(frame)
-            for instance in self.meshes(context.evaluated_depsgraph_get()):
-                piece = shapes.get(_key(instance))
-                if piece is None:
-                    continue
-                vertices, _ = _geometry(instance.object)
-                tolerance = 1e-3 * np.ptp(piece.vertices, axis=0).max()
-                if vertices.shape != piece.vertices.shape or np.abs(vertices - piece.vertices).max() > tolerance:
-                    changed[piece.name] = None
-        return tuple(
-            f"The shape of '{name}' changes during the shot; its shape at the first frame is used." for name in changed
-        )
-
-
-def _follow(depsgraph: bpy.types.Depsgraph, pieces: list[_Piece]) -> None:
-    """Add this frame's matrices; what is gone or disabled by now stays where it was."""
-    found: dict[tuple, np.ndarray] = {}
-    if any(piece.source is None for piece in pieces):
-        wanted = {piece.key for piece in pieces if piece.source is None}
-        for instance in depsgraph.object_instances:
-            if instance.is_instance and (key := _key(instance)) in wanted:
-                found[key] = _array(instance.matrix_world)
-    for piece in pieces:
-        if piece.source is not None:
-            found[piece.key] = _array(piece.source.evaluated_get(depsgraph).matrix_world)
-        piece.matrices.append(found[piece.key] if piece.key in found else piece.matrices[-1])
-
-
-def _solid(piece: _Piece, unit: float) -> Mesh:
-    matrices = np.array(piece.matrices)
-    matrices[:, :3] *= unit
-    still = np.allclose(matrices, matrices[0], atol=1e-6)
-    return Mesh(piece.vertices, piece.triangles, matrices[0] if still else matrices, piece.name)
+    if furniture:
+        yield from furniture.told()
+    pushed = (simulation.name for simulation in simulations if _meets(simulation, dependencies, armature))
+    for name in dict.fromkeys(pushed):
+        yield f"The character itself may push '{name}', so that each take changes the next; bake the simulation."
 
 
 def _rigid(matrices: np.ndarray, unit: float, what: str) -> np.ndarray:

@@ -12,9 +12,10 @@ from ..core.sensor import REACH
 from ..core.solids import Mesh
 from ..director.surfaces import surface_points
 from .armature import character_scale, metres_per_unit, parts_of
+from .furniture import furniture_now
 from .path_sources import places_of
 from .properties import Settings, find_object, settings_of
-from .scene_reader import furniture_now, read_scene
+from .scene_reader import read_scene
 
 __all__ = ["Found", "find_furniture"]
 

@@ -13,8 +13,9 @@ from ..director.seats import on_a_seat, seat_of
 from ..director.walks import walk_to
 from .armature import character_scale, metres_per_unit
 from .compat import action_curves
+from .furniture import furniture_now
+from .playback import frame_kept
 from .properties import Settings, find_object, settings_of
-from .scene_reader import frame_kept, furniture_now
 
 __all__ = ["MOVES", "Walk", "extended_to", "keyable_root", "last_key", "walk", "write_keys"]
 

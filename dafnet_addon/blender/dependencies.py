@@ -1,0 +1,227 @@
+"""What an object of the scene follows, near or far: its place, its shape, and the simulations that move it.
+
+Blender's own graph of dependencies cannot be asked for this, so what that graph is built from is read: parents, constraints
+(of bones, too), drivers, modifiers with their node groups, shape keys, collections. Names in driver scripts
+(``bpy.data.objects["…"]``) are unknown to Blender and to us.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import bpy
+
+from .compat import animated_paths
+
+__all__ = ["Dependencies", "Simulation"]
+
+_PLACE = ("location", "rotation", "scale", "delta_", "constraints[", "parent")
+_SHAPE = ("modifiers[", "pose.", "instance_")
+"""How the data paths of an object begin that move it, and that shape it."""
+_SIMULATED = {"CLOTH", "SOFT_BODY", "PARTICLE_SYSTEM", "PARTICLE_INSTANCE", "DYNAMIC_PAINT", "FLUID", "COLLISION"}
+"""Modifiers that name what they may push against: ``Simulation.met``, not what they follow."""
+_ON_SURFACES = {"SHRINKWRAP", "FOLLOW_PATH", "CLAMP_TO", "FOLLOW_TRACK", "OBJECT_SOLVER", "TRANSFORM_CACHE"}
+"""Constraints that follow their target's shape and not its place alone."""
+_NESTED = 2
+"""How deep in a constraint or a modifier what it points to may lie."""
+
+
+class _Aspect(NamedTuple):
+    """What something follows of a datablock: of an object ``_IN_PLACE`` or ``_IN_SHAPE`` (which has the place in it), of any
+    datablock a single property by its data path, of all but objects else everything.
+    """
+
+    owner: bpy.types.ID
+    what: str
+
+
+_IN_PLACE, _IN_SHAPE = "its place", "its shape"
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A simulation that is not baked: the object's ``name``, and the frame that it starts ``since``.
+
+    ``met``: the objects that it may push against.
+    """
+
+    name: str
+    since: int
+    met: tuple[bpy.types.Object, ...]
+
+
+class Dependencies:
+    """What objects of one scene follow. Each datablock is looked at once, so it is of the moment when it was made."""
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        self._scene = scene
+        self._next: dict[_Aspect, set[_Aspect]] = {}
+
+    def follows(self, follower: bpy.types.Object, leader: bpy.types.Object, shaped: bool = True) -> bool:
+        """Whether ``leader`` moves ``follower``, or with ``shaped`` also whether it shapes it; an object follows itself."""
+        aspects = self._all([follower], shaped)
+        return not aspects.isdisjoint({_Aspect(leader, _IN_PLACE), _Aspect(leader, _IN_SHAPE)})
+
+    def simulations(self, owners: Iterable[bpy.types.Object], shaped: bool = True) -> list[Simulation]:
+        """The simulations, none of them baked, that move these objects or with ``shaped`` also shape them."""
+        found: dict[str, Simulation] = {}
+        for owner, what in self._all(owners, shaped):
+            if isinstance(owner, bpy.types.Object) and what in {_IN_PLACE, _IN_SHAPE}:
+                for simulation in (*self._rigid(owner), *(self._soft(owner) if what == _IN_SHAPE else ())):
+                    found.setdefault(simulation.name, simulation)
+        return list(found.values())
+
+    def _all(self, owners: Iterable[bpy.types.Object], shaped: bool) -> set[_Aspect]:
+        found: set[_Aspect] = set()
+        waiting = [_Aspect(owner, _IN_SHAPE if shaped else _IN_PLACE) for owner in owners]
+        while waiting:
+            aspect = waiting.pop()
+            if aspect not in found:
+                found.add(aspect)
+                if aspect not in self._next:
+                    self._next[aspect] = set(_followed(*aspect))
+                waiting += self._next[aspect]
+        return found
+
+    def _rigid(self, owner: bpy.types.Object) -> Iterator[Simulation]:
+        """The rigid body that moves an object: an active one that is not animated all along."""
+        world, body = self._scene.rigidbody_world, owner.rigid_body
+        if world is None or not world.enabled or world.collection is None or world.point_cache.is_baked:
+            return
+        handed_over = "rigid_body.kinematic" in animated_paths(owner)
+        if body is not None and body.type == "ACTIVE" and body.enabled and (handed_over or not body.kinematic):
+            yield Simulation(owner.name, world.point_cache.frame_start, tuple(world.collection.all_objects))
+
+    def _soft(self, owner: bpy.types.Object) -> Iterator[Simulation]:
+        """Simulations among the modifiers."""
+        scene = self._scene
+        modifiers = list(_on(owner.modifiers, owner))
+        since = [cache.frame_start for each in modifiers for cache in _caches(each) if not cache.is_baked]
+        if any(each.type == "NODES" and each.node_group and _simulates(each.node_group) for each in modifiers):
+            since.append(scene.simulation_frame_start if scene.use_custom_simulation_range else scene.frame_start)
+        if since:
+            met = (o for o in scene.objects if any(m.type == "COLLISION" for m in o.modifiers))
+            yield Simulation(owner.name, min(since), tuple(met))
+
+
+def _followed(owner: bpy.types.ID, what: str) -> Iterator[_Aspect]:
+    """What one aspect follows directly."""
+    if what not in {_IN_PLACE, _IN_SHAPE}:
+        yield from _driven(owner, what)
+    elif isinstance(owner, bpy.types.Object):
+        yield from _driven(owner, _PLACE if what == _IN_PLACE else _PLACE + _SHAPE)
+        yield from _placed(owner)
+        if what == _IN_SHAPE:
+            yield from _shaped(owner)
+    else:
+        yield from _driven(owner, "")
+        yield from _aspects(_inside(owner))
+
+
+def _inside(owner: bpy.types.ID) -> Iterator[Any]:
+    """What a datablock that is no object is made of, as far as shapes may depend on it."""
+    if isinstance(owner, bpy.types.Collection):
+        yield from owner.all_objects
+    elif isinstance(owner, bpy.types.NodeTree):
+        for node in owner.nodes:
+            yield getattr(node, "node_tree", None)
+            yield from (getattr(each, "default_value", None) for each in node.inputs if not each.is_linked)
+    else:
+        yield from (getattr(owner, name, None) for name in ("shape_keys", "bevel_object", "taper_object", "follow_curve"))
+
+
+def _aspects(found: Iterable[Any], what: str = _IN_SHAPE) -> Iterator[_Aspect]:
+    """The datablocks among some values."""
+    return (_Aspect(each, what) for each in found if isinstance(each, bpy.types.ID))
+
+
+def _placed(owner: bpy.types.Object) -> Iterator[_Aspect]:
+    if owner.parent:
+        instanced = owner.parent.instance_type in {"VERTS", "FACES"}
+        yield _Aspect(owner.parent, _IN_SHAPE if instanced or owner.parent_type != "OBJECT" else _IN_PLACE)
+    yield from _constrained(owner.constraints, owner)
+
+
+def _shaped(owner: bpy.types.Object) -> Iterator[_Aspect]:
+    yield from _aspects([owner.data])
+    for modifier in _on(owner.modifiers, owner):
+        if modifier.type not in _SIMULATED:
+            yield from _aspects(_pointed(modifier, _NESTED))
+    if owner.pose is not None:
+        for bone in owner.pose.bones:
+            yield from _constrained(bone.constraints, owner)
+
+
+def _constrained(constraints: Iterable[bpy.types.Constraint], owner: bpy.types.Object) -> Iterator[_Aspect]:
+    for constraint in _on(constraints, owner):
+        parts = [constraint, *getattr(constraint, "targets", ())]
+        inside = constraint.type in _ON_SURFACES or any(getattr(part, "subtarget", "") for part in parts)
+        yield from _aspects(_pointed(constraint, _NESTED), _IN_SHAPE if inside else _IN_PLACE)
+
+
+def _on(blocks: Iterable[Any], owner: bpy.types.Object) -> Iterator[Any]:
+    """Those of an object's modifiers or constraints that do something now, or may since their switch is animated."""
+    for block in blocks:
+        off = block.mute or not block.influence if isinstance(block, bpy.types.Constraint) else not block.show_viewport
+        if off:
+            path = block.path_from_id()
+            switches = {f"{path}.{name}" for name in ("mute", "enabled", "influence", "show_viewport")}
+            if switches.isdisjoint(animated_paths(owner)):
+                continue
+        yield block
+
+
+def _pointed(block: bpy.types.bpy_struct, depth: int) -> Iterator[bpy.types.ID]:
+    """The datablocks that a block's properties, its inputs of a node group among them, point to."""
+    for each in block.values() if isinstance(block, bpy.types.NodesModifier) else ():
+        if isinstance(each, bpy.types.ID):
+            yield each
+    for kind in block.bl_rna.properties:
+        if kind.type not in {"POINTER", "COLLECTION"} or kind.identifier == "rna_type":
+            continue
+        value = getattr(block, kind.identifier)
+        for each in value if kind.type == "COLLECTION" else (value,):
+            if isinstance(each, bpy.types.ID):
+                yield each
+            elif each is not None and depth:
+                yield from _pointed(each, depth - 1)
+
+
+def _driven(owner: bpy.types.ID, paths: str | tuple[str, ...]) -> Iterator[_Aspect]:
+    """What the drivers of those properties read whose data path begins like one of these."""
+    data = getattr(owner, "animation_data", None)
+    for curve in data.drivers if data else ():
+        if curve.mute or not curve.data_path.startswith(paths):
+            continue
+        for variable in curve.driver.variables:
+            for target in variable.targets:
+                if target.id is None:
+                    continue
+                path = target.data_path if variable.type == "SINGLE_PROP" else ""
+                if _is_setting(path):
+                    yield _Aspect(target.id, path)
+                elif path.startswith(_SHAPE) or target.bone_target or not isinstance(target.id, bpy.types.Object):
+                    yield _Aspect(target.id, _IN_SHAPE)
+                else:
+                    yield _Aspect(target.id, _IN_PLACE)
+
+
+def _is_setting(path: str) -> bool:
+    """Whether a data path is a custom property or one of ours: keyed by hand, and moved by nothing but a driver."""
+    return path.startswith("dafnet.") or path.endswith(('"]', "']"))
+
+
+def _caches(modifier: bpy.types.Modifier) -> Iterator[Any]:
+    """The point caches of a modifier."""
+    if modifier.type in {"CLOTH", "SOFT_BODY"}:
+        yield modifier.point_cache
+    elif modifier.type == "PARTICLE_SYSTEM":
+        yield modifier.particle_system.point_cache
+    elif modifier.type == "DYNAMIC_PAINT" and modifier.canvas_settings:
+        yield from (surface.point_cache for surface in modifier.canvas_settings.canvas_surfaces)
+
+
+def _simulates(tree: bpy.types.NodeTree) -> bool:
+    """Whether a node group has a simulation zone, also in a group in it."""
+    inner = (node.node_tree for node in tree.nodes if getattr(node, "node_tree", None))
+    return any(node.bl_idname == "GeometryNodeSimulationOutput" for node in tree.nodes) or any(map(_simulates, inner))

@@ -1,0 +1,351 @@
+"""What follows the character is neither its root, nor a target, nor furniture; simulations are read as they are played."""
+
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+CUBE = [(x, y, z) for x in (-0.25, 0.25) for y in (-0.25, 0.25) for z in (0, 0.45)]
+FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+
+
+class Stage:
+    """A character with a root before a chair, and short ways to add to the scene and to read it."""
+
+    def __init__(self, bpy: ModuleType, addon: Any) -> None:
+        self.bpy, self.addon, self.scene = bpy, addon, bpy.context.scene
+        self.error = addon("dafnet_addon.core.errors").InputError
+        self.furniture = bpy.data.collections.new("Furniture")
+        self.scene.collection.children.link(self.furniture)
+        self.ann = addon("dafnet_addon.blender.armature").create_character(bpy.context, "Ann")
+        self.body = next(o for o in self.ann.children if o.type == "MESH")
+        self.root, self.head = self.ann.dafnet.root, self.ann.dafnet.head
+        self.ann.dafnet.furniture = self.furniture
+        self.scene.frame_start, self.scene.frame_end = 1, 40
+        self.scene.frame_set(4)
+        self.chair = self.box("Chair", location=(0, 2, 0))
+
+    def box(self, name: str, collection: Any = None, **transform: Any) -> Any:
+        mesh = self.bpy.data.meshes.new(name)
+        mesh.from_pydata(CUBE, [], FACES)
+        return self.add(self.bpy.data.objects.new(name, mesh), collection or self.furniture, **transform)
+
+    def empty(self, name: str, **transform: Any) -> Any:
+        return self.add(self.bpy.data.objects.new(name, None), self.scene.collection, **transform)
+
+    def add(self, made: Any, collection: Any, **transform: Any) -> Any:
+        for key, value in transform.items():
+            setattr(made, key, value)
+        collection.objects.link(made)
+        return made
+
+    def drive(self, owner: Any, path: str, target: Any, read: str, index: int = -1) -> None:
+        curve = owner.driver_add(path, index) if index >= 0 else owner.driver_add(path)
+        variable = curve.driver.variables.new()
+        variable.name = "read"
+        variable.targets[0].id, variable.targets[0].data_path = target, read
+        curve.driver.expression = "read"
+
+    def settings(self, **overrides: Any) -> Any:
+        return self.addon("dafnet_addon.blender.properties").settings_of(self.ann, self.scene, **overrides)
+
+    def steps(self, **overrides: Any) -> Any:
+        return self.addon("dafnet_addon.blender.scene_reader").read_steps(self.bpy.context, self.settings(**overrides))
+
+    def read(self, **overrides: Any) -> Any:
+        return self.addon("dafnet_addon.core.progress").drained(self.steps(**overrides))
+
+    def names(self) -> set[str]:
+        return {solid.name for solid in self.read().scene.solids}
+
+    def refused(self, words: str) -> None:
+        with pytest.raises(self.error, match=words):
+            self.read()
+        assert self.scene.frame_current == 4
+
+    def falling(self, name: str, height: float = 20.0) -> Any:
+        """An active rigid body, and the frames' heights as the scene plays them."""
+        ball = self.box(name, self.scene.collection, location=(0, 0, height))
+        if self.scene.rigidbody_world is None:
+            self.bpy.ops.rigidbody.world_add()
+        for o in self.scene.objects:
+            o.select_set(o == ball)
+        self.bpy.context.view_layer.objects.active = ball
+        self.bpy.ops.rigidbody.object_add()
+        return ball
+
+    def played(self, follower: Any, axis: int, first: int, last: int) -> np.ndarray:
+        """Where Blender shows an object when the scene is played from its start."""
+        places = []
+        for frame in range(1, last + 1):
+            self.scene.frame_set(frame)
+            evaluated = follower.evaluated_get(self.bpy.context.evaluated_depsgraph_get())
+            places.append(evaluated.matrix_world.translation[axis])
+        self.scene.frame_set(4)
+        return np.array(places[first - 1 :])
+
+
+@pytest.fixture
+def stage(blender: ModuleType, addon: Any) -> Stage:
+    return Stage(blender, addon)
+
+
+def copies(stage: Stage, follower: Any, target: Any, kind: str = "COPY_LOCATION", bone: str = "") -> Any:
+    constraint = follower.constraints.new(kind)
+    if kind == "ARMATURE":
+        each = constraint.targets.new()
+        each.target, each.subtarget = target, bone
+    else:
+        constraint.target, constraint.subtarget = target, bone
+    return constraint
+
+
+def by_copy_location(stage: Stage, follower: Any) -> None:
+    copies(stage, follower, stage.ann, "COPY_LOCATION", "left_wrist")
+
+
+def by_child_of(stage: Stage, follower: Any) -> None:
+    copies(stage, follower, stage.ann, "CHILD_OF", "left_wrist")
+
+
+def by_armature_constraint(stage: Stage, follower: Any) -> None:
+    copies(stage, follower, stage.ann, "ARMATURE", "left_wrist")
+
+
+def by_a_constraint_switched_on_later(stage: Stage, follower: Any) -> None:
+    constraint = copies(stage, follower, stage.ann, "COPY_TRANSFORMS", "left_wrist")
+    for frame, value in ((1, 0.0), (20, 1.0)):
+        constraint.influence = value
+        constraint.keyframe_insert("influence", frame=frame)
+    constraint.influence = 0.0
+
+
+def by_driver(stage: Stage, follower: Any) -> None:
+    stage.drive(follower, "location", stage.ann, 'pose.bones["left_wrist"].location[0]', 0)
+
+
+def by_driven_distance(stage: Stage, follower: Any) -> None:
+    curve = follower.driver_add("rotation_euler", 2)
+    variable = curve.driver.variables.new()
+    variable.type = "TRANSFORMS"
+    variable.targets[0].id, variable.targets[0].bone_target = stage.ann, "head"
+
+
+def by_a_driven_property(stage: Stage, follower: Any) -> None:
+    middle = stage.empty("Middle")
+    middle["height"] = 0.0
+    stage.drive(middle, '["height"]', stage.ann, "location[2]")
+    stage.drive(follower, "location", middle, '["height"]', 2)
+
+
+def by_a_chain(stage: Stage, follower: Any) -> None:
+    first, second = stage.empty("First"), stage.empty("Second")
+    copies(stage, first, stage.ann, bone="head")
+    second.parent = first
+    copies(stage, follower, second)
+
+
+def by_another_rig(stage: Stage, follower: Any) -> None:
+    stage.scene.cursor.location = (3, 3, 0)
+    rig = stage.addon("dafnet_addon.blender.armature").create_character(stage.bpy.context, "Rig")
+    constraint = rig.pose.bones["head"].constraints.new("COPY_LOCATION")
+    constraint.target, constraint.subtarget = stage.ann, "head"
+    copies(stage, follower, rig, bone="left_wrist")
+
+
+def by_a_vertex_of_the_body(stage: Stage, follower: Any) -> None:
+    constraint = copies(stage, follower, stage.body, bone=stage.body.vertex_groups[0].name)
+    assert constraint.subtarget
+
+
+def by_shrinkwrap(stage: Stage, follower: Any) -> None:
+    follower.constraints.new("SHRINKWRAP").target = stage.body
+
+
+WAYS = [
+    by_copy_location, by_child_of, by_armature_constraint, by_a_constraint_switched_on_later, by_driver, by_driven_distance,
+    by_a_driven_property, by_a_chain, by_another_rig, by_a_vertex_of_the_body, by_shrinkwrap,
+]
+Way = Callable[[Stage, Any], None]
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_what_follows_the_character_is_no_furniture(stage: Stage, way: Way) -> None:
+    prop = stage.box("Cup", location=(0.3, 0.3, 1.0))
+    assert stage.names() == {"Chair", "Cup"}
+    way(stage, prop)
+    read = stage.read()
+    assert {solid.name for solid in read.scene.solids} == {"Chair"}
+    assert [each for each in read.warnings if "'Cup'" in each] == ["Moved by the character, so not there for it: 'Cup'."]
+    found = stage.addon("dafnet_addon.blender.furniture").furniture_now(stage.bpy.context, stage.settings())
+    assert set(found) == {"Chair"}, "the same for the overlays and for ways round the furniture"
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("role", ["root", "head"])
+def test_what_leads_the_character_may_not_follow_it(stage: Stage, way: Way, role: str) -> None:
+    way(stage, getattr(stage.ann.dafnet, role))
+    stage.refused(f"{role}.* follows the character itself")
+
+
+def shaped_by_armature(stage: Stage, prop: Any) -> None:
+    prop.modifiers.new("Armature", "ARMATURE").object = stage.ann
+
+
+def shaped_by_surface(stage: Stage, prop: Any) -> None:
+    prop.modifiers.new("Bound", "SURFACE_DEFORM").target = stage.body
+
+
+def shaped_by_lattice(stage: Stage, prop: Any) -> None:
+    lattice = stage.add(stage.bpy.data.objects.new("Cage", stage.bpy.data.lattices.new("Cage")), stage.scene.collection)
+    lattice.parent = stage.ann
+    prop.modifiers.new("Lattice", "LATTICE").object = lattice
+
+
+def shaped_by_nodes(stage: Stage, prop: Any) -> None:
+    tree = stage.bpy.data.node_groups.new("Group", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Object", in_out="INPUT", socket_type="NodeSocketObject")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    nodes = [tree.nodes.new(kind) for kind in ("NodeGroupInput", "NodeGroupOutput")]
+    tree.links.new(nodes[0].outputs[0], nodes[1].inputs[0])
+    modifier = prop.modifiers.new("Nodes", "NODES")
+    modifier.node_group = tree
+    modifier[tree.interface.items_tree["Object"].identifier] = stage.ann
+
+
+def shaped_inside_nodes(stage: Stage, prop: Any) -> None:
+    inner, outer = (stage.bpy.data.node_groups.new(name, "GeometryNodeTree") for name in ("Inner", "Outer"))
+    inner.nodes.new("GeometryNodeObjectInfo").inputs[0].default_value = stage.body
+    outer.nodes.new("GeometryNodeGroup").node_tree = inner
+    for tree in (inner, outer):
+        tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    outer.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    nodes = [outer.nodes.new(kind) for kind in ("NodeGroupInput", "NodeGroupOutput")]
+    outer.links.new(nodes[0].outputs[0], nodes[1].inputs[0])
+    prop.modifiers.new("Nodes", "NODES").node_group = outer
+
+
+def shaped_by_driven_key(stage: Stage, prop: Any) -> None:
+    prop.shape_key_add(name="Basis")
+    stage.drive(prop.shape_key_add(name="Pressed"), "value", stage.ann, 'pose.bones["pelvis"].location[1]')
+
+
+@pytest.mark.parametrize("way", [
+    shaped_by_armature, shaped_by_surface, shaped_by_lattice, shaped_by_nodes, shaped_inside_nodes, shaped_by_driven_key,
+])
+def test_what_the_character_shapes_is_no_furniture_and_may_carry_a_root(stage: Stage, way: Way) -> None:
+    prop = stage.box("Cup")
+    assert stage.names() == {"Chair", "Cup"}
+    way(stage, prop)
+    assert stage.names() == {"Chair"}
+    stage.root.parent = prop
+    stage.read()  # its place does not depend on its shape
+    stage.root.parent_type = "VERTEX"
+    stage.refused("root.* follows the character itself")
+
+
+def test_what_only_knows_the_character_is_furniture_and_may_lead_it(stage: Stage) -> None:
+    muted = copies(stage, stage.root, stage.ann)
+    muted.mute = True
+    off = copies(stage, stage.chair, stage.ann)
+    off.influence = 0.0
+    stage.chair["owner"] = stage.ann
+    stage.drive(stage.chair, "color", stage.ann, "location[0]", 0)
+    stage.ann["speed"] = 1.0
+    stage.ann.update_tag()  # or its evaluated copy would not know the new property
+    stage.drive(stage.head, "location", stage.ann, '["speed"]', 2)
+    stage.drive(stage.chair, "location", stage.ann, "dafnet.head_influence", 2)
+    stage.scene.cursor.location = (3, 3, 0)
+    bob = stage.addon("dafnet_addon.blender.armature").create_character(stage.bpy.context, "Bob")
+    bob.dafnet.upper_body_source = stage.ann
+    bob.dafnet.hand_left.constraints.new("COPY_LOCATION").target = stage.ann
+    copies(stage, stage.ann.dafnet.hand_left, bob, bone="left_wrist")
+    cart = stage.box("Cart")
+    cart.parent = stage.root
+    read = stage.read()
+    assert {solid.name for solid in read.scene.solids} == {"Chair", "Cart"}
+    assert read.controls.head[0, 2] == pytest.approx(1.0)
+
+
+def test_a_held_prop_leaves_the_next_take_as_it_was(stage: Stage) -> None:
+    """It was furniture before: pressed twice with one seed, wrists were 17.6 cm apart."""
+    stage.scene.frame_end = 60
+    for frame, y in ((1, 0.0), (60, 1.2)):
+        stage.root.location.y = y
+        stage.root.keyframe_insert("location", frame=frame)
+    tray = stage.box("Tray", scale=(1, 1, 0.2))
+    copies(stage, tray, stage.ann, "COPY_LOCATION", "left_wrist")
+    job = stage.addon("dafnet_addon.blender.job")
+    first, second = (job.run(stage.bpy.context, stage.settings(temperature=1.0)).take.joints for _ in range(2))
+    assert np.abs(first - second).max() == 0.0
+
+
+def test_a_root_on_a_rigid_body_is_read_as_it_falls(stage: Stage) -> None:
+    copies(stage, stage.root, stage.falling("Ball"))
+    read = stage.read()
+    assert np.allclose(read.controls.root[:, 2, 3], stage.played(stage.root, 2, 1, 40), atol=1e-5)
+    assert np.ptp(read.controls.root[:, 2, 3]) > 6.0
+
+
+def test_the_shot_may_begin_while_a_rigid_body_falls(stage: Stage) -> None:
+    ball = stage.falling("Ball")
+    stage.furniture.objects.link(ball)
+    read = stage.read(frame_start=18)
+    falls = next(solid for solid in read.scene.solids if solid.name == "Ball").matrix[:, 2, 3]
+    assert np.allclose(falls, stage.played(ball, 2, 18, 40), atol=1e-5) and np.ptp(falls) > 4.0
+    assert stage.scene.frame_current == 4
+
+
+def test_a_root_on_a_cloth_is_read_as_it_hangs(stage: Stage) -> None:
+    bpy = stage.bpy
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=6, y_subdivisions=6, size=1.0, location=(0, 0, 30))
+    cloth = bpy.context.object
+    cloth.vertex_groups.new(name="Middle").add([24], 1.0, "REPLACE")
+    cloth.modifiers.new("Cloth", "CLOTH")
+    copies(stage, stage.root, cloth, bone="Middle")
+    read = stage.read(frame_start=5)
+    assert np.allclose(read.controls.root[:, 2, 3], stage.played(stage.root, 2, 5, 40), atol=1e-4)
+    assert np.ptp(read.controls.root[:, 2, 3]) > 1.0
+
+
+def test_reading_a_simulation_may_be_cancelled_and_notices_a_changed_frame(stage: Stage) -> None:
+    copies(stage, stage.root, stage.falling("Ball"))
+    steps = stage.steps()
+    for _ in range(2):
+        next(steps)
+    steps.close()
+    assert stage.scene.frame_current == 4
+    steps = stage.steps()
+    next(steps)
+    stage.scene.frame_set(2)
+    with pytest.raises(stage.error, match="frame was changed"):
+        list(steps)
+    assert stage.scene.frame_current == 4
+
+
+def test_a_simulation_that_the_character_pushes_is_to_be_baked(stage: Stage) -> None:
+    ball = stage.falling("Ball")
+    stage.furniture.objects.link(ball)
+    assert not stage.read().warnings
+    shin = stage.box("Shin", stage.scene.collection)
+    shin.parent, shin.parent_type, shin.parent_bone = stage.ann, "BONE", "left_knee"
+    stage.falling("Other").rigid_body.type = "PASSIVE"
+    stage.scene.rigidbody_world.collection.objects.link(shin)
+    assert any("push 'Ball'" in each and "bake the simulation" in each for each in stage.read().warnings)
+    copies(stage, stage.root, ball)
+    stage.refused("push 'Ball', which moves the root 'Ann Root'; bake the simulation")
+    stage.scene.rigidbody_world.point_cache.frame_end = 40
+    stage.bpy.ops.ptcache.bake_all(bake=True)
+    stage.scene.frame_set(4)
+    assert not any("bake" in each for each in stage.read().warnings)
+
+
+def test_find_furniture_and_root_from_object_see_what_is_played(stage: Stage) -> None:
+    ball = stage.falling("Ball")
+    places = stage.addon("dafnet_addon.blender.path_sources").places_of
+    found = places(stage.bpy.context, ball, [10, 25, 40])[:, 2]
+    played = stage.played(ball, 2, 1, 40)
+    assert np.allclose(found, played[[9, 24, 39]], atol=1e-5) and np.ptp(found) > 4.0
