@@ -23,6 +23,7 @@ import torch
 from dafnet_addon.core.weights import Weights, load_weights
 from dafnet_addon.data.held_out import HeldClip, held_out
 from dafnet_addon.model.config import SMALL, ModelConfig
+from dafnet_addon.training import precision
 from dafnet_addon.training.batches import Pool
 from dafnet_addon.training.evaluate import captured, measured, rows_of
 from dafnet_addon.training.export import export
@@ -112,6 +113,7 @@ def main() -> None:
     options = parser.parse_args()
     begin_with = load_weights(options.begin_with) if options.begin_with else None
     torch.set_num_threads(max(1, (os.cpu_count() or 2)))
+    precision.announce(TRAINING.mixed)
     clips = captured(held_out(options.folder))[:: options.every]
     first = options.output / "predictor"
     if not (first / "predictor.pt").exists():

@@ -38,6 +38,7 @@ from dafnet_addon.core.weights import load_weights
 from dafnet_addon.data.held_out import HeldClip, held_out
 from dafnet_addon.data.paper_test import paper_test
 from dafnet_addon.model.config import SMALL, ModelConfig
+from dafnet_addon.training import precision
 from dafnet_addon.training.evaluate import Measured, captured, measured, row
 from dafnet_addon.training.export import export
 from dafnet_addon.training.processes import spread_out
@@ -296,6 +297,7 @@ def main() -> int:
         command.add_argument("-o", "--output", type=Path, required=True, metavar="RUNS")
     options = parser.parse_args()
     if options.command == "train":
+        precision.announce(TRAINING.mixed)
         train(options.dataset, options.output, options.minutes, options.processes)
         return 0
     clips = {

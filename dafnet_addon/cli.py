@@ -242,7 +242,7 @@ def _prepare(options: argparse.Namespace) -> None:
 def _train(options: argparse.Namespace) -> None:
     _require_checkout("training")
     from .core.weights import load_weights
-    from .training import ranks
+    from .training import precision, ranks
     from .training.export import export
     from .training.spread import take_spread
     from .training.train import account, dataset_pool, read_config, train, trained
@@ -251,6 +251,8 @@ def _train(options: argparse.Namespace) -> None:
     if options.minutes is not None:
         config = replace(config, minutes_flow=options.minutes)
     begin_with = load_weights(options.begin_with) if options.begin_with else None
+    if ranks.rank() == 0:
+        precision.announce(config.mixed, options.device)
     with _Bar() as bar:
         train(options.dataset, options.output, model, config, bar, options.device, begin_with)
     if ranks.rank():

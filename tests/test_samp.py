@@ -17,6 +17,7 @@ from dafnet_addon.core.skeleton import OFFSETS, PARENTS, REST, SEAT_TO_PELVIS, j
 from dafnet_addon.data.boxes import ABSENT, MOST, NO_BOXES, box  # noqa: E402
 from dafnet_addon.data.held_out import HeldClip  # noqa: E402
 from dafnet_addon.data.prepare import POSE_UNIT  # noqa: E402
+from dafnet_addon.training import precision  # noqa: E402
 from dafnet_addon.training.batches import Pool  # noqa: E402
 from dafnet_addon.training.evaluate import shot_of  # noqa: E402
 
@@ -183,6 +184,17 @@ def test_mixed_precision_is_nearly_the_same(pool):
         training = SampTraining("samp", replace(TINY, mixed=mixed), pool.statistics(), "cpu", pool)
         losses.append(float(training.loss(pool, torch.arange(12), 0.0).detach()))
     assert abs(losses[0] - losses[1]) < 0.02 * losses[0]
+
+
+def test_mixed_precision_is_asked_for_only_where_it_is_there(pool, monkeypatch):
+    losses = {}
+    for asked, there in ((False, False), (True, False), (True, True)):
+        monkeypatch.setattr(precision, "mixes", lambda device, there=there: there)
+        torch.manual_seed(0)
+        training = SampTraining("samp", replace(TINY, mixed=asked), pool.statistics(), "cpu", pool)
+        assert training.config.mixed is (asked and there)
+        losses[asked, there] = float(training.loss(pool, torch.arange(12), 0.0).detach())
+    assert losses[True, False] == losses[False, False] != losses[True, True]
 
 
 def test_a_state_dict_says_all(pool):

@@ -22,6 +22,8 @@ from dafnet_addon.core.skeleton import MODEL_ORDER  # noqa: E402
 from dafnet_addon.core.weights import load_weights  # noqa: E402
 from dafnet_addon.data import boxes as boxes_module  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
+from dafnet_addon.model.flow import Coupling, EnvironmentEncoder  # noqa: E402
+from dafnet_addon.training import precision  # noqa: E402
 from dafnet_addon.training.batches import Pool, Statistics, observation_for, occupancy_of, past_of  # noqa: E402
 from dafnet_addon.training.export import (  # noqa: E402
     adopt_predictor,
@@ -224,6 +226,24 @@ def test_mixed_precision_is_nearly_the_same(dataset, tmp_path):
     assert abs(losses[0] - losses[1]) < 0.02 * abs(losses[0]) + 0.2
 
 
+@pytest.mark.parametrize("there", [False, True])
+def test_mixed_precision_is_asked_for_only_where_it_is_there(dataset, tmp_path, monkeypatch, capsys, there):
+    monkeypatch.setattr(precision, "mixes", lambda device: there)
+    run = Run("upper", tmp_path, TINY, replace(_config(2), mixed=True), _pool(dataset).statistics())
+    switches = [module.mixed for module in run.flow.modules() if isinstance(module, Coupling | EnvironmentEncoder)]
+    assert switches and set(switches) == {there} and run.config.mixed is there, "what is said of the run is what was done"
+    precision.announce(True)
+    assert capsys.readouterr().err.count("\n") == (0 if there else 1)
+    precision.announce(False)
+    assert capsys.readouterr().err == ""
+
+
+def test_the_probe_leaves_the_generators_alone():
+    before = torch.get_rng_state()
+    precision.mixes.__wrapped__("cpu")
+    assert torch.equal(torch.get_rng_state(), before)
+
+
 def test_what_a_cpu_reads_of_the_sensor_is_what_other_devices_make(dataset):
     pool = _pool(dataset)
     rows = pool._rows(torch.arange(12))
@@ -299,24 +319,42 @@ def test_running_on_is_the_likelihood_and_the_inverse(dataset):
     assert (again[:, 5:] - z[:, None]).abs().max() < 1e-3
 
 
-def test_two_processes_train_one_model(dataset, tmp_path):
-    (dataset / "dataset.json").write_text("{}", encoding="utf-8")
-    config = tmp_path / "tiny.toml"
+def _tiny_train(python: list[str], dataset: Path, folder: Path, changed: dict[str, str | None]) -> str:
+    """What ``dafnet train`` of a small model says, run as ``python`` in an environment with some variables set or unset."""
+    (dataset / "dataset.json").write_text('{"train": ["Jörg"]}', encoding="utf-8")
+    config = dataset / "tiny.toml"
     config.write_text(
         'preset = "small"\n[model]\npredictor_code = 8\npredictor_width = 16\nwidth = 16\ncode = 8\nsteps_upper = 1\n'
-        "steps_lower = 1\n[training]\nminutes_predictor = 0.02\nminutes_flow = 0.02\nbatch = 4\n",
+        "steps_lower = 1\n[training]\nminutes_predictor = 0.02\nminutes_flow = 0.02\nbatch = 4\nmixed = true\n",
         encoding="utf-8",
     )
-    command = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2", "-m", "dafnet_addon"]
+    environment = {name: value for name, value in {**os.environ, **changed}.items() if value is not None}
     done = subprocess.run(
-        [*command, "train", config, dataset, "-o", tmp_path / "run"], cwd=Path(__file__).resolve().parents[1],
-        env={**os.environ, "OMP_NUM_THREADS": "1"}, capture_output=True, text=True,
+        [sys.executable, *python, "-m", "dafnet_addon", "train", config, dataset, "-o", folder],
+        cwd=Path(__file__).resolve().parents[1], env=environment, capture_output=True, text=True,
     )
     assert done.returncode == 0, done.stdout + done.stderr
+    weights = load_weights(folder / "dafnet.safetensors")
+    assert weights.config["model"]["width"] == 16 and "Jörg" in weights.metadata["data"]
+    return done.stderr
+
+
+def test_it_trains_without_avx_512_in_a_bare_environment(dataset, tmp_path):
+    """A processor without a bfloat16 LSTM, no home, no UTF-8, one thread: as in a container or a batch job."""
+    bare = {
+        "ONEDNN_MAX_CPU_ISA": "AVX2", "OMP_NUM_THREADS": "1", "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0",
+        "HOME": None, "TZ": "Asia/Kathmandu",
+    }
+    said = _tiny_train([], dataset, tmp_path / "run", bare)
+    assert said.count("single precision") == 1
+
+
+def test_two_processes_train_one_model(dataset, tmp_path):
+    together = ["-m", "torch.distributed.run", "--standalone", "--local-addr", "127.0.0.1", "--nproc-per-node", "2"]
+    _tiny_train(together, dataset, tmp_path / "run", {"OMP_NUM_THREADS": "1"})
     lines = [json.loads(line) for line in (tmp_path / "run" / "log.jsonl").read_text(encoding="utf-8").splitlines()]
     assert len(lines) == len({(line["part"], line["step"]) for line in lines}), "one process keeps the run"
     assert {line["part"] for line in lines} == {"predictor", "upper", "lower"}
-    assert load_weights(tmp_path / "run" / "dafnet.safetensors").config["model"]["width"] == 16
 
 
 @pytest.mark.parametrize("system", ["ap-p", "moglow", "lower-first"])

@@ -21,6 +21,7 @@ from ..core.root import RootPath, to_world
 from ..core.sampler import Conditions, smpl_order, velocities_up_to
 from ..data.held_out import HeldClip
 from ..model.config import POSE_SIZE, SENSOR_SIZE, ModelConfig
+from ..training import precision
 from ..training.batches import Pool, Statistics, observation_for
 from .samp_features import FIELDS, goals_seen, of_clip, of_windows, parts_of
 from .samp_state import (
@@ -63,7 +64,8 @@ _PHASES = 50
 @dataclass(frozen=True)
 class SampConfig:
     """``width``: of experts, and of the first layers of encoder and gating. ``code``: of the encoders' later layers.
-    ``frames``: longest training sequence. ``mixed``: the loss is computed in bfloat16, which halves its cost on a CPU.
+    ``frames``: longest training sequence. ``mixed``: the loss is computed in bfloat16 where the device can, which halves its
+    cost on a CPU.
     """
 
     width: int = 512
@@ -170,7 +172,8 @@ class SampTraining:
     def __init__(
         self, kind: str, config: SampConfig, statistics: Statistics, device: torch.device | str, pool: Pool
     ) -> None:
-        self.kind, self.config, self.statistics, self.device = kind, config, statistics, torch.device(device)
+        self.kind, self.statistics, self.device = kind, statistics, torch.device(device)
+        self.config = replace(config, mixed=config.mixed and precision.mixes(str(device)))
         self.network: MotionNet = network_of(kind, config)
         if kind == "samp-ob":
             _take_statistics(self.network, statistics)

@@ -26,7 +26,7 @@ from ..core.weights import Weights
 from ..model.config import LOWER_SIZE, PAPER, POSE_SIZE, SMALL, UPPER_SIZE, ModelConfig
 from ..model.flow import BodyFlow, Coupling, EnvironmentEncoder
 from ..model.predictor import GMVAE, ActionPredictor, gumbel_temperature
-from . import ranks
+from . import precision, ranks
 from .batches import Batch, Pool, Statistics, observation_for
 from .export import adopt_part, adopt_predictor, adopted_statistics
 from .free_run import lower_loss, upper_loss
@@ -46,7 +46,7 @@ class TrainingConfig:
     of spheres are told apart, and seats are met to 12 cm). ``clip_norm``: largest gradient norm. ``free_run``: weight of the
     losses of motion that the flow makes by itself (see ``free_run``; 0 as in the paper), which begins after ``captured``
     frames of a window, in a share ``cold`` of the batches after the first, with an empty memory, as a take begins; ``calm`` of
-    the windows make it from z = 0. ``mixed``: LSTMs and environment encoders compute in bfloat16.
+    the windows make it from z = 0. ``mixed``: LSTMs and environment encoders compute in bfloat16, where the device can.
     """
 
     minutes_predictor: float = 5.0
@@ -106,13 +106,14 @@ class Run:
         device: str = "cpu",
     ) -> None:
         torch.manual_seed(config.seed)
-        self.part, self.folder, self.model, self.config, self.statistics = part, folder, model, config, statistics
+        self.part, self.folder, self.model, self.statistics = part, folder, model, statistics
         self.device = torch.device(device)
+        self.config = replace(config, mixed=config.mixed and precision.mixes(device))
         self.gmvae = GMVAE(model).to(self.device)
         self.flow = flow_of(model).to(self.device)
         for module in self.flow.modules():
             if isinstance(module, Coupling | EnvironmentEncoder):
-                module.mixed = config.mixed
+                module.mixed = self.config.mixed
         self.network: nn.Module = self.gmvae if part == "predictor" else self.flow.parts()[part]
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=config.peak)
         self.step, self.seconds = 0, 0.0
