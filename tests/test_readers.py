@@ -1,7 +1,11 @@
 """Readers of motion capture: what is written with a known answer is read back; what is damaged is refused in one sentence."""
 
 import json
+import sys
+import tracemalloc
+from io import BytesIO
 from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZIP_LZMA, ZipFile
 
 import numpy as np
 import pytest
@@ -22,75 +26,11 @@ from dafnet_addon.data.sheet import sheet
 from dafnet_addon.data.summary import summary
 from dafnet_addon.data.world import at_model_rate, floor_height, unit_of
 
+sys.path.insert(0, str(Path(__file__).parent))
+from motion_files import MIXAMO, VICON, Y_UP, walk, write_amc, write_asf, write_bvh
+
 MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
 RAW = MOCAP / "raw_samples"
-MIXAMO = dict(zip(JOINTS, (
-    "Hips", "LeftUpLeg", "RightUpLeg", "Spine", "LeftLeg", "RightLeg", "Spine1", "LeftFoot", "RightFoot", "Spine2",
-    "LeftToeBase", "RightToeBase", "Neck", "LeftShoulder", "RightShoulder", "Head", "LeftArm", "RightArm", "LeftForeArm",
-    "RightForeArm", "LeftHand", "RightHand",
-), strict=True))
-Y_UP = [0, 2, 1], (1.0, 1.0, -1.0)  # a body in z-up axes as one in y-up axes that looks along -z
-
-
-def _children(parent: int) -> list[int]:
-    return [j for j, p in enumerate(PARENTS) if p == parent]
-
-
-def _bvh(
-    file: Path, angles: np.ndarray, way: np.ndarray, order: str = "ZXY", fps: float = 30.0, unit: float = 0.01, up: str = "y",
-    names: dict[str, str] = MIXAMO,
-) -> np.ndarray:
-    """Write a BVH of our rest skeleton, joints turned by ``angles`` (T, 22, 3) degrees about x, y, z in ``order``; its joints
-    (T, 22, 3) in metres and the file's axes, by plain recursion.
-    """
-    rest = REST if up == "z" else REST[:, Y_UP[0]] * Y_UP[1]
-    lines = ["HIERARCHY"]
-    written: list[int] = []
-
-    def write(j: int, depth: int) -> None:
-        offset = (rest[j] - rest[PARENTS[j]]) / unit if j else np.zeros(3)
-        channels = [f"{axis}rotation" for axis in order]
-        if j == 0:
-            channels = ["Xposition", "Yposition", "Zposition", *channels]
-        pad = "\t" * depth
-        lines.append(f"{pad}{'ROOT' if j == 0 else 'JOINT'} {names[JOINTS[j]]}\n{pad}{{")
-        lines.append(f"{pad}OFFSET {' '.join(f'{x:.12g}' for x in offset)}")
-        lines.append(f"{pad}CHANNELS {len(channels)} {' '.join(channels)}")
-        written.append(j)
-        for child in _children(j):
-            write(child, depth + 1)
-        if not _children(j):
-            lines.append(f"{pad}End Site\n{pad}{{\n{pad}OFFSET 0 1 0\n{pad}}}")
-        lines.append(f"{pad}}}")
-
-    write(0, 0)
-    columns = ["XYZ".index(axis) for axis in order]
-    lines += ["MOTION", f"Frames: {len(angles)}", f"Frame Time: {1 / fps:.7f}"]
-    for t, turned in enumerate(angles):
-        numbers = list(way[t] / unit) + [float(turned[j, c]) for j in written for c in columns]
-        lines.append(" ".join(f"{n:.9f}" for n in numbers))
-    file.write_text("\n".join(lines), encoding="utf-8")
-
-    out = np.zeros((len(angles), 22, 3))
-    for t in range(len(angles)):
-        frames: list[np.ndarray] = []
-        for j in range(22):
-            turn = np.eye(3)
-            for axis in order:
-                turn = turn @ rotation_about(axis.lower(), np.radians(angles[t, j, "XYZ".index(axis)]))
-            frames.append(turn if j == 0 else frames[PARENTS[j]] @ turn)
-            out[t, j] = way[t] if j == 0 else out[t, PARENTS[j]] + frames[PARENTS[j]] @ (rest[j] - rest[PARENTS[j]])
-    return out
-
-
-def _walk(frames: int, up: str) -> tuple[np.ndarray, np.ndarray]:
-    """Angles that swing the limbs a little, and a pelvis that goes forward at standing height."""
-    rng = np.random.default_rng(4)
-    phase = np.linspace(0, 3, frames)[:, None, None] + rng.uniform(0, 6, (1, 22, 3))
-    angles = 8.0 * np.sin(phase) * (np.arange(22) > 0)[None, :, None]
-    ahead = np.linspace(0, 1.5, frames)
-    way = np.stack([0 * ahead, ahead, 0 * ahead + REST[0, 2]], -1)
-    return angles, way if up == "z" else way[:, Y_UP[0]] * Y_UP[1]
 
 
 def test_an_axis_turns_as_it_should():
@@ -101,9 +41,9 @@ def test_an_axis_turns_as_it_should():
 
 @pytest.mark.parametrize("order", ["ZXY", "XYZ", "YZX"])
 def test_bvh_positions_are_those_of_its_angles(tmp_path, order):
-    angles, way = _walk(12, "y")
+    angles, way = walk(12, "y")
     angles *= 8
-    truth = _bvh(tmp_path / "a.bvh", angles, way, order, unit=0.0254)
+    truth = write_bvh(tmp_path / "a.bvh", angles, way, order, unit=0.0254)
     recording = read_bvh(tmp_path / "a.bvh")
     assert recording.rate == 30.0 and recording.names.count("LeftHand end") == 1
     joints, rest = mapped(recording, tmp_path / "a.bvh")
@@ -114,8 +54,8 @@ def test_bvh_positions_are_those_of_its_angles(tmp_path, order):
 @pytest.mark.parametrize(("up", "unit", "fps"), [("y", 0.01, 120), ("z", 1.0, 30), ("y", 0.0254, 24), ("z", 0.001, 60)])
 def test_units_way_up_and_rate_are_found(tmp_path, up, unit, fps):
     frames = 2 * fps + 1
-    angles, way = _walk(frames, up)
-    truth = _bvh(tmp_path / "walk.bvh", angles, way, fps=fps, unit=unit, up=up)
+    angles, way = walk(frames, up)
+    truth = write_bvh(tmp_path / "walk.bvh", angles, way, fps=fps, unit=unit, up=up)
     (clip,) = read_clips(tmp_path)
     truth = truth if up == "z" else truth[..., [0, 2, 1]] * (1, -1, 1)
     assert len(clip.joints) == 61
@@ -124,11 +64,11 @@ def test_units_way_up_and_rate_are_found(tmp_path, up, unit, fps):
 
 
 def test_a_lying_body_shares_the_way_up_of_the_others_in_its_folder(tmp_path):
-    angles, way = _walk(60, "y")
-    _bvh(tmp_path / "walk.bvh", angles, way)
+    angles, way = walk(60, "y")
+    write_bvh(tmp_path / "walk.bvh", angles, way)
     lying = angles * 0
     lying[:, 0, 0] = 90.0  # on its face: the head lies along +z
-    lying_truth = _bvh(tmp_path / "lie.bvh", lying, way * (0, 0, 0) + (0, 0.1, 0))
+    lying_truth = write_bvh(tmp_path / "lie.bvh", lying, way * (0, 0, 0) + (0, 0.1, 0))
     assert lying_truth[0, 15, 2] - lying_truth[0, 0, 2] > 0.5
     clips = {c.name: c for c in read_clips(tmp_path)}
     assert clips["lie"].category == "lying" and np.ptp(clips["lie"].joints[0, :, 2]) < 0.4
@@ -160,70 +100,11 @@ def test_resampling_keeps_time():
     assert len(at_model_rate(ramp, 24.0)) == 151
 
 
-ASF = """# made by a test
-:version 1.10
-:name VICON
-:units
-  mass 1.0
-  length 0.45
-  angle deg
-:root
-   order TX TY TZ RX RY RZ
-   axis XYZ
-   position 0 0 0
-   orientation 0 0 0
-:bonedata
-{bones}:hierarchy
-  begin
-{lines}
-  end
-"""
-VICON = {
-    "left_hip": "lfemur", "right_hip": "rfemur", "spine1": "upperback", "left_knee": "ltibia", "right_knee": "rtibia",
-    "spine2": "thorax", "left_ankle": "lfoot", "right_ankle": "rfoot", "spine3": "lowerneck", "left_foot": "ltoes",
-    "right_foot": "rtoes", "neck": "upperneck", "left_collar": "lclavicle", "right_collar": "rclavicle", "head": "head",
-    "left_shoulder": "lhumerus", "right_shoulder": "rhumerus", "left_elbow": "lradius", "right_elbow": "rradius",
-    "left_wrist": "lhand", "right_wrist": "rhand",
-}
-
-
-def _asf(file: Path) -> np.ndarray:
-    """Write our rest skeleton as an .asf; its joints (22, 3) in the file's units and axes.
-
-    A bone of .asf has one end only: a fixed one leads to each joint, at which one without length turns.
-    """
-    rest = REST[:, Y_UP[0]] * Y_UP[1] / (0.0254 / 0.45)
-    fixed = {"left_hip": "lhipjoint", "right_hip": "rhipjoint", "spine1": "lowerback"}
-    bones, lines = "", []
-    for j in range(1, 22):
-        parent = VICON.get(JOINTS[PARENTS[j]], "root")
-        link = fixed.get(JOINTS[j], f"to_{VICON[JOINTS[j]]}")
-        offset = rest[j] - rest[PARENTS[j]]
-        length = float(np.linalg.norm(offset))
-        direction = " ".join(f"{x:.12g}" for x in offset / length)
-        bones += (
-            f"  begin\n id {j}\n name {link}\n direction {direction}\n length {length:.12g}\n axis 0 0 0 XYZ\n  end\n"
-            f"  begin\n id {j + 50}\n name {VICON[JOINTS[j]]}\n direction 0 1 0\n length 0\n axis 20 -30 40 XYZ\n"
-            "dof rx ry rz\n limits (-180 180)\n (-180 180)\n (-180 180)\n  end\n"
-        )
-        lines += [f"    {parent} {link}", f"    {link} {VICON[JOINTS[j]]}"]
-    file.write_text(ASF.format(bones=bones, lines="\n".join(lines)), encoding="utf-8")
-    return rest
-
-
-def _amc(file: Path, angles: np.ndarray, way: np.ndarray) -> None:
-    lines = [":FULLY-SPECIFIED", ":DEGREES"]
-    for t, turned in enumerate(angles):
-        lines.append(f"{t + 1}\nroot {' '.join(f'{x:.9f}' for x in [*way[t], *turned[0]])}")
-        lines += [f"{VICON[JOINTS[j]]} {' '.join(f'{x:.9f}' for x in turned[j])}" for j in range(1, 22)]
-    file.write_text("\n".join(lines), encoding="utf-8")
-
-
 def test_asf_and_amc_give_the_joints_of_their_angles(tmp_path):
-    rest = _asf(tmp_path / "s.asf")
-    angles, way = _walk(9, "y")
+    rest = write_asf(tmp_path / "s.asf")
+    angles, way = walk(9, "y")
     way = way / (0.0254 / 0.45)
-    _amc(tmp_path / "s_walk.amc", angles, way)
+    write_amc(tmp_path / "s_walk.amc", angles, way)
     # Acclaim: a bone turns by C M C⁻¹, each of C and M about x, then y, then z, all about fixed axes.
     def turn(degrees: np.ndarray) -> np.ndarray:
         x, y, z = (rotation_about(a, np.array(np.radians(d))) for a, d in zip("xyz", degrees, strict=True))
@@ -248,10 +129,10 @@ def test_asf_and_amc_give_the_joints_of_their_angles(tmp_path):
 
 
 def test_an_amc_goes_with_the_asf_it_is_named_after(tmp_path):
-    _asf(tmp_path / "s.asf")
-    _asf(tmp_path / "s2.asf")
-    angles, way = _walk(9, "y")
-    _amc(tmp_path / "s2_walk.amc", angles, way)
+    write_asf(tmp_path / "s.asf")
+    write_asf(tmp_path / "s2.asf")
+    angles, way = walk(9, "y")
+    write_amc(tmp_path / "s2_walk.amc", angles, way)
     assert len(list(read_clips(tmp_path))) == 1
     (tmp_path / "s2_walk.amc").rename(tmp_path / "other.amc")
     with pytest.raises(InputError, match=r"2 \.asf files"):
@@ -286,9 +167,9 @@ def test_archives_that_are_no_motion_are_passed_over(tmp_path):
 
 def test_what_is_known_of_a_clip_is_stated_beside_it(tmp_path):
     (tmp_path / "s1").mkdir()
-    angles, way = _walk(12, "y")
-    _bvh(tmp_path / "s1" / "WalkUp_01.bvh", angles, way)
-    _bvh(tmp_path / "sit_on_chair.bvh", angles, way)
+    angles, way = walk(12, "y")
+    write_bvh(tmp_path / "s1" / "WalkUp_01.bvh", angles, way)
+    write_bvh(tmp_path / "sit_on_chair.bvh", angles, way)
     clips = {c.name: c for c in read_clips(tmp_path)}
     assert clips["s1/WalkUp_01"].subject == "s1" and clips["s1/WalkUp_01"].category == "locomotion"
     assert clips["sit_on_chair"].category == "sit-stand" and clips["sit_on_chair"].source == tmp_path.name
@@ -320,6 +201,274 @@ def _one_sentence(error: pytest.ExceptionInfo[InputError]) -> None:
     assert text.endswith(".") and "\n" not in text and ";" in text and len(text) < 500, text
 
 
+LIBERTIES = {
+    "a byte order mark": lambda text: "\ufeff" + text,
+    "UTF-16": lambda text: text,
+    "Windows' line ends": lambda text: text.replace("\n", "\r\n"),
+    "an old Mac's line ends": lambda text: text.replace("\n", "\r"),
+    "tabs": lambda text: text.replace(" ", "\t"),
+    "blank lines": lambda text: text.replace("\n", "\n\n  \n"),
+    "decimal commas": lambda text: text.replace(".", ","),
+    "trailing spaces": lambda text: text.replace("\n", "  \n"),
+}
+"""What a text file may look like without meaning anything else."""
+
+BVH_LIBERTIES = LIBERTIES | {
+    "one frame more than announced": lambda text: text.replace("Frames: 12", "Frames: 11"),
+    "one frame less than announced": lambda text: text.replace("Frames: 12", "Frames: 13"),
+    "no space after the colons": lambda text: text.replace("Frames: ", "Frames:").replace("Time: ", "Time:"),
+    "a space before the colons": lambda text: text.replace("Frames:", "Frames :").replace("Time:", "Time :"),
+    "capitals": lambda text: text.upper(),
+    "small letters": lambda text: text.lower(),
+    "end sites with names": lambda text: text.replace("End Site", "End Site LeftTip"),
+    "end sites in one word": lambda text: text.replace("End Site", "EndSite"),
+    "end sites without a word": lambda text: text.replace("End Site", "End"),
+    "end sites without offset": lambda text: text.replace("OFFSET 0 1 0", ""),
+    "end sites that say they are still": lambda text: text.replace("OFFSET 0 1 0", "OFFSET 0 1 0 CHANNELS 0"),
+    "braces on their names' line": lambda text: text.replace("\n{", "{").replace("Hips", "Hips "),
+    "commas between numbers": lambda text: text[: text.index("MOTION")] + text[text.index("MOTION") :].replace(" ", ", ")
+        .replace("Frames:,", "Frames:").replace("Frame,", "Frame").replace("Time:,", "Time:"),
+    "frames over several lines": lambda text: text[: text.index("Time")] + text[text.index("Time") :].replace(" ", "\n"),
+    "a prefix with a colon": lambda text: _renamed(text, "mixamorig:"),
+    "a prefix with an underscore": lambda text: _renamed(text, "mixamorig1_"),
+    "a prefix of its own": lambda text: _renamed(text, "Hero 2 "),
+}
+
+
+def _renamed(text: str, prefix: str) -> str:
+    for name in sorted(MIXAMO.values(), key=len, reverse=True):
+        text = text.replace(f" {name}\n", f" {prefix}{name}\n")
+    return text
+
+
+@pytest.mark.parametrize("liberty", BVH_LIBERTIES)
+def test_a_bvh_is_read_whatever_its_exporter_made_of_it(tmp_path, liberty):
+    angles, way = walk(12, "y")
+    truth = write_bvh(tmp_path / "a.bvh", angles, way)
+    text = (tmp_path / "a.bvh").read_text(encoding="utf-8")
+    changed = BVH_LIBERTIES[liberty](text)
+    assert changed != text or liberty == "UTF-16"
+    (tmp_path / "a.bvh").write_bytes(changed.encode("utf-16" if liberty == "UTF-16" else "utf-8"))
+    recording = read_bvh(tmp_path / "a.bvh")
+    joints, _ = mapped(recording, tmp_path / "a.bvh")
+    assert recording.rate == 30.0 and np.abs(joints * 0.01 - truth).max() < 1e-6
+    assert len(list(read_clips(tmp_path))) == 1
+
+
+@pytest.mark.parametrize("liberty", [*LIBERTIES, "small letters", "capitals"])
+def test_acclaim_files_are_read_whatever_was_made_of_them(tmp_path, liberty):
+    write_asf(tmp_path / "s.asf")
+    angles, way = walk(9, "y")
+    write_amc(tmp_path / "s_a.amc", angles, way)
+    (before,) = read_clips(tmp_path)
+    changes = LIBERTIES | {"small letters": str.lower, "capitals": str.upper}
+    for name in ("s.asf", "s_a.amc"):
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        changed = changes[liberty](text)
+        (tmp_path / name).write_bytes(changed.encode("utf-16" if liberty == "UTF-16" else "utf-8"))
+        (after,) = read_clips(tmp_path)
+        assert np.abs(before.joints - after.joints).max() < 1e-9, name
+
+
+@pytest.mark.parametrize("rate", [np.nan, np.inf, 1e-9, -30.0, 0.5, 1e9])
+def test_a_rate_that_no_motion_has_is_refused_before_any_memory_is_taken(tmp_path, rate):
+    np.savez(tmp_path / "a.npz", poses=np.zeros((41, 156)), trans=np.zeros((41, 3)), mocap_framerate=rate)
+    with pytest.raises(InputError, match=r"41 frames at .* a second, .*'fps'") as error:
+        list(read_clips(tmp_path))
+    _one_sentence(error)
+    (tmp_path / "clips.json").write_text('{"*": {"fps": 60}}', encoding="utf-8")
+    assert [len(clip.joints) for clip in read_clips(tmp_path)] == [21], "what is stated counts"
+
+
+def _archive(file: Path, name: str, header: str, content: bytes = b"") -> None:
+    """An AMASS archive in which one array has another header."""
+    arrays = {"poses": np.zeros((4, 156)), "trans": np.zeros((4, 3)), "mocap_framerate": np.array(60.0)}
+    with ZipFile(file, "w", ZIP_DEFLATED) as archive:
+        for each, array in arrays.items():
+            if each == name:
+                padded = header.encode() + b" " * (118 - len(header)) + b"\n"
+                written = b"\x93NUMPY\x01\x00" + len(padded).to_bytes(2, "little") + padded + content
+            else:
+                buffer = BytesIO()
+                np.save(buffer, array)
+                written = buffer.getvalue()
+            archive.writestr(f"{each}.npy", written)
+
+
+@pytest.mark.parametrize(("header", "content"), [
+    ("{'descr': '<f8', 'fortran_order': False, 'shape': (20000000000, 156), }", b""),
+    ("{'descr': '<f8', 'fortran_order': False, 'shape': (100000, 156), }", b"\0" * 800),
+    ("{'descr': '<f8', 'fortran_order': False, 'shape': (-4, -156), }", b"\0" * 4992),
+    ("{'descr': '<U0', 'fortran_order': False, 'shape': (10000000000, 156), }", b""),
+    ("{'descr': '|O', 'fortran_order': False, 'shape': (4, 156), }", b"\0" * 4992),
+    ("{'descr': '<f8', 'fortran_order': False, 'shape': (4", b""),
+    ("{'descr': '<f4', 'fortran_order': False, 'shape': (300000, 156), }", b"\0" * 187_200_000),
+])
+def test_nothing_is_unpacked_that_an_archive_cannot_hold(tmp_path, header, content):
+    _archive(tmp_path / "a.npz", "poses", header, content)
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError) as error:
+            list(read_clips(tmp_path))
+        assert tracemalloc.get_traced_memory()[1] < 20e6
+    finally:
+        tracemalloc.stop()
+    _one_sentence(error)
+
+
+def test_archives_of_another_kind_are_refused_in_one_sentence(tmp_path):
+    np.savez(tmp_path / "a.npz", poses=np.zeros((4, 156)), trans=np.zeros((4, 3)), mocap_framerate=60.0)
+    assert len(list(read_clips(tmp_path))) == 1
+    whole = (tmp_path / "a.npz").read_bytes()
+    at = whole.index(b"poses.npy") + 400
+    broken = whole[:at] + b"\x07" + whole[at + 1 :]
+    np.save(tmp_path / "b.npy", np.zeros((4, 156)))
+    packed = BytesIO()
+    with ZipFile(packed, "w", ZIP_LZMA) as archive:
+        archive.writestr("poses.npy", whole)
+        archive.writestr("trans.npy", whole)
+    for content, said in ((broken, "CRC"), ((tmp_path / "b.npy").read_bytes(), "zip"), (packed.getvalue(), "packed")):
+        (tmp_path / "a.npz").write_bytes(content)
+        with pytest.raises(InputError, match=said) as error:
+            list(read_clips(tmp_path))
+        _one_sentence(error)
+
+
+@pytest.mark.parametrize("damage", [
+    lambda arrays: arrays | {"frames": arrays["frames"] + 1}, lambda arrays: arrays | {"frames": -arrays["frames"]},
+    lambda arrays: arrays | {"first_mm": arrays["first_mm"][:0]}, lambda arrays: arrays | {"first_mm": arrays["first_mm"] * 9},
+    lambda arrays: arrays | {"delta_mm": arrays["delta_mm"][..., :2]}, lambda arrays: {"delta_mm": arrays["delta_mm"]},
+    lambda arrays: arrays | {"delta_mm": arrays["delta_mm"] * 0.5}, lambda arrays: arrays | {"clips": "{"},
+    lambda arrays: arrays | {"clips": "[1]"}, lambda arrays: arrays | {"clips": "[" * 9999},
+])
+def test_a_damaged_compact_archive_is_refused_in_one_sentence(tmp_path, damage):
+    arrays = _compact([{"clip": "walk", "licence": "CC0", "split": "train"}, {"clip": "stand"}])
+    np.savez(tmp_path / "a.npz", **arrays)
+    clips = list(read_clips(tmp_path))
+    assert [(c.name, c.category, c.licence, c.split) for c in clips] == [
+        ("walk", "locomotion", "CC0", "train"), ("stand", "standing", UNSTATED, ""),
+    ]
+    assert np.abs(clips[0].joints - REST).max() < 0.001
+    np.savez(tmp_path / "a.npz", **damage(arrays))
+    with pytest.raises(InputError) as error:
+        list(read_clips(tmp_path))
+    _one_sentence(error)
+
+
+def _compact(infos: list[dict[str, str]]) -> dict[str, np.ndarray]:
+    millimetres = np.round(REST * 1000).astype(np.int32)
+    return {
+        "clips": np.array(json.dumps(infos)), "first_mm": np.repeat(millimetres[None], len(infos), axis=0),
+        "delta_mm": np.zeros((9 * len(infos), 22, 3), np.int16), "frames": np.full(len(infos), 10),
+    }
+
+
+def test_what_cannot_be_used_is_named_and_the_rest_is_read(tmp_path):
+    angles, way = walk(12, "y")
+    write_bvh(tmp_path / "good.bvh", angles, way)
+    text = (tmp_path / "good.bvh").read_text(encoding="utf-8")
+    bad = {
+        "cut.bvh": text[:-200].encode(), "empty.bvh": b"", "gone.npz": b"PK", "alone.amc": b"1\nroot 0 0 0 0 0 0\n",
+        "other.bvh": text.replace("Hips", "Becken").encode(),
+    }
+    for name, content in bad.items():
+        (tmp_path / name).write_bytes(content)
+    (tmp_path / "link.bvh").symlink_to(tmp_path / "nowhere.bvh")
+    (tmp_path / "folder.bvh").mkdir()
+    np.savez(tmp_path / "half.npz", poses=np.zeros((4, 156)))
+    np.savez(tmp_path / "tall.npz", **_compact([{"clip": "a"}]) | {"first_mm": np.round(REST[None] * 9000).astype(np.int32)})
+    np.savez(tmp_path / "fine.npz", **_compact([{"clip": "a"}]))
+    (tmp_path / "__MACOSX").mkdir()
+    for hidden in ("__MACOSX/._good.bvh", "._good.bvh", ".DS_Store.npz", "._s.asf"):
+        (tmp_path / hidden).write_bytes(b"\0\5\x16\7")
+
+    left_out: list[str] = []
+    assert sorted(clip.name for clip in read_clips(tmp_path, left_out)) == ["a", "good"]
+    named = {name: [said for said in left_out if f"{name}'" in said] for name in (*bad, "link.bvh", "half.npz", "tall.npz")}
+    assert all(len(said) == 1 for said in named.values()) and len(left_out) == len(named), left_out
+    assert all(said.endswith(".") and "\n" not in said for said in left_out)
+    for name in ("good.bvh", "fine.npz"):
+        (tmp_path / name).unlink()
+    with pytest.raises(InputError, match=r"None of the motion files .* can be used; of the first: .*'"):
+        list(read_clips(tmp_path, []))
+
+
+def test_a_broken_skeleton_does_not_keep_others_from_theirs(tmp_path):
+    write_asf(tmp_path / "s.asf")
+    angles, way = walk(5, "y")
+    write_amc(tmp_path / "s_a.amc", angles, way)
+    (tmp_path / "broken.asf").write_text(":units\n length 0\n", encoding="utf-8")
+    assert len(list(read_clips(tmp_path))) == 1
+    (tmp_path / "s.asf").unlink()
+    with pytest.raises(InputError, match=r"broken\.asf"):
+        list(read_clips(tmp_path))
+
+
+def test_a_bone_of_acclaim_that_is_missing_in_a_frame_is_seen(tmp_path):
+    """As many lines as there should be, but not where: the motion would be out of step."""
+    write_asf(tmp_path / "s.asf")
+    angles, way = walk(5, "y")
+    write_amc(tmp_path / "s_a.amc", angles, way)
+    lines = (tmp_path / "s_a.amc").read_text(encoding="utf-8").splitlines()
+    first, second, *_ = (i for i, line in enumerate(lines) if line.startswith("ltibia"))
+    lines.insert(first, lines.pop(second))
+    (tmp_path / "s_a.amc").write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(InputError, match="does not give the bone 'ltibia' 3 numbers in each"):
+        list(read_clips(tmp_path))
+
+
+def test_a_bvh_of_two_skeletons_is_refused(tmp_path):
+    angles, way = walk(3, "y")
+    write_bvh(tmp_path / "a.bvh", angles, way)
+    text = (tmp_path / "a.bvh").read_text(encoding="utf-8")
+    (tmp_path / "a.bvh").write_text(text.replace("MOTION", "ROOT Prop\n{\nOFFSET 0 0 0\n}\nMOTION"), encoding="utf-8")
+    with pytest.raises(InputError, match="several skeletons"):
+        list(read_clips(tmp_path))
+
+
+@pytest.mark.parametrize(("name", "table"), [
+    ("clips.csv", "\ufefffile,licence,subject\nwalk[1].bvh,CC0,anna\n"),
+    ("clips.csv", "\ufefffile;licence;subject\r\nwalk[1].bvh;CC0;anna\r\n;;\r\n"),
+    ("clips.csv", "File, Licence , subject\nwalk[1].bvh , CC0,anna\n"),
+    ("clips.csv", "file\tlicence\tsubject\nwalk?1?.*\tCC0\tanna\n"),
+    ("clips.json", '\ufeff{"walk[1].bvh": {"licence": "CC0", "subject": "anna"}}'),
+])
+def test_a_licence_reaches_its_clip_however_it_is_written(tmp_path, name, table):
+    """Byte order marks and semicolons as Excel writes them; names as browsers number downloads."""
+    angles, way = walk(3, "y")
+    write_bvh(tmp_path / "walk[1].bvh", angles, way)
+    write_bvh(tmp_path / "walk1.bvh", angles, way)
+    (tmp_path / name).write_text(table, encoding="utf-8", newline="")
+    left_out: list[str] = []
+    licences = {clip.name: (clip.licence, clip.split) for clip in read_clips(tmp_path, left_out)}
+    assert licences == {"walk[1]": ("CC0", "train"), "walk1": (UNSTATED, "")} and not left_out
+
+
+def test_a_folders_name_and_accents_do_not_lose_a_licence(tmp_path):
+    angles, way = walk(3, "y")
+    for folder, name in ("take [2]", "geh.bvh"), ("s1", "Ru\u0308cken.bvh"):  # decomposed, as a Mac names files
+        (tmp_path / folder).mkdir()
+        write_bvh(tmp_path / folder / name, angles, way)
+    stated = {"take [2]/*": {"licence": "CC0"}, "s1\\R\u00fccken.bvh": {"licence": "MIT"}, "s3/*": {"licence": "CC BY"}}
+    (tmp_path / "clips.json").write_text(json.dumps(stated), encoding="utf-8")
+    left_out: list[str] = []
+    assert [clip.licence for clip in read_clips(tmp_path, left_out)] == ["MIT", "CC0"]
+    assert len(left_out) == 1 and "states 's3/*', which no motion file is called" in left_out[0]
+
+
+@pytest.mark.parametrize("content", [
+    b"file,licence\n\xe9.bvh,CC0\n", b"licence\nCC0\n", b"file,licence\n,CC0\n", b"a\0b", b"\xff\xfe",
+    b"file\n" + b"a" * 200_000,
+])
+def test_a_table_that_cannot_be_understood_is_refused(tmp_path, content):
+    angles, way = walk(3, "y")
+    write_bvh(tmp_path / "a.bvh", angles, way)
+    (tmp_path / "clips.csv").write_bytes(content)
+    with pytest.raises(InputError, match="does not list clips by file name") as error:
+        list(read_clips(tmp_path, []))
+    _one_sentence(error)
+
+
 @pytest.mark.parametrize("damage", [
     lambda text: text[: len(text) // 3], lambda text: text[: -200], lambda text: text.replace("HIERARCHY", "HI", 1),
     lambda text: text.replace("Xrotation", "Wrotation", 1), lambda text: text.replace("Frames: 12", "Frames: 0"),
@@ -327,8 +476,8 @@ def _one_sentence(error: pytest.ExceptionInfo[InputError]) -> None:
     lambda text: text.replace("}", "", 1), lambda text: text.replace("OFFSET", "OFFSETS", 1),
 ])
 def test_a_damaged_bvh_is_refused_in_one_sentence(tmp_path, damage):
-    angles, way = _walk(12, "y")
-    _bvh(tmp_path / "a.bvh", angles, way)
+    angles, way = walk(12, "y")
+    write_bvh(tmp_path / "a.bvh", angles, way)
     (tmp_path / "a.bvh").write_text(damage((tmp_path / "a.bvh").read_text(encoding="utf-8")), encoding="utf-8")
     with pytest.raises(InputError) as error:
         list(read_clips(tmp_path))
@@ -343,9 +492,9 @@ def test_a_damaged_bvh_is_refused_in_one_sentence(tmp_path, damage):
     ("s_a.amc", lambda text: ":DEGREES\n"), ("s_a.amc", lambda text: text.replace("root", "root x", 1)),
 ])
 def test_damaged_acclaim_files_are_refused_in_one_sentence(tmp_path, file, damage):
-    _asf(tmp_path / "s.asf")
-    angles, way = _walk(5, "y")
-    _amc(tmp_path / "s_a.amc", angles, way)
+    write_asf(tmp_path / "s.asf")
+    angles, way = walk(5, "y")
+    write_amc(tmp_path / "s_a.amc", angles, way)
     (tmp_path / file).write_text(damage((tmp_path / file).read_text(encoding="utf-8")), encoding="utf-8")
     with pytest.raises(InputError) as error:
         list(read_clips(tmp_path))
@@ -372,23 +521,23 @@ def test_damaged_archives_are_refused_in_one_sentence(tmp_path):
 
 def test_an_unknown_skeleton_names_what_it_lacks(tmp_path):
     names = MIXAMO | {"left_foot": "Zehe", "right_wrist": "Pfote"}
-    angles, way = _walk(3, "y")
-    _bvh(tmp_path / "a.bvh", angles, way, names=names)
+    angles, way = walk(3, "y")
+    write_bvh(tmp_path / "a.bvh", angles, way, names=names)
     with pytest.raises(InputError, match=r"'mixamo' it lacks lefttoebase, righthand \(for left_foot, right_wrist\)") as error:
         list(read_clips(tmp_path))
     _one_sentence(error)
 
 
 def test_a_prefix_and_case_do_not_hide_a_skeleton(tmp_path):
-    angles, way = _walk(3, "y")
-    _bvh(tmp_path / "a.bvh", angles, way, names={ours: f"mixamorig:{name.upper()}" for ours, name in MIXAMO.items()})
+    angles, way = walk(3, "y")
+    write_bvh(tmp_path / "a.bvh", angles, way, names={ours: f"mixamorig:{name.upper()}" for ours, name in MIXAMO.items()})
     assert len(list(read_clips(tmp_path))) == 1
 
 
 def test_names_alone_do_not_make_a_skeleton(tmp_path):
-    angles, way = _walk(3, "y")
+    angles, way = walk(3, "y")
     swapped = MIXAMO | {"left_knee": "LeftFoot", "left_ankle": "LeftLeg"}
-    _bvh(tmp_path / "a.bvh", angles, way, names=swapped)
+    write_bvh(tmp_path / "a.bvh", angles, way, names=swapped)
     with pytest.raises(InputError, match="does not hang from"):
         list(read_clips(tmp_path))
     recording = Recording(tuple(MIXAMO.values()), PARENTS, np.repeat(REST[None], 2, axis=0), REST, 30.0)
@@ -434,9 +583,9 @@ def test_bad_frames_are_cut_for_their_reasons():
 
 
 def test_the_summary_counts_minutes_clips_and_cuts(tmp_path):
-    angles, way = _walk(90, "y")
-    _bvh(tmp_path / "walk_1.bvh", angles, way)
-    _bvh(tmp_path / "walk_2.bvh", angles, way)
+    angles, way = walk(90, "y")
+    write_bvh(tmp_path / "walk_1.bvh", angles, way)
+    write_bvh(tmp_path / "walk_2.bvh", angles, way)
     text = summary(read_clips(tmp_path))
     assert "2 clips" in text and "locomotion" in text and "0.1" in text and "2 clips are not trained on" in text
     assert "T-pose" in text, "the rest skeleton is a T-pose, swung a little"

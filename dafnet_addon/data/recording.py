@@ -1,12 +1,29 @@
 """A captured skeleton as its file has it: joints by name, in the file's own units and axes; and how bones pose it."""
 
+import re
+from array import array
+from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from ..core.errors import InputError
 from ..core.rotations import rotate
 
-__all__ = ["Recording", "rotation_about", "posed"]
+__all__ = [
+    "MOST_JOINTS", "Recording", "check_size", "numbers_in", "posed", "posed_in_blocks", "printable", "rotation_about", "sound",
+    "text_of",
+]
+
+MOST_JOINTS = 4096
+"""Of a skeleton that is read: faces, fingers and cloth have hundreds."""
+
+_LARGEST = 1e9  # of a number in a file; no way in millimetres is as long
+_SPARE = 50_000_000  # bytes of positions that a file may have beyond twice what its numbers take
+_BLOCK = 200_000  # joints posed at once, all frames of a block together
+_CHUNK = 1 << 20  # characters
 
 
 @dataclass(frozen=True)
@@ -25,6 +42,58 @@ class Recording:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+
+def text_of(file: Path) -> str:
+    """A text file as editors and exporters leave it, with or without a byte order mark; what is not ASCII stands for itself.
+
+    Raises InputError where the file cannot be opened.
+    """
+    try:
+        data = file.read_bytes()
+    except OSError as error:
+        raise InputError(f"The file '{file}' cannot be opened ({error.strerror}); look at its permissions.") from None
+    if data[:2] in (BOM_UTF16_LE, BOM_UTF16_BE):
+        return data.decode("utf-16", errors="replace")
+    return data.removeprefix(BOM_UTF8).decode("latin-1")
+
+
+def printable(name: str) -> str:
+    """A joint's name as it may stand in a sentence."""
+    return "".join(c for c in name if c.isprintable())[:80]
+
+
+def numbers_in(text: str) -> np.ndarray:
+    """The numbers (N,) of a text, separated by spaces; a comma is a decimal point where there is no other.
+
+    Raises ValueError where something else is among them.
+    """
+    if "," in text:
+        text = text.replace(",", " " if "." in text else ".")
+    out, at = array("d"), 0
+    while at < len(text):
+        # In pieces, since a word takes eight times the memory that it takes in the file.
+        gap = re.compile(r"\s").search(text, at + _CHUNK)
+        end = gap.start() if gap else len(text)
+        out.extend(map(float, text[at:end].split()))
+        at = end
+    return np.array(out)
+
+
+def sound(numbers: np.ndarray) -> bool:
+    """Whether all are numbers that a motion may hold."""
+    if numbers.dtype.kind not in "fiu":
+        return False
+    return not numbers.size or bool(numbers.min() >= -_LARGEST and numbers.max() <= _LARGEST)
+
+
+def check_size(file: Path, frames: int, joints: int, numbers: int) -> None:
+    """Raises InputError where so many joints and frames would take far more memory than the numbers that move them."""
+    if joints > MOST_JOINTS or frames * joints * 24 > _SPARE + 16 * numbers:
+        raise InputError(
+            f"The file '{file}' has a skeleton of {joints} joints in {frames} frames, but only {numbers} numbers that move it, "
+            "which is no body's; export the body's skeleton alone."
+        )
 
 
 def rotation_about(axis: str, angle: np.ndarray) -> np.ndarray:
@@ -51,3 +120,15 @@ def posed(parents: tuple[int, ...], offsets: np.ndarray, local: np.ndarray) -> n
         positions[:, j] = positions[:, parent] + rotate(turned[:, parent], offsets[:, j])
         turned[:, j] = turned[:, parent] @ local[:, j]
     return positions
+
+
+def posed_in_blocks(
+    parents: tuple[int, ...], frames: int, pose: Callable[[slice], tuple[np.ndarray, np.ndarray]]
+) -> np.ndarray:
+    """``posed`` for many frames: ``pose`` gives offsets and rotations of some, which take six times what positions do."""
+    out = np.empty((frames, len(parents), 3))
+    step = max(1, _BLOCK // len(parents))
+    for start in range(0, frames, step):
+        rows = slice(start, start + step)
+        out[rows] = posed(parents, *pose(rows))
+    return out

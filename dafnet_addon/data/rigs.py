@@ -2,7 +2,7 @@
 
 A map says for each of our 22 joints the source's joint, or several with weights that sum to one where ours lies between
 them. ``known_by`` lists further names that tell the convention from others. Names are compared without case, spaces,
-underscores and a prefix that ends in a colon.
+underscores, a prefix that ends in a colon, and one that the pelvis has before its name, as in ``mixamorig1_Hips``.
 """
 
 import json
@@ -18,6 +18,9 @@ from ..core.skeleton import JOINTS, PARENTS, joint
 from .recording import Recording
 
 __all__ = ["Rig", "rigs", "rig_of", "mapped"]
+
+
+_PREFIXES = 8  # tried at most
 
 
 @dataclass(frozen=True)
@@ -53,17 +56,31 @@ def rigs() -> tuple[Rig, ...]:
     return tuple(sorted(found, key=lambda rig: (-len(rig.needs), rig.name)))
 
 
-def rig_of(recording: Recording, file: Path) -> Rig:
-    """The convention of a recording's skeleton. Raises InputError, naming the joints that are missing, where there is none."""
-    names = {_plain(name) for name in recording.names}
-    # The root has no name of its own in an .asf file.
-    names |= {"hips"} if names >= {"root"} else set()
-    for rig in rigs():
-        if rig.needs <= names:
-            return rig
-    nearest = min(rigs(), key=lambda rig: len(rig.needs - names) / len(rig.needs))
-    lacking = [ours for ours, theirs in nearest.joints.items() if not theirs.keys() <= names]
-    wanted = sorted({n for ours in lacking for n in nearest.joints[ours]} - names) or sorted(nearest.known_by - names)
+def _called(names: tuple[str, ...], rig: Rig) -> dict[str, int]:
+    """Joints by the names that a convention may know them by: without the prefix that leaves it the most."""
+    plain = {_plain(name): i for i, name in reversed(list(enumerate(names)))}
+    if "root" in plain:
+        plain.setdefault("hips", 0)  # the root has no name of its own in an .asf file
+    pelvis = max(rig.joints["pelvis"], key=lambda name: rig.joints["pelvis"][name])
+    prefixes = {"", *(name.removesuffix(pelvis) for name in plain if name.endswith(pelvis))}
+    likely = sorted(prefixes, key=lambda prefix: (len(prefix), prefix))[:_PREFIXES]
+    called = [{name.removeprefix(prefix): i for name, i in plain.items()} for prefix in likely]
+    return max(called, key=lambda own: len(rig.needs & own.keys()))
+
+
+def rig_of(recording: Recording, file: Path) -> tuple[Rig, dict[str, int]]:
+    """The convention of a recording's skeleton, and its joints by the names that it knows them by.
+
+    Raises InputError, naming the joints that are missing, where there is none.
+    """
+    found = [(rig, _called(recording.names, rig)) for rig in rigs()]
+    for rig, index in found:
+        if rig.needs <= index.keys():
+            return rig, index
+    nearest, index = min(found, key=lambda pair: len(pair[0].needs - pair[1].keys()) / len(pair[0].needs))
+    lacking = [ours for ours, theirs in nearest.joints.items() if not theirs.keys() <= index.keys()]
+    wanted = sorted({n for ours in lacking for n in nearest.joints[ours]} - index.keys())
+    wanted = wanted or sorted(nearest.known_by - index.keys())
     raise InputError(
         f"The skeleton of '{file}' is of no known convention: to be read as '{nearest.name}' it lacks {', '.join(wanted)} (for "
         f"{', '.join(lacking) or 'telling it apart'}); rename its joints, or add a map to dafnet_addon/data/rigs."
@@ -116,9 +133,7 @@ def mapped(recording: Recording, file: Path) -> tuple[np.ndarray, np.ndarray]:
 
     Raises InputError where its skeleton is of no known convention, or is not a body's.
     """
-    rig = rig_of(recording, file)
-    index = {_plain(name): i for i, name in reversed(list(enumerate(recording.names)))}
-    index.setdefault("hips", 0)
+    rig, index = rig_of(recording, file)
     weights = np.zeros((len(JOINTS), len(recording.names)))
     for ours, theirs in rig.joints.items():
         for name, weight in theirs.items():
