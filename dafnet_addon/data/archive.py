@@ -4,11 +4,11 @@ import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from math import prod
 from pathlib import Path
 from tokenize import TokenError
-from typing import IO
-from zipfile import ZIP_DEFLATED, ZIP_STORED, BadZipFile, ZipFile, ZipInfo
+from zipfile import ZIP_DEFLATED, ZIP_STORED, BadZipFile, ZipFile
 
 import numpy as np
 
@@ -19,7 +19,7 @@ __all__ = ["names_in", "read_arrays"]
 _SPARE, _PACKED = 100_000_000, 20
 """An archive may unpack to so many bytes, and to so many times its own size; motion is packed to a half or a third."""
 
-_KINDS = {"f": "numbers", "i": "numbers", "u": "numbers", "U": "text"}
+_KINDS = "fiuU"  # numbers and text
 _DAMAGE = (
     BadZipFile, EOFError, KeyError, NotImplementedError, OSError, OverflowError, RuntimeError, SyntaxError, TokenError,
     TypeError, ValueError, struct.error, zlib.error,
@@ -37,29 +37,23 @@ def _opened(file: Path) -> Iterator[ZipFile]:
         raise InputError(f"The archive '{file}' cannot be read ({reason}); get it again from where it came.") from None
 
 
-def _header(member: IO[bytes]) -> tuple[tuple[int, ...], np.dtype]:
-    """Shape and type that an array announces; ``member`` is left where its numbers begin. Raises ValueError."""
+def _array(name: str, data: bytes) -> np.ndarray:
+    """The array in a member of an archive, without a copy. Raises ValueError where it is not just what its header announces."""
+    member = BytesIO(data)
     version = np.lib.format.read_magic(member)
     if version == (1, 0):
-        shape, _, dtype = np.lib.format.read_array_header_1_0(member)
+        shape, by_columns, dtype = np.lib.format.read_array_header_1_0(member)
     elif version == (2, 0):
-        shape, _, dtype = np.lib.format.read_array_header_2_0(member)
+        shape, by_columns, dtype = np.lib.format.read_array_header_2_0(member)
     else:
-        raise ValueError(f"version {version} of an array")
-    return shape, dtype
-
-
-def _check(archive: ZipFile, info: ZipInfo) -> None:
-    """Raises ValueError where an array is not just what its header announces."""
-    if info.compress_type not in (ZIP_STORED, ZIP_DEFLATED):
-        raise ValueError(f"'{info.filename}' is packed as no .npz is")
-    with archive.open(info) as member:
-        shape, dtype = _header(member)
-        held = info.file_size - member.tell()
+        raise ValueError(f"'{name}' is an array of version {version}")
+    held = len(data) - member.tell()
     if dtype.kind not in _KINDS or min(shape, default=0) < 0:
-        raise ValueError(f"'{info.filename}' holds neither numbers nor text")
+        raise ValueError(f"'{name}' holds neither numbers nor text")
     if prod(shape) * max(dtype.itemsize, 1) != held:
-        raise ValueError(f"'{info.filename}' announces {'×'.join(map(str, shape))} entries, but holds {held} bytes")
+        raise ValueError(f"'{name}' announces {'×'.join(map(str, shape))} entries, but holds {held} bytes")
+    flat = np.frombuffer(data, dtype, offset=member.tell()) if held else np.zeros(0, dtype)
+    return flat.reshape(shape, order="F" if by_columns else "C")
 
 
 def names_in(file: Path) -> list[str]:
@@ -78,10 +72,6 @@ def read_arrays(file: Path, *names: str) -> list[np.ndarray]:
         unpacked = sum(info.file_size for info in infos)
         if unpacked > _SPARE + _PACKED * file.stat().st_size:
             raise ValueError(f"it would unpack to {unpacked / 1e6:.0f} MB, which no motion of its size does")
-        for info in infos:
-            _check(archive, info)
-        arrays = []
-        for info in infos:
-            with archive.open(info) as member:
-                arrays.append(np.lib.format.read_array(member, allow_pickle=False))
-        return arrays
+        if any(info.compress_type not in (ZIP_STORED, ZIP_DEFLATED) for info in infos):
+            raise ValueError("it is packed as no .npz is")
+        return [_array(info.filename, archive.read(info)) for info in infos]
