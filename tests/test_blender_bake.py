@@ -1,6 +1,7 @@
 """Character and baker: what plays in Blender is the take, at any frame rate, and nothing that was there is lost."""
 
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -161,6 +162,89 @@ def test_every_take_is_kept_and_mode_keys_stay(blender, addon) -> None:
     assert [tuple(point.co) for point in mode.keyframe_points] == [(1.0, 0.0), (20.0, 1.0)]
     compat.assign_action(ann, first)
     assert np.abs(bone_heads(blender, addon, ann, 5) - made_take(addon, seed=1).joints[4]).max() < 1e-3
+
+
+def test_all_other_curves_play_on_as_they_did(blender, addon) -> None:
+    """Muted ones, modifiers, extrapolation, handles, groups, samples, custom properties and bones that are no joints."""
+    compat = addon("dafnet_addon.blender.compat")
+    ann = character(blender, addon)
+    own = ann.dafnet
+    blender.ops.object.mode_set(mode="EDIT")
+    tail = ann.data.edit_bones.new("tail")
+    tail.tail = (0, 0.3, 0)
+    blender.ops.object.mode_set(mode="OBJECT")
+    ann["sparkle"] = ann["shine"] = 0.0
+    for path, keys in {
+        "mode": ((1, "FREE"), (20, "EE")), "head_influence": ((1, 0.0), (6, 1.0), (11, 0.0)),
+        "hand_left_influence": ((1, 0.2), (30, 0.8)), "hand_right_influence": ((1, 0.9), (9, 0.1)),
+    }.items():
+        for frame, value in keys:
+            setattr(own, path, value)
+            ann.keyframe_insert(f"dafnet.{path}", frame=frame, group="Asked For")
+    for owner, path in ((ann, '["sparkle"]'), (ann, '["shine"]'), (ann.pose.bones["tail"], "location"), (ann, "hide_render")):
+        for frame in (1, 12, 25):
+            owner.keyframe_insert(path, frame=frame, group="pelvis")
+
+    curves = {(c.data_path, c.array_index): c for c in compat.action_curves(ann)}
+    curves["dafnet.mode", 0].mute = True
+    curves["dafnet.head_influence", 0].modifiers.new("CYCLES").mode_after = "REPEAT_OFFSET"
+    noise = curves["dafnet.head_influence", 0].modifiers.new("NOISE")
+    noise.strength, noise.use_restricted_range, noise.frame_start, noise.frame_end = 0.3, True, 5, 60
+    envelope = curves["dafnet.hand_left_influence", 0].modifiers.new("ENVELOPE")
+    for frame, low in ((1.0, -0.2), (30.0, -2.0)):
+        envelope.control_points.add(frame).min = low
+    right = curves["dafnet.hand_right_influence", 0]
+    right.extrapolation = "LINEAR"
+    first, last = right.keyframe_points
+    first.handle_right_type, first.handle_right = "FREE", (4.0, 1.4)
+    last.interpolation, last.easing, last.amplitude, last.period = "ELASTIC", "EASE_IN", 0.7, 3.0
+    generator = curves['["sparkle"]', 0].modifiers.new("GENERATOR")
+    generator.poly_order, generator.use_additive = 3, True
+    generator.coefficients = (0.1, -0.2, 0.03, 0.001)
+    stepped = curves['["sparkle"]', 0].modifiers.new("STEPPED")
+    stepped.frame_step = 4
+    limits = curves['["sparkle"]', 0].modifiers.new("LIMITS")
+    limits.use_max_y, limits.max_y = True, 30.0
+    curves['["shine"]', 0].keyframe_points[1].co.y = 5.0
+    curves['["shine"]', 0].convert_to_samples(1, 25)
+    curves['pose.bones["tail"].location', 2].lock = True
+    curves["dafnet.mode", 0].group.color_set = "THEME04"
+    blender.context.view_layer.update()
+
+    def scene_says() -> list[tuple[Any, ...]]:
+        said = []
+        for frame in range(-5, 70, 5):
+            blender.context.scene.frame_set(frame)
+            influences = own.head_influence, own.hand_left_influence, own.hand_right_influence
+            said.append((own.mode, *influences, ann["sparkle"], ann["shine"]))
+        return said
+
+    times = np.arange(-20.0, 120.0, 0.5)
+    played = {place: [curve.evaluate(time) for time in times] for place, curve in curves.items()}
+    said = scene_says()
+    addon("dafnet_addon.blender.baker").bake(made_take(addon), ann, 1, "Take")
+    assert scene_says() == said, "the properties that the curves move"
+    found = {(c.data_path, c.array_index): c for c in compat.action_curves(ann)}
+    for place, values in played.items():
+        assert np.abs(np.array([found[place].evaluate(time) for time in times]) - values).max() < 1e-5, place
+    assert found["dafnet.mode", 0].mute and found['pose.bones["tail"].location', 2].lock
+    group = found["dafnet.mode", 0].group
+    assert group.name == "Asked For" and group.color_set == "THEME04" and not found["location", 0].mute
+    assert [m.type for m in found['["sparkle"]', 0].modifiers] == ["GENERATOR", "STEPPED", "LIMITS"]
+
+
+def test_a_muted_group_mutes_what_is_carried_and_not_the_take(blender, addon) -> None:
+    compat = addon("dafnet_addon.blender.compat")
+    ann = character(blender, addon)
+    ann.keyframe_insert("dafnet.mode", frame=1, group="pelvis")
+    ann.keyframe_insert("dafnet.head_influence", frame=1, group="Own")
+    curves = {c.data_path: c for c in compat.action_curves(ann)}
+    curves["dafnet.mode"].group.mute = curves["dafnet.head_influence"].group.mute = True
+    take = made_take(addon)
+    addon("dafnet_addon.blender.baker").bake(take, ann, 1, "Take")
+    curves = {c.data_path: c for c in compat.action_curves(ann)}
+    assert curves["dafnet.mode"].mute and curves["dafnet.head_influence"].group.mute
+    assert np.abs(bone_heads(blender, addon, ann, 5) - take.joints[4]).max() < 1e-3
 
 
 def test_what_cannot_be_baked_is_refused_and_left_alone(blender, addon, tmp_path) -> None:

@@ -107,6 +107,203 @@ def test_what_cannot_be_walked_to_changes_nothing(room: Room) -> None:
     refused("has no root")
 
 
+def keyed(room: Room, frames: tuple[int, ...] = (1, 6)) -> list:
+    """Two keys of the root at its place; its curves."""
+    for frame in frames:
+        for path in ("location", "rotation_euler"):
+            room.root.keyframe_insert(path, frame=frame, group="Way")
+    return room.addon("dafnet_addon.blender.compat").action_curves(room.root)
+
+
+def locked(room: Room) -> None:
+    keyed(room)[0].lock = True
+
+
+def in_a_locked_group(room: Room) -> None:
+    keyed(room)[0].group.lock = True
+
+
+def muted(room: Room) -> None:
+    keyed(room)[5].mute = True
+
+
+def in_a_muted_group(room: Room) -> None:
+    keyed(room)[0].group.mute = True
+
+
+def repeated(room: Room) -> None:
+    keyed(room)[1].modifiers.new("CYCLES")
+
+
+def sampled(room: Room) -> None:
+    keyed(room)[0].convert_to_samples(1, 10)
+
+
+def linked(room: Room) -> None:
+    keyed(room)
+    data, bpy = room.root.animation_data, room.bpy
+    name, slots = data.action.name, hasattr(data, "action_slot")
+    file = str(room.folder / "way.blend")
+    bpy.data.libraries.write(file, {data.action})
+    with bpy.data.libraries.load(file, link=True) as (_, wanted):
+        wanted.actions = [name]
+    data.action = wanted.actions[0]
+    if slots:
+        data.action_slot = data.action.slots[0]
+
+
+def shared(room: Room) -> None:
+    keyed(room)
+    other = room.bpy.data.objects.new("Other", None)
+    room.scene.collection.objects.link(other)
+    mine, theirs = room.root.animation_data, other.animation_data_create()
+    theirs.action = mine.action
+    if hasattr(mine, "action_slot"):
+        theirs.action_slot = mine.action_slot
+
+
+def added_up(room: Room) -> None:
+    keyed(room)
+    room.root.animation_data.action_blend_type = "ADD"
+
+
+def half(room: Room) -> None:
+    keyed(room)
+    room.root.animation_data.action_influence = 0.5
+
+
+def in_tweak_mode(room: Room) -> None:
+    keyed(room)
+    data = room.root.animation_data
+    data.nla_tracks.new().strips.new("Way", 1, data.action)
+    data.action = None
+    data.nla_tracks[0].select = data.nla_tracks[0].strips[0].select = True
+    data.nla_tracks.active = data.nla_tracks[0]
+    data.use_tweak_mode = True
+
+
+def under_a_solo_track(room: Room) -> None:
+    keyed(room)
+    data = room.root.animation_data
+    data.nla_tracks.new().strips.new("Way", 1, data.action)
+    data.nla_tracks[0].is_solo = True
+
+
+def with_delta_location(room: Room) -> None:
+    room.root.delta_location.x = 1.0
+
+
+def with_delta_rotation(room: Room) -> None:
+    room.root.delta_rotation_euler.z = 1.0
+
+
+def with_delta_scale(room: Room) -> None:
+    room.root.delta_scale.y = -1.0
+
+
+def with_keyed_delta(room: Room) -> None:
+    room.root.keyframe_insert("delta_location", frame=1)
+    room.root.delta_location.x = 1.0
+    room.root.keyframe_insert("delta_location", frame=30)
+    room.root.delta_location.x = 0.0
+
+
+def driven(room: Room) -> None:
+    room.root.driver_add("location", 1).driver.expression = "frame"
+
+
+def pushed(room: Room) -> None:
+    """A rigid body moves it, which no look at its keys tells."""
+    ball = room.box("Ball", (0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
+    room.scene.collection.objects.link(ball)
+    room.furniture.objects.unlink(ball)
+    room.bpy.ops.rigidbody.world_add()
+    room.select(ball)
+    room.bpy.ops.rigidbody.object_add()
+    room.ann.dafnet.root = room.root = ball
+    room.bpy.context.view_layer.update()
+
+
+def animation(owner) -> tuple:
+    """All that is keyed of an object, and where it is."""
+    data = owner.animation_data
+    curves = () if data is None or data.action is None else tuple(
+        (c.data_path, c.array_index, c.mute, c.lock, [tuple(p.co) + tuple(p.handle_right) for p in c.keyframe_points])
+        for c in all_curves(data.action)
+    )
+    place = (*owner.location, *owner.rotation_euler)
+    named = (data.action and data.action.name, len(data.nla_tracks)) if data else None
+    return curves, place, named
+
+
+def all_curves(action) -> list:
+    if hasattr(action, "layers"):
+        return [c for layer in action.layers for strip in layer.strips for bag in strip.channelbags for c in bag.fcurves]
+    return list(action.fcurves)
+
+
+@pytest.mark.parametrize("way, words", [
+    (locked, "locked curves"), (in_a_locked_group, "locked curves"), (muted, "muted curves"),
+    (in_a_muted_group, "muted curves"),
+    (repeated, "modifiers on curves"), (sampled, "samples"), (linked, "linked action"), (shared, "in common with 'Other'"),
+    (added_up, "blending to Replace"), (half, "blending to Replace"), (in_tweak_mode, "tweak"), (under_a_solo_track, "solo"),
+    (with_delta_location, "delta"), (with_delta_rotation, "delta"), (with_delta_scale, "delta"), (with_keyed_delta, "delta"),
+    (driven, "drivers"), (pushed, "Something else than its keys moves the root 'Ball'"),
+])
+@pytest.mark.parametrize("button", ["SEAT", "CURVE"])
+def test_a_root_that_cannot_be_keyed_is_said_and_left_alone(room: Room, way, words: str, button: str, tmp_path) -> None:
+    room.folder = tmp_path
+    way(room)
+    if button == "CURVE":
+        data = room.bpy.data.curves.new("Path", "CURVE")
+        data.dimensions = "3D"
+        data.splines.new("POLY").points.add(1)
+        data.splines[0].points[0].co, data.splines[0].points[1].co = (0.0, 0.0, 0.0, 1.0), (-2.0, 0.0, 0.0, 1.0)
+        curve = room.bpy.data.objects.new("Path", data)
+        room.scene.collection.objects.link(curve)
+    room.select(room.chair if button == "SEAT" else curve, room.ann)
+    room.scene.frame_set(1)
+    before, actions = animation(room.root), {action.name for action in room.bpy.data.actions}
+    with pytest.raises(RuntimeError, match=words):
+        if button == "SEAT":
+            room.bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0)
+        else:
+            room.bpy.ops.dafnet.walk_along_curve()
+    assert animation(room.root) == before and {action.name for action in room.bpy.data.actions} == actions
+    assert room.scene.frame_current == 1 and room.scene.frame_end == 40 and room.ann.dafnet.furniture is None
+
+
+def test_what_fails_while_it_is_keyed_leaves_the_root_as_it_was(room: Room, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also its action where that is an NLA strip as well, and a place that has no keys."""
+    keys = room.addon("dafnet_addon.blender.root_keys")
+    keyed(room)
+    data = room.root.animation_data
+    data.action.use_fake_user = True
+    data.nla_tracks.new().strips.new("Way", 1, data.action)
+    data.nla_tracks[0].mute = True
+    room.root.location = (0.25, 0.0, 0.0)
+    before = animation(room.root)
+    with pytest.raises(ZeroDivisionError), keys.unchanged_on_failure(room.root):
+        room.root.location.x = 5.0
+        room.root.keyframe_insert("location", frame=50)
+        room.root.keyframe_insert("scale", frame=50)
+        raise ZeroDivisionError
+    assert animation(room.root) == before and len(room.bpy.data.actions) == 1
+    assert data.nla_tracks[0].strips[0].action == data.action and data.action.use_fake_user
+    room.scene.frame_set(6)
+    assert room.root.location.x == pytest.approx(0.0), "it plays"
+
+
+def test_an_action_whose_slot_is_missing_gets_one(room: Room) -> None:
+    keyed(room)
+    data = room.root.animation_data
+    if hasattr(data, "action_slot"):
+        data.action_slot = None
+    room.select(room.chair, room.ann)
+    assert room.bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
+    assert room.place(room.scene.frame_end)[1] > 3.0
+
+
 def test_the_panel_offers_the_selected_seat(room: Room) -> None:
     sent = room.addon("dafnet_addon.blender.armature").sent
     room.select(room.chair)

@@ -11,6 +11,7 @@ from ..core.skeleton import JOINTS
 from ..core.take import Take
 from .armature import character_scale
 from .compat import action_curves, assign_action, new_action
+from .curves import copy_curve
 from .mannequin import FACING
 
 __all__ = ["TRANSFORMS", "bake", "driven", "key_curves", "laid_over", "require_bakeable"]
@@ -59,7 +60,8 @@ def bake(take: Take, armature: bpy.types.Object, frame_start: int, name: str, un
 
     The object follows the root (location and heading), each bone turns, and the pelvis moves: bone lengths are
     constant, so all 22 bone heads lie on ``take.joints``. ``unit`` is the length of a Blender unit in metres. Earlier
-    actions are kept by a fake user, and keys of the ``dafnet`` settings (the mode) are carried over to the new action.
+    actions are kept by a fake user, and all other curves of the present one (the mode, influences, custom properties, further
+    bones) are carried over to the new action.
 
     ``InputError``: the armature is linked, overridden, parented, constrained, edited, or its size differs from the
     take's; nothing is changed then.
@@ -78,7 +80,7 @@ def bake(take: Take, armature: bpy.types.Object, frame_start: int, name: str, un
     local[:, 0] = to_root @ local[:, 0]
 
     previous = armature.animation_data.action if armature.animation_data else None
-    carried = [curve for curve in action_curves(armature) if curve.data_path.startswith("dafnet.")]
+    carried = [curve for curve in action_curves(armature) if not _is_motion(curve.data_path)]
     action, add_curve = new_action(armature, name)
     action.use_fake_user = True
     key_curves(add_curve, "location", "Root", frames, take.root[:, :3, 3] / unit)
@@ -92,7 +94,7 @@ def bake(take: Take, armature: bpy.types.Object, frame_start: int, name: str, un
             key_curves(add_curve, path + "location", joint_name, frames, (pelvis - rest[:3, 3]) @ rest[:3, :3])
         key_curves(add_curve, path + "rotation_quaternion", joint_name, frames, quaternions)
     for curve in carried:
-        _copy(curve, add_curve(curve.data_path, curve.array_index, "DAFNet"))
+        copy_curve(curve, add_curve)
 
     if previous:
         previous.use_fake_user = True
@@ -119,13 +121,10 @@ def key_curves(
         curve.update()
 
 
-def _copy(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
-    target.extrapolation = source.extrapolation
-    target.keyframe_points.add(len(source.keyframe_points))
-    for old, new in zip(source.keyframe_points, target.keyframe_points, strict=True):
-        new.co, new.interpolation = old.co, old.interpolation
-        new.handle_left, new.handle_right = old.handle_left, old.handle_right
-    target.update()
+def _is_motion(path: str) -> bool:
+    """Whether a data path is what a take moves: the object, and the bones that are joints."""
+    return path.startswith((*TRANSFORMS, "delta_", *_JOINT_PATHS))
 
 
+_JOINT_PATHS = tuple(f'pose.bones["{name}"].{part}' for name in JOINTS for part in TRANSFORMS)
 _LINEAR = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEAR"].value

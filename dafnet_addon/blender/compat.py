@@ -17,7 +17,10 @@ _SLOTS = bpy.app.version >= (4, 4, 0)
 def new_action(
     owner: bpy.types.Object, name: str,
 ) -> tuple[bpy.types.Action, Callable[[str, int, str], bpy.types.FCurve]]:
-    """A new action for ``owner``, not assigned yet, and a function (path, index, group) that adds a curve to it."""
+    """A new action for ``owner``, not assigned yet, and a function (path, index, group) that adds a curve to it.
+
+    An empty ``group`` is none.
+    """
     action = bpy.data.actions.new(name)
     if _SLOTS:
         slot = action.slots.new(id_type="OBJECT", name=owner.name)
@@ -27,7 +30,8 @@ def new_action(
 
     def add(path: str, index: int, group: str) -> bpy.types.FCurve:
         curve = curves.fcurves.new(path, index=index)
-        curve.group = curves.groups.get(group) or curves.groups.new(group)
+        if group:
+            curve.group = curves.groups.get(group) or curves.groups.new(group)
         return curve
 
     return action, add

@@ -14,7 +14,8 @@ from ..core.rotations import rotate, yaw_matrix
 from ..demo import Place
 from .armature import create_character, metres_per_unit
 from .demo_room import FURNITURE, Part, add_piece, key_channels, new_collection
-from .walking import extended_to, write_keys
+from .root_keys import write_keys
+from .walking import extended_to
 
 __all__ = ["EXAMPLES", "Example", "add_example"]
 
@@ -177,7 +178,7 @@ def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
     own = armature.dafnet
     own.furniture = furniture
     placed = Route(RootPath(path.position + np.array(middle) * unit, path.yaw), plan.walked.rests)
-    write_keys(own.root, placed, first, 1.0 / unit, fps)
+    write_keys(own.root, placed, first=first, scale=1.0 / unit, fps=fps)
     _direct(armature, plan, first, np.array(middle), unit)
     extended_to(scene, armature, first + len(path) - 1)
     scene.frame_set(first)

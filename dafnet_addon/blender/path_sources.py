@@ -21,7 +21,8 @@ from .dependencies import Dependencies
 from .furniture import furniture_now
 from .playback import frame_kept, in_order
 from .properties import settings_of
-from .walking import MOVES, Walk, extended_to, keyable_root, last_key, walk, write_keys
+from .root_keys import MOVES, keyable_root, keyed_along, last_key, unchanged_on_failure
+from .walking import Walk, extended_to, walk
 
 __all__ = ["along_curve", "as_moved", "chosen", "floor_points", "is_curve", "may_move", "places_of", "through_points"]
 
@@ -110,6 +111,20 @@ def _directed(context: bpy.types.Context, armature: bpy.types.Object, first: int
 def _written(context: bpy.types.Context, armature: bpy.types.Object, directed: _Directed, walked: Route) -> Walk:
     """Key a route over what the root has from its first frame on; before that it moves as it did."""
     root, first = directed.root, directed.first
+    with unchanged_on_failure(root):
+        kept = _cut(root, first)
+        keyed_along(context, root, walked, first=first, scale=1.0 / directed.unit, fps=directed.fps)
+        for curve in action_curves(root):
+            for frame, value in kept.get((curve.data_path, curve.array_index), []):
+                if abs(curve.evaluate(frame) - value) > 1e-5:
+                    curve.keyframe_points.insert(frame, value).interpolation = "LINEAR"
+            curve.update()
+    last_frame = first + len(walked.path) - 1
+    return Walk(first, last_frame, extended_to(context.scene, armature, last_frame))
+
+
+def _cut(root: bpy.types.Object, first: int) -> dict[tuple[str, int], list[tuple[int, float]]]:
+    """Remove a root's keys from frame ``first`` on; returns by curve the values of the frames after the last key that stays."""
     kept: dict[tuple[str, int], list[tuple[int, float]]] = {}
     for curve in action_curves(root):
         if curve.data_path not in MOVES:
@@ -123,15 +138,7 @@ def _written(context: bpy.types.Context, armature: bpy.types.Object, directed: _
         for k in reversed([k for k, point in enumerate(curve.keyframe_points) if point.co[0] >= first]):
             curve.keyframe_points.remove(curve.keyframe_points[k], fast=True)
         curve.update()
-    write_keys(root, walked, first, 1.0 / directed.unit, directed.fps)
-    for curve in action_curves(root):
-        for frame, value in kept.get((curve.data_path, curve.array_index), []):
-            if abs(curve.evaluate(frame) - value) > 1e-5:
-                curve.keyframe_points.insert(frame, value).interpolation = "LINEAR"
-        curve.update()
-    last_frame = first + len(walked.path) - 1
-    context.scene.frame_set(context.scene.frame_current)  # the keys' last place is not where it is now
-    return Walk(first, last_frame, extended_to(context.scene, armature, last_frame))
+    return kept
 
 
 def _line_of(context: bpy.types.Context, curve: bpy.types.Object) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Keys on a character's root: a walk round the furniture to a seat, or to a place to stand."""
+"""A character's walk round the furniture to a seat, or to a place to stand, as keys on its root."""
 
 from dataclasses import dataclass
 
@@ -12,17 +12,14 @@ from ..core.solids import Mesh, Scene
 from ..director.seats import on_a_seat, seat_of
 from ..director.walks import walk_to
 from .armature import character_scale, metres_per_unit
-from .compat import action_curves
 from .furniture import furniture_now
 from .playback import frame_kept
-from .properties import Settings, find_object, settings_of
+from .properties import settings_of
+from .root_keys import keyable_root, keyed_along, last_key, unchanged_on_failure
 
-__all__ = ["MOVES", "Walk", "extended_to", "keyable_root", "last_key", "walk", "write_keys"]
+__all__ = ["Walk", "extended_to", "walk"]
 
-_KEYS_A_SECOND = 10
 _BEFORE = 0.2  # seconds of rest before the first step
-MOVES = ("location", "rotation_euler")
-"""What is keyed of a root."""
 
 
 @dataclass(frozen=True)
@@ -34,20 +31,6 @@ class Walk:
     extended: bool
 
 
-def keyable_root(settings: Settings) -> bpy.types.Object:
-    """The root, whose keys are to be written: its own place must be its place in the world."""
-    if settings.root is None:
-        raise InputError(f"The character '{settings.armature}' has no root; choose its root object in the DAFNet panel.")
-    root = find_object(settings, settings.root, "root")
-    if root.parent or any(not c.mute for c in root.constraints):
-        raise InputError(f"The root '{root.name}' follows something; clear its parent and constraints to key it.")
-    if root.animation_data and any(driver.data_path in MOVES for driver in root.animation_data.drivers):
-        raise InputError(f"The root '{root.name}' has drivers; remove them to key it.")
-    if root.library or len(root.rotation_mode) != 3 or root.rotation_mode[2] != "Z":
-        raise InputError(f"The root '{root.name}' is linked or not in rotation mode XYZ; make it local and set that mode.")
-    return root
-
-
 def walk(
     context: bpy.types.Context, armature: bpy.types.Object, seat: bpy.types.Object | None, seconds: float = 3.0,
     speed: float = 1.1,
@@ -56,12 +39,13 @@ def walk(
 
     Goes on from the root's last key, else from the current frame, where nothing before is changed. The seat has to be in the
     character's furniture collection; where it has none, the seat's own becomes that. ``InputError``: there is nothing to sit
-    on, no way, or the root cannot be keyed.
+    on, no way, or the root cannot be keyed; nothing is changed then.
     """
     scene, own = context.scene, armature.dafnet
-    if seat is not None and own.furniture is None:
-        own.furniture = _collection_of(seat, armature, scene)
-    settings = settings_of(armature, scene)
+    furniture = own.furniture
+    if seat is not None and furniture is None:
+        furniture = _collection_of(seat, armature, scene)
+    settings = settings_of(armature, scene, furniture=furniture.name_full if furniture else None)
     root = keyable_root(settings)
     keyed = last_key(root)
     first = scene.frame_current if keyed is None else keyed
@@ -72,16 +56,13 @@ def walk(
         found = furniture_now(context, settings)
         place, yaw = np.array(root.location, float) * unit / size, float(root.rotation_euler[2])
         goal = np.array(scene.cursor.location, float) * unit / size
-    route = _route(found, seat, place, yaw, goal, seconds, speed, scene.render.fps / scene.render.fps_base, size)
+    fps = scene.render.fps / scene.render.fps_base
+    route = _route(found, seat, place, yaw, goal, seconds, speed, fps, size)
     last = first + len(route.path) - 1
-    write_keys(root, route, first, size / unit, scene.render.fps / scene.render.fps_base)
+    with unchanged_on_failure(root):
+        keyed_along(context, root, route, first=first, scale=size / unit, fps=fps)
+    own.furniture = furniture
     return Walk(first, last, extended_to(scene, armature, last))
-
-
-def last_key(root: bpy.types.Object) -> int | None:
-    """The frame of a root's last key, or the whole one after it; None where it has none."""
-    keyed = [float(p.co[0]) for c in action_curves(root) if c.data_path in MOVES for p in c.keyframe_points]
-    return int(np.ceil(max(keyed))) if keyed else None
 
 
 def extended_to(scene: bpy.types.Scene, armature: bpy.types.Object, last: int) -> bool:
@@ -129,24 +110,3 @@ def _route(
         spot = seat_of(solids, place[:2], floor, seat.name)
         end = Stop((float(spot.position[0]), float(spot.position[1])), spot.yaw, seconds, seated=True)
     return walk_to(everything.solids, start, end, speed, fps, floor)
-
-
-def write_keys(root: bpy.types.Object, route: Route, first: int, scale: float, fps: float) -> None:
-    """Key location and heading about ten times a second from frame ``first`` on, and where the root comes to rest.
-
-    ``scale``: the route's metres in Blender units.
-    """
-    frames = set(range(0, len(route.path), max(1, round(fps / _KEYS_A_SECOND))))
-    frames |= {len(route.path) - 1, *(k for rest in route.rests for k in (rest.first, rest.last))}
-    for k in sorted(frames):
-        root.location = route.path.position[k] * scale
-        root.rotation_euler = (0.0, 0.0, float(route.path.yaw[k]))
-        for path in MOVES:
-            root.keyframe_insert(path, frame=first + k)
-    for curve in action_curves(root):
-        if curve.data_path in MOVES:
-            for point in curve.keyframe_points:
-                if point.co[0] >= first:
-                    point.interpolation = "BEZIER"
-                    point.handle_left_type = point.handle_right_type = "AUTO_CLAMPED"
-            curve.update()
