@@ -190,6 +190,34 @@ def test_what_leads_the_character_may_not_follow_it(stage: Stage, way: Way, role
     stage.refused(f"{role}.* follows the character itself")
 
 
+def test_the_mode_may_not_be_driven_by_the_character(stage: Stage) -> None:
+    stage.drive(stage.ann, "dafnet.head_influence", stage.chair, "location[0]")
+    stage.read()
+    stage.drive(stage.ann, "dafnet.mode", stage.ann, "location[1]")
+    stage.refused("driver of mode or influences of 'Ann' reads the character itself")
+
+
+def test_the_source_of_the_upper_body_may_not_follow_the_character(stage: Stage) -> None:
+    stage.scene.cursor.location = (3, 3, 0)
+    bob = stage.addon("dafnet_addon.blender.armature").create_character(stage.bpy.context, "Bob")
+    stage.ann.dafnet.upper_body_source = bob
+    constraint = bob.pose.bones["left_wrist"].constraints.new("IK")
+    constraint.target, constraint.subtarget = stage.ann, "right_wrist"
+    stage.read()  # FREE: nothing is copied
+    stage.ann.dafnet.mode = "FULL"
+    stage.refused("source 'Bob' follows the character itself")
+    constraint.mute = True
+    stage.read()
+
+
+def test_a_character_of_another_scene_is_said(stage: Stage) -> None:
+    other = stage.bpy.data.scenes.new("Other")
+    other.collection.objects.link(stage.ann)
+    settings = stage.addon("dafnet_addon.blender.properties").settings_of(stage.ann, other)
+    with pytest.raises(stage.error, match="scene 'Other' is not the active one; make it active"):
+        stage.addon("dafnet_addon.blender.scene_reader").read_scene(stage.bpy.context, settings)
+
+
 def shaped_by_armature(stage: Stage, prop: Any) -> None:
     prop.modifiers.new("Armature", "ARMATURE").object = stage.ann
 

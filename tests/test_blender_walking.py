@@ -273,6 +273,53 @@ def test_a_root_that_cannot_be_keyed_is_said_and_left_alone(room: Room, way, wor
     assert room.scene.frame_current == 1 and room.scene.frame_end == 40 and room.ann.dafnet.furniture is None
 
 
+def with_locked_transforms(room: Room) -> None:
+    room.root.lock_location = room.root.lock_rotation = (True, True, True)
+
+
+def with_an_old_parent_inverse(room: Room) -> None:
+    room.root.matrix_parent_inverse[0][3] = 5.0
+
+
+def where_only_needed_keys_are_wanted(room: Room) -> None:
+    room.bpy.context.preferences.edit.use_keyframe_insert_needed = True
+
+
+def with_an_active_keying_set(room: Room) -> None:
+    room.scene.keying_sets.new(idname="Sizes", name="Sizes").paths.add(room.root, "scale")
+
+
+def over_nla_strips(room: Room) -> None:
+    """An older way lies below; the new keys are on top of it."""
+    room.root.location.x = 2.0
+    keyed(room, (1, 90))
+    data = room.root.animation_data
+    data.nla_tracks.new().strips.new("Way", 1, data.action)
+    data.action = None
+    room.root.location.x = 0.0
+
+
+def with_muted_extras(room: Room) -> None:
+    keyed(room)[0].modifiers.new("NOISE").mute = True
+    room.root.driver_add("location", 2).mute = True
+
+
+@pytest.mark.parametrize("way", [
+    with_locked_transforms, with_an_old_parent_inverse, where_only_needed_keys_are_wanted, with_an_active_keying_set,
+    over_nla_strips, with_muted_extras,
+])
+def test_what_does_not_move_the_root_does_not_keep_it_from_the_seat(room: Room, way) -> None:
+    way(room)
+    room.select(room.chair, room.ann)
+    try:
+        assert room.bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
+    finally:
+        room.bpy.context.preferences.edit.use_keyframe_insert_needed = False
+    room.scene.frame_set(room.scene.frame_end)
+    place = room.root.evaluated_get(room.bpy.context.evaluated_depsgraph_get()).matrix_world.translation
+    assert abs(place.x) < 0.05 and 3.1 < place.y < 3.35
+
+
 def test_what_fails_while_it_is_keyed_leaves_the_root_as_it_was(room: Room, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also its action where that is an NLA strip as well, and a place that has no keys."""
     keys = room.addon("dafnet_addon.blender.root_keys")

@@ -59,21 +59,25 @@ class Dependencies:
 
     def follows(self, follower: bpy.types.Object, leader: bpy.types.Object, shaped: bool = True) -> bool:
         """Whether ``leader`` moves ``follower``, or with ``shaped`` also whether it shapes it; an object follows itself."""
-        aspects = self._all([follower], shaped)
-        return not aspects.isdisjoint({_Aspect(leader, _IN_PLACE), _Aspect(leader, _IN_SHAPE)})
+        return _meets(self._all([_Aspect(follower, _IN_SHAPE if shaped else _IN_PLACE)]), leader)
+
+    def setting_follows(self, owner: bpy.types.Object, path: str, leader: bpy.types.Object) -> bool:
+        """Whether drivers let ``leader`` set any property of ``owner`` whose data path begins like ``path``."""
+        return _meets(self._all([_Aspect(owner, path)]), leader)
 
     def simulations(self, owners: Iterable[bpy.types.Object], shaped: bool = True) -> list[Simulation]:
         """The simulations, none of them baked, that move these objects or with ``shaped`` also shape them."""
         found: dict[str, Simulation] = {}
-        for owner, what in self._all(owners, shaped):
+        for owner, what in self._all(_Aspect(owner, _IN_SHAPE if shaped else _IN_PLACE) for owner in owners):
             if isinstance(owner, bpy.types.Object) and what in {_IN_PLACE, _IN_SHAPE}:
                 for simulation in (*self._rigid(owner), *(self._soft(owner) if what == _IN_SHAPE else ())):
                     found.setdefault(simulation.name, simulation)
         return list(found.values())
 
-    def _all(self, owners: Iterable[bpy.types.Object], shaped: bool) -> set[_Aspect]:
+    def _all(self, aspects: Iterable[_Aspect]) -> set[_Aspect]:
+        """These and all that they follow."""
         found: set[_Aspect] = set()
-        waiting = [_Aspect(owner, _IN_SHAPE if shaped else _IN_PLACE) for owner in owners]
+        waiting = list(aspects)
         while waiting:
             aspect = waiting.pop()
             if aspect not in found:
@@ -102,6 +106,10 @@ class Dependencies:
         if since:
             met = (o for o in scene.objects if any(m.type == "COLLISION" for m in o.modifiers))
             yield Simulation(owner.name, min(since), tuple(met))
+
+
+def _meets(aspects: set[_Aspect], leader: bpy.types.Object) -> bool:
+    return not aspects.isdisjoint({_Aspect(leader, _IN_PLACE), _Aspect(leader, _IN_SHAPE)})
 
 
 def _followed(owner: bpy.types.ID, what: str) -> Iterator[_Aspect]:

@@ -89,8 +89,8 @@ def steps(
 
     ``settings`` comes from ``settings_of(armature, scene, **overrides)``. Without ``weights`` those of the
     preferences, else the shipped ones, are loaded. ``watch``: see ``takes_steps``. The current frame is as it was at every
-    yield, and until the last stage nothing in the scene is changed: an error (``InputError``, ``WeightsError``) or ``close()``
-    leaves it untouched.
+    yield (but see ``read_steps`` for simulations), and until the last stage nothing in the scene is changed: an error
+    (``InputError``, ``WeightsError``) or ``close()`` leaves it untouched.
     """
     if weights is None:
         weights = load_weights(weights_path(context))

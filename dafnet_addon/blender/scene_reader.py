@@ -146,6 +146,8 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
         if _is_turned(target, np.array(tracks[f"{role} local"])):
             given[f"{role}_rotation"] = matrices[:, :3, :3]
     if source and "FULL" in modes:
+        if dependencies.follows(source, armature):
+            raise InputError(f"The upper body's source '{source.name}' follows the character itself; mute what ties it to it.")
         given["upper_body"] = _carried(source, source_map, np.array(bones), np.array(bodies), unit, root_matrices, size, fps)
     elif settings.upper_body_take and "FULL" in modes:
         given["upper_body"] = _of_take(settings, np.array([mode == "FULL" for mode in modes]), root_matrices, size, fps)
@@ -166,6 +168,8 @@ def _require_independent(
     dependencies: Dependencies, armature: bpy.types.Object, leading: dict[str, bpy.types.Object],
 ) -> None:
     """What leads the character may not follow it, nor be pushed by it, or each take would change the next."""
+    if dependencies.setting_follows(armature, "dafnet.", armature):
+        raise InputError(f"A driver of mode or influences of '{armature.name}' reads the character itself; remove it.")
     for what, leader in leading.items():
         if dependencies.follows(leader, armature, shaped=False):
             raise InputError(f"The {what} follows the character itself; let it follow something else.")
