@@ -1,5 +1,6 @@
-"""Writers of motion files of a made-up walk, whose joints are known: BVH, ASF/AMC."""
+"""Writers of motion files whose joints are known: BVH, ASF/AMC, the compact form; and a made-up walk."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -133,3 +134,13 @@ def write_amc(file: Path, angles: np.ndarray, way: np.ndarray) -> None:
         lines.append(f"{t + 1}\nroot {' '.join(f'{x:.9f}' for x in [*way[t], *turned[0]])}")
         lines += [f"{VICON[JOINTS[j]]} {' '.join(f'{x:.9f}' for x in turned[j])}" for j in range(1, 22)]
     file.write_text("\n".join(lines), encoding="utf-8")
+
+
+def write_compact(file: Path, clips: list[tuple[dict[str, str], np.ndarray]]) -> None:
+    """Write clips of the compact form, each with what is known of it and its joints (T, 22, 3) in metres, z up, 30 fps."""
+    millimetres = [np.round(joints * 1000).astype(np.int32) for _, joints in clips]
+    np.savez(
+        file, clips=json.dumps([info for info, _ in clips]), first_mm=np.stack([mm[0] for mm in millimetres]),
+        delta_mm=np.concatenate([np.diff(mm, axis=0) for mm in millimetres]).astype(np.int16),
+        frames=[len(mm) for mm in millimetres],
+    )

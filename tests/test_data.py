@@ -1,6 +1,7 @@
 """Composing training data: boxes, fitted furniture, retargeted heights, windows; and the real motion files where they are."""
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,9 @@ from dafnet_addon.data.furniture import resting
 from dafnet_addon.data.mocap import Clip, read_clips
 from dafnet_addon.data.motions import read_motions, write_motions
 from dafnet_addon.data.windows import draw, mirrored, motion_of
+
+sys.path.insert(0, str(Path(__file__).parent))
+from motion_files import write_compact
 
 MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
 BONES = np.linalg.norm(OFFSETS[1:], axis=1)
@@ -162,13 +166,20 @@ def test_a_seat_that_is_used_later_is_there_before():
     assert standing > 20 and seen > 0.8 * standing
 
 
-def test_the_split_is_by_body():
+@pytest.fixture(scope="module")
+def real_motions():
+    """All motions that are used, by split."""
     if not MOCAP.is_dir():
         pytest.skip(f"needs the motion capture at {MOCAP}")
-    from dafnet_addon.data.prepare import TRAINED_ON_PARTLY, load_motions
+    from dafnet_addon.data.prepare import load_motions
 
-    train = {f"{m.source}/{m.subject}" for m in load_motions(MOCAP, "train")}
-    test = {f"{m.source}/{m.subject}" for m in load_motions(MOCAP, "test")}
+    return {split: load_motions(MOCAP, split) for split in ("train", "test")}
+
+
+def test_the_split_is_by_body(real_motions):
+    from dafnet_addon.data.prepare import TRAINED_ON_PARTLY
+
+    train, test = ({f"{m.source}/{m.subject}" for m in real_motions[split]} for split in ("train", "test"))
     both = {body for body in train & test if body not in TRAINED_ON_PARTLY and body.split("/")[0] not in TRAINED_ON_PARTLY}
     assert not both and not any(body.startswith("hdm05") for body in train)
 
@@ -219,3 +230,110 @@ def test_a_dataset_of_raw_files_needs_a_licence_and_a_held_out_body(tmp_path):
     prepare(folder, out, windows=4)
     assert (out / "pool-0000.npz").exists()
     assert json.loads((out / "dataset.json").read_text(encoding="utf-8"))["held_out"] == ["mocap/a"]
+
+
+def test_the_pelvis_is_over_the_hips_alike_in_every_source(real_motions):
+    """Sources put it from 3 cm under to 10 cm over the hips' middle; a seat's height is read off it."""
+    hips = [joint("left_hip"), joint("right_hip")]
+    over: dict[str, list[np.ndarray]] = {}
+    for motion in [*real_motions["train"], *real_motions["test"]]:
+        trunk = motion.joints[:, joint("neck")] - motion.joints[:, 0]
+        upright = (motion.joints[:, 0, 2] > 0.88) & (trunk[:, 2] > 0.97 * np.linalg.norm(trunk, axis=-1))
+        heights = motion.joints[upright, 0, 2] - motion.joints[upright][:, hips, 2].mean(1)
+        over.setdefault(motion.source, []).append(heights)
+    assert {"mhad", "cmu_fbx", "cmu_daz", "rocketbox", "snu_tiling", "snu_ys2010", "cmu69"} <= set(over)
+    for source, heights in over.items():
+        of_all = np.concatenate(heights)
+        assert len(of_all) > 100 and abs(np.median(of_all) + OFFSETS[hips[0]][2]) < 0.002, source
+        assert np.abs(np.percentile(of_all, (2, 98)) + OFFSETS[hips[0]][2]).max() < 0.01, source
+
+
+def _made_up_folder(folder: Path, **more: list[tuple[dict[str, str], np.ndarray]]) -> Path:
+    """A folder with a body to train on and one held out, each of whom sits down twice; and ``more`` archives."""
+    folder.mkdir()
+    for source, split in (("here", "train"), ("there", "test")):
+        info = {"licence": f"CC0 from {source}", "split": split, "subject": source, "category": "sit_down"}
+        clips = [(info | {"clip": f"{source} {seated}"}, _sit_down(seated)) for seated in (0.5, 0.6)]
+        write_compact(folder / f"{source}.npz", clips)
+    for source, clips in more.items():
+        write_compact(folder / f"{source}.npz", clips)
+    return folder
+
+
+def _count(out: Path) -> list[int]:
+    files = sorted(out.glob("pool-*.npz"))
+    assert files == sorted(out.glob("pool-????.npz")), "nothing is mistaken for a shard"
+    with_kinds = [np.load(file) for file in files]
+    return [len(archive["kinds"]) for archive in with_kinds]
+
+
+def test_a_dataset_has_as_many_windows_as_were_asked_for(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib", reason="previews are drawn with it")
+    from dafnet_addon.data import prepare as p
+
+    monkeypatch.setattr(p, "_SHARD", 10)
+    folder, out = _made_up_folder(tmp_path / "mocap"), tmp_path / "dataset"
+    for wrong in {"windows": 0}, {"windows": 10**9}, {"seed": -1}:
+        with pytest.raises(InputError):
+            p.prepare(folder, out, **({"windows": 15} | wrong))
+        assert not out.exists()
+    p.prepare(folder, out, windows=15)
+    assert _count(out) == [10, 5]
+    described = json.loads((out / "dataset.json").read_text(encoding="utf-8"))
+    assert described["windows"] == 15 and described["licences"] == {"CC0 from here": ["here"]}
+    kept = {name: (out / name).stat().st_mtime_ns for name in ("pool-0000.npz", "train.npz", "summary.txt")}
+    first = np.load(out / "pool-0001.npz")["poses"]
+    (out / "pool-0000.part.npz").write_bytes(b"of a run that was killed")
+    p.prepare(folder, out, windows=32)
+    assert _count(out) == [10, 10, 10, 2] and not list(out.glob("*.part.*"))
+    assert kept == {name: (out / name).stat().st_mtime_ns for name in kept}
+    assert (np.load(out / "pool-0001.npz")["poses"][:5] == first).all(), "a shard that was too short begins as it did"
+    assert json.loads((out / "dataset.json").read_text(encoding="utf-8"))["windows"] == 32
+    for asked, said in ({"windows": 15}, "begun with 32 windows"), ({"windows": 40, "seed": 1}, "begun with the seed 0"):
+        with pytest.raises(InputError, match=said):
+            p.prepare(folder, out, **asked)
+    assert _count(out) == [10, 10, 10, 2]
+
+
+def test_what_a_dataset_leaves_out_is_said_and_does_not_stop_it(tmp_path):
+    pytest.importorskip("matplotlib", reason="previews are drawn with it")
+    from dafnet_addon.data.prepare import prepare
+
+    known = {"licence": "CC0", "split": "train"}
+    lying = _sit_down()[..., [0, 2, 1]] * (1, -1, 1)
+    folder, out = tmp_path / "mocap", tmp_path / "dataset"
+    _made_up_folder(
+        folder,
+        lies=[(known | {"clip": "sleep", "subject": "tired", "category": "lying"}, lying)],
+        cooks=[(known | {"clip": "stir", "category": "kitchen_mime"}, _sit_down())],
+        hops=[(known | {"clip": "hop on", "category": "locomotion"}, _sit_down())],
+        unstated=[({"clip": "walk"}, _sit_down())],
+        ui_prmd=[(known | {"clip": "squat down", "category": "sit-stand", "description": ""}, _sit_down()),
+                 (known | {"clip": "sit", "category": "sit-stand"}, _sit_down())],
+    )
+    (folder / "torn.npz").write_bytes((folder / "here.npz").read_bytes()[:-700])
+    (folder / "torn.bvh").write_text("HIERARCHY", encoding="utf-8")
+    prepare(folder, out, windows=4)
+    assert _count(out) == [4]
+    summary = (out / "summary.txt").read_text(encoding="utf-8")
+    for said in (
+        "torn.npz' cannot be read", "torn.bvh' is damaged", "'lies/tired' never stands upright",
+        "The clip 'sit' of 'ui_prmd' has arms that are not real, and none to borrow",
+        "of the activity 'kitchen_mime', of which no windows are drawn (1 of the clips of cooks).",
+        "whose name or description says 'hop' (1 of the clips of hops).",
+        "or of no stated licence (1 of the clips of unstated).",
+    ):
+        assert said in summary, said
+    assert json.loads((out / "dataset.json").read_text(encoding="utf-8"))["licences"] == {"CC0 from here": ["here"]}
+
+
+def test_motion_that_is_too_short_for_a_window_is_no_endless_search(tmp_path):
+    from dafnet_addon.data.prepare import prepare
+
+    known = {"licence": "CC0", "subject": "a", "category": "standing"}
+    standing = np.repeat(_sit_down()[:1], 20, axis=0) + np.linspace(0, 0.8, 20)[:, None, None] * (1, 0, 0)
+    (tmp_path / "mocap").mkdir()
+    for split in ("train", "test"):
+        write_compact(tmp_path / "mocap" / f"{split}.npz", [(known | {"clip": "a", "split": split}, standing)])
+    with pytest.raises(InputError, match="no window could be drawn"):
+        prepare(tmp_path / "mocap", tmp_path / "dataset", windows=4)

@@ -27,7 +27,7 @@ from dafnet_addon.data.summary import summary
 from dafnet_addon.data.world import at_model_rate, floor_height, unit_of
 
 sys.path.insert(0, str(Path(__file__).parent))
-from motion_files import MIXAMO, VICON, Y_UP, walk, write_amc, write_asf, write_bvh
+from motion_files import MIXAMO, VICON, Y_UP, walk, write_amc, write_asf, write_bvh, write_compact
 
 MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
 RAW = MOCAP / "raw_samples"
@@ -342,8 +342,11 @@ def test_archives_of_another_kind_are_refused_in_one_sentence(tmp_path):
     lambda arrays: arrays | {"clips": "[1]"}, lambda arrays: arrays | {"clips": "[" * 9999},
 ])
 def test_a_damaged_compact_archive_is_refused_in_one_sentence(tmp_path, damage):
-    arrays = _compact([{"clip": "walk", "licence": "CC0", "split": "train"}, {"clip": "stand"}])
-    np.savez(tmp_path / "a.npz", **arrays)
+    standing = np.repeat(REST[None], 10, axis=0)
+    infos = {"clip": "walk", "licence": "CC0", "split": "train"}, {"clip": "stand"}
+    write_compact(tmp_path / "a.npz", [(info, standing) for info in infos])
+    with np.load(tmp_path / "a.npz") as archive:
+        arrays = dict(archive)
     clips = list(read_clips(tmp_path))
     assert [(c.name, c.category, c.licence, c.split) for c in clips] == [
         ("walk", "locomotion", "CC0", "train"), ("stand", "standing", UNSTATED, ""),
@@ -353,14 +356,6 @@ def test_a_damaged_compact_archive_is_refused_in_one_sentence(tmp_path, damage):
     with pytest.raises(InputError) as error:
         list(read_clips(tmp_path))
     _one_sentence(error)
-
-
-def _compact(infos: list[dict[str, str]]) -> dict[str, np.ndarray]:
-    millimetres = np.round(REST * 1000).astype(np.int32)
-    return {
-        "clips": np.array(json.dumps(infos)), "first_mm": np.repeat(millimetres[None], len(infos), axis=0),
-        "delta_mm": np.zeros((9 * len(infos), 22, 3), np.int16), "frames": np.full(len(infos), 10),
-    }
 
 
 def test_what_cannot_be_used_is_named_and_the_rest_is_read(tmp_path):
@@ -376,15 +371,16 @@ def test_what_cannot_be_used_is_named_and_the_rest_is_read(tmp_path):
     (tmp_path / "link.bvh").symlink_to(tmp_path / "nowhere.bvh")
     (tmp_path / "folder.bvh").mkdir()
     np.savez(tmp_path / "half.npz", poses=np.zeros((4, 156)))
-    np.savez(tmp_path / "tall.npz", **_compact([{"clip": "a"}]) | {"first_mm": np.round(REST[None] * 9000).astype(np.int32)})
-    np.savez(tmp_path / "fine.npz", **_compact([{"clip": "a"}]))
+    write_compact(tmp_path / "tall.npz", [({"clip": "giant"}, REST[None] * 9)])
+    write_compact(tmp_path / "fine.npz", [({"clip": "a"}, REST[None]), ({"clip": "dwarf"}, REST[None] * 0.2)])
     (tmp_path / "__MACOSX").mkdir()
     for hidden in ("__MACOSX/._good.bvh", "._good.bvh", ".DS_Store.npz", "._s.asf"):
         (tmp_path / hidden).write_bytes(b"\0\5\x16\7")
 
     left_out: list[str] = []
     assert sorted(clip.name for clip in read_clips(tmp_path, left_out)) == ["a", "good"]
-    named = {name: [said for said in left_out if f"{name}'" in said] for name in (*bad, "link.bvh", "half.npz", "tall.npz")}
+    wanted = (*bad, "link.bvh", "half.npz", "giant", "dwarf")
+    named = {name: [said for said in left_out if f"{name}'" in said] for name in wanted}
     assert all(len(said) == 1 for said in named.values()) and len(left_out) == len(named), left_out
     assert all(said.endswith(".") and "\n" not in said for said in left_out)
     for name in ("good.bvh", "fine.npz"):

@@ -134,8 +134,8 @@ def _compact(file: Path, left_out: list[str] | None) -> Iterator[Clip]:
             steps = delta[ends[i] : ends[i + 1]].astype(np.int64)
             joints = np.concatenate([first[i][None].astype(np.int64), steps]).cumsum(0) / 1000.0
             name = str(info.get("clip", f"{file.stem} {i}"))
-            if unit_of(joints, 1.0, file) != 1.0:
-                raise InputError(f"The clip '{name}' of '{file}' is no grown person's in metres; scale it.")
+            if unit_of(joints, 1.0, file / name) != 1.0:
+                raise InputError(f"The body in '{file / name}' is no grown person's in metres; scale it.")
             yield _clip(name, file.stem, file.stem, {"split": "", **info}, joints)
 
 

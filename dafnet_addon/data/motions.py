@@ -31,7 +31,7 @@ def write_motions(file: Path, motions: list[Motion], draws: Draws) -> None:
         rests=np.array(rests).reshape(-1, 7), draws=np.concatenate([rows for rows, _ in draws.values()]).astype(np.int32),
         weights=np.concatenate([weight for _, weight in draws.values()]),
     )
-    part.rename(file)
+    part.replace(file)
 
 
 def read_motions(file: Path) -> tuple[list[Motion], Draws]:

@@ -2,13 +2,13 @@
 
 A dataset is a folder: ``train.npz`` and ``test.npz`` (motions, captured and composed), ``dataset.json`` (what they were made
 from), ``pool-NNNN.npz`` (training windows) and ``held.npz`` (windows of held-out motions, for the likelihood). For people:
-``summary.txt`` (what was read, and what was cut from it), ``fits.txt`` (how often furniture fits) and ``preview.png``.
+``summary.txt`` (what was read, cut and left out), ``fits.txt`` (how often furniture fits) and ``preview.png``.
 """
 
 import json
 import multiprocessing
-from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +17,15 @@ import numpy as np
 from ..core.errors import InputError
 from ..core.rotations import frame_from, normalised
 from ..core.skeleton import OFFSETS, PARENTS
-from .canonical import calibrate, canonical
+from .archive import read_arrays
+from .canonical import Calibration, calibrate, canonical
 from .compose import composed
 from .fits import fit_report
-from .mocap import Clip, read_clips
+from .mocap import Clip, leaving_out, read_clips
 from .motions import Draws, read_motions, write_motions
 from .preview import preview
 from .summary import summary
-from .windows import COMPOSED, Motion, Window, draw, motion_of
+from .windows import Motion, Window, draw, motion_of
 
 __all__ = ["load_motions", "sample", "prepare", "load_pool", "POSE_UNIT", "TRAINED_ON_PARTLY"]
 
@@ -50,26 +51,50 @@ _COMPOSITION = (
 """What in the training motion nobody ever did in one piece; said on the weights' card."""
 
 _SHARE_ALIKE = {"hdm05_cuts"}
-_ONE_RIG = {"cmu_daz", "cmu_expmap", "gazebo_actors", "snu_tiling", "snu_ys2010"}
+_ONE_RIG = {"cmu_daz", "cmu_expmap", "cmu_fbx", "gazebo_actors", "snu_tiling", "snu_ys2010"}
 _ARMS_RAISED = {"ui_prmd"}
 _WEIGHT = {"ui_prmd": 0.35, "snu_tiling": 3.0}  # of a sit-down: the one stands with borrowed arms, the other walks up to it
 TRAINED_ON_PARTLY = {"cmu69", "snu_tiling/wd2(dir 1)", "snu_ys2010", "gazebo_actors"}
 """Bodies with clips on both sides of the split; figures of their test clips are reported apart."""
 
 _ARMS = [18, 20, 19, 21]  # elbow and wrist, left then right
-_SHARD = 1000
+_SHARD, _SHARDS = 1000, 10_000  # seeds of shards are seed * _SHARDS + i
+_DRAWS = 2000  # in a row, of which none gives a window
 _FIT_TRIES = 60  # moments of each kind that are furnished for the report
 _STORED = ("poses", "velocity", "ahead", "root", "boxes")
 POSE_UNIT = 1e-4
 """Poses are stored as whole numbers of these (metres)."""
 
 
-def _wanted(clip: Clip) -> bool:
+def _why_not(clip: Clip) -> str:
+    """Why a clip is not used; nothing where it is."""
+    if clip.source in _SHARE_ALIKE:
+        return "under a share-alike licence, which would bind the weights"
+    if not clip.split:
+        return "of no split, or of no stated licence"
     if clip.category == "lying":
-        return True
+        return ""
     if clip.category not in _WALK | _STAND | _SIT:
-        return False
-    return not any(word in f"{clip.name} {clip.description}".lower() for word in _AVOID)
+        return f"of the activity '{clip.category}', of which no windows are drawn"
+    text = f"{clip.name} {clip.description}".lower()
+    return next((f"whose name or description says '{word}'" for word in _AVOID if word in text), "")
+
+
+def _unused(clips: Iterable[Clip]) -> list[str]:
+    """A sentence for each reason why clips are not used."""
+    frames: Counter[str] = Counter()
+    count: Counter[str] = Counter()
+    sources: dict[str, set[str]] = defaultdict(set)
+    for clip in clips:
+        why = _why_not(clip)
+        if why:
+            frames[why] += len(clip.joints)
+            count[why] += 1
+            sources[why].add(clip.source)
+    return [
+        f"Not used: {n / 1800:.1f} minutes {why} ({count[why]} of the clips of {', '.join(sorted(sources[why]))})."
+        for why, n in frames.most_common()
+    ]
 
 
 def _arm_directions(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -92,27 +117,49 @@ def _with_arms(joints: np.ndarray, standing: np.ndarray, seated: np.ndarray) -> 
     return out
 
 
-def load_motions(folder: Path, split: str) -> list[Motion]:
-    """Every usable clip of a split ('train' or 'test') on the canonical body, bodies calibrated on all their clips."""
+def _measured(
+    clips: Iterable[Clip], splits: Sequence[str], left_out: list[str] | None
+) -> list[tuple[Clip, Calibration]]:
+    """The clips of some splits that are used, body by body, each with its body's constants, calibrated on all its clips."""
     bodies: dict[tuple[str, str], list[Clip]] = defaultdict(list)
-    for clip in read_clips(folder):
+    for clip in clips:
         if clip.source not in _SHARE_ALIKE:
             bodies[clip.source, "" if clip.source in _ONE_RIG else clip.subject].append(clip)
-    fitted: list[tuple[Clip, np.ndarray]] = []
-    for clips in bodies.values():
-        wanted = [c for c in clips if c.split == split and _wanted(c)]
-        if wanted:
-            body = calibrate(clips)
-            fitted += [(clip, canonical(clip, body)) for clip in wanted]
+    found: list[tuple[Clip, Calibration]] = []
+    for own in bodies.values():
+        used = [clip for clip in own if clip.split in splits and not _why_not(clip)]
+        if used:
+            with leaving_out(left_out):
+                body = calibrate(own)
+                found += [(clip, body) for clip in used]
+    return found
+
+
+def _motions(measured: list[tuple[Clip, Calibration]], split: str, left_out: list[str] | None) -> list[Motion]:
+    fitted = [(clip, canonical(clip, body)) for clip, body in measured if clip.split == split]
     rng = np.random.default_rng(7)
     lend = {kind: [j for c, j in fitted if c.category == kind] for kind in ("standing_idle", "seated_chair")}
     motions = []
     for clip, joints in fitted:
-        if clip.source in _ARMS_RAISED:
-            poses = [clips[i][rng.integers(len(clips[i]))] for clips in lend.values() for i in [rng.integers(len(clips))]]
-            joints = _with_arms(joints, *poses)
-        motions.append(motion_of(clip.name, clip.source, clip.subject, clip.category, joints))
+        with leaving_out(left_out):
+            if clip.source in _ARMS_RAISED:
+                if not all(lend.values()):
+                    raise InputError(
+                        f"The clip '{clip.name}' of '{clip.source}' has arms that are not real, and none to borrow; add clips "
+                        f"of split '{split}' and of the categories {' and '.join(lend)}."
+                    )
+                poses = [clips[i][rng.integers(len(clips[i]))] for clips in lend.values() for i in [rng.integers(len(clips))]]
+                joints = _with_arms(joints, *poses)
+            motions.append(motion_of(clip.name, clip.source, clip.subject, clip.category, joints))
     return motions
+
+
+def load_motions(folder: Path, split: str) -> list[Motion]:
+    """Every usable clip of a split ('train' or 'test') on the canonical body, bodies calibrated on all their clips.
+
+    Raises InputError where a file or a body cannot be used.
+    """
+    return _motions(_measured(read_clips(folder), (split,), None), split, None)
 
 
 def _captured(motions: list[Motion]) -> dict[str, list[tuple[int, int, float]]]:
@@ -146,16 +193,23 @@ def _draws(motions: list[Motion]) -> tuple[list[Motion], Draws]:
 
 
 def sample(rng: np.random.Generator, motions: list[Motion], draws: Draws) -> tuple[str, Window]:
-    """A kind of moment by its share, a moment of that kind, and a window around it."""
+    """A kind of moment by its share, a moment of that kind, and a window around it.
+
+    Raises InputError where hardly any window can be drawn.
+    """
     kinds = [kind for kind in _SHARES if kind in draws]
     share = np.array([_SHARES[kind] for kind in kinds])
-    while True:
+    for _ in range(_DRAWS):
         kind = kinds[rng.choice(len(kinds), p=share / share.sum())]
         rows, weight = draws[kind]
         motion, frame = rows[rng.choice(len(rows), p=weight)]
         window = draw(rng, motions[motion], int(frame))
         if window is not None:
             return kind, window
+    raise InputError(
+        f"In {_DRAWS} tries no window could be drawn from the motion, most likely since its clips are shorter than three "
+        "seconds or have many bad frames; give longer or cleaner ones (see summary.txt)."
+    )
 
 
 _known: tuple[list[Motion], Draws]
@@ -174,7 +228,7 @@ def _shard(task: tuple[Path, int, int]) -> Path:
     arrays = {name: np.stack([getattr(w, name) for w in windows]).astype(np.float32) for name in _STORED}
     arrays["poses"] = np.round(arrays["poses"] / POSE_UNIT).astype(np.int16)
     np.savez(part, kinds=np.array(kinds), **arrays)
-    part.rename(file)
+    part.replace(file)
     return file
 
 
@@ -184,44 +238,95 @@ def _written(file: Path, text: Callable[[], str]) -> None:
         file.write_text(text() + "\n", encoding="utf-8")
 
 
+def _read(folder: Path, out: Path) -> dict[str, Any]:
+    """Read the motion files; write the motions of both splits and the summary. What is known of the training set."""
+    left_out: list[str] = []
+    clips = list(read_clips(folder, left_out))
+    names = {"test": "held_out", "train": "train"}
+    measured = _measured(clips, tuple(names), left_out)
+    licence_of = {(clip.source, clip.name): clip.licence for clip, _ in measured}
+    licences: dict[str, set[str]] = defaultdict(set)
+    described: dict[str, Any] = {}
+    for split, name in names.items():
+        captured = _motions(measured, split, left_out)
+        motions, draws = _draws(captured)
+        if not draws:
+            raise InputError(
+                f"The folder '{folder}' has no clip of split '{split}' that can be used; state in its clips.json the "
+                "clips' licence, their split ('train', or 'test' for held-out subjects) and category (as 'locomotion')."
+                + (f" Left out: {left_out[0]}" if left_out else "")
+            )
+        write_motions(out / f"{split}.npz", motions, draws)
+        described[name] = sorted({f"{m.source}/{m.subject}" for m in captured})
+        for motion in captured if split == "train" else ():
+            licences[licence_of[motion.source, motion.name]].add(motion.source)
+    described["licences"] = {licence: sorted(sources) for licence, sources in sorted(licences.items())}
+    text = summary(clips, [*left_out, *_unused(clips)])
+    (out / "summary.txt").write_text(text + "\n", encoding="utf-8")
+    return described
+
+
+def _windows_in(file: Path) -> int:
+    """How many windows a shard holds: none where it is not there, or damaged."""
+    if not file.exists():
+        return 0
+    try:
+        return len(read_arrays(file, "kinds")[0])
+    except InputError:
+        return 0
+
+
+def _asked(described: dict[str, Any], out: Path, windows: int, seed: int) -> None:
+    """Raises InputError where what is asked for cannot be made, or is not what ``out`` holds already."""
+    if not 1 <= windows <= _SHARD * _SHARDS:
+        raise InputError(f"A dataset holds 1 to {_SHARD * _SHARDS} windows; ask for so many instead of {windows}.")
+    if seed < 0:
+        raise InputError(f"The seed is {seed}; give 0 or more.")
+    if described.get("seed", seed) != seed:
+        raise InputError(f"The dataset '{out}' was begun with the seed {described['seed']}; give this, or another folder.")
+    if described.get("windows", 0) > windows:
+        raise InputError(
+            f"The dataset '{out}' was begun with {described['windows']} windows; ask for as many or more, or give another "
+            "folder."
+        )
+
+
 def prepare(
     folder: Path, out: Path, windows: int = 12000, processes: int = 1, seed: int = 0,
     progress: Callable[[float], None] = lambda _: None,
 ) -> None:
     """Make (or go on making) the dataset ``out`` from the motion files in ``folder``. What is finished is kept.
 
-    Raises InputError where the folder holds no motion files, or none to train on or none that are held out.
+    Files, bodies and clips that cannot be used are left out, which ``summary.txt`` says. Raises InputError where the folder
+    holds no motion files, or none to train on or none that are held out, and where ``out`` holds another dataset.
     """
+    record = out / "dataset.json"
+    described = json.loads(record.read_text(encoding="utf-8")) if record.exists() else {}
+    _asked(described, out, windows, seed)
     out.mkdir(parents=True, exist_ok=True)
-    size = min(_SHARD, windows)
-    train = [(out / f"pool-{i:04d}.npz", seed * 10000 + i, size) for i in range(max(1, windows // _SHARD))]
-    described: dict[str, Any] = {"windows": size * len(train), "shares": _SHARES, "composed": _COMPOSITION}
+    for left in out.glob("*.part.*"):  # by a run that was ended
+        left.unlink()
+    if not described:
+        described = _read(folder, out)
+    described |= {"windows": windows, "seed": seed, "shares": _SHARES, "composed": _COMPOSITION}
+    part = record.with_suffix(".part.json")
+    part.write_text(json.dumps(described, indent=1), encoding="utf-8")
+    part.replace(record)
+
+    sizes = [min(_SHARD, windows - done) for done in range(0, windows, _SHARD)]
+    train = [(out / f"pool-{i:04d}.npz", seed * _SHARDS + i, size) for i, size in enumerate(sizes)]
     done = 0
     for split, tasks in (("test", [(out / "held.npz", 99, min(600, windows))]), ("train", train)):
-        file = out / f"{split}.npz"
-        if not file.exists():
-            motions, draws = _draws(load_motions(folder, split))
-            if not draws:
-                raise InputError(
-                    f"The folder '{folder}' has no clip of split '{split}' that can be used; state in its clips.json the "
-                    "clips' licence, their split ('train', or 'test' for held-out subjects) and category (as 'locomotion')."
-                )
-            write_motions(file, motions, draws)
-        known = read_motions(file)
-        described["train" if split == "train" else "held_out"] = sorted(
-            {f"{m.source}/{m.subject}" for m in known[0] if m.source != COMPOSED}
-        )
-        missing = [task for task in tasks if not task[0].exists()]
+        known = read_motions(out / f"{split}.npz")
+        missing = [task for task in tasks if _windows_in(task[0]) != task[2]]
         # Forked: the motions are read once and shared by all.
-        with multiprocessing.get_context("fork").Pool(processes, _start, (known,)) as pool:
+        with multiprocessing.get_context("fork").Pool(max(processes, 1), _start, (known,)) as pool:
             for k, _ in enumerate(pool.imap_unordered(_shard, missing)):
                 progress((done + k + 1) / (1 + len(train)))
         done += len(tasks)
-    _written(out / "summary.txt", lambda: summary(read_clips(folder)))
     _written(out / "fits.txt", lambda: fit_report(*read_motions(out / "train.npz"), np.random.default_rng(seed), _FIT_TRIES))
     if not (out / "preview.png").exists():
         preview(out / "preview.png", *read_motions(out / "train.npz"), np.random.default_rng(seed))
-    (out / "dataset.json").write_text(json.dumps(described, indent=1), encoding="utf-8")
 
 
 def load_pool(files: Iterable[Path]) -> dict[str, np.ndarray]:

@@ -1,7 +1,7 @@
 """What a folder of motion capture holds: minutes, clips and cut frames by source, subject and activity."""
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -15,11 +15,11 @@ _Key = tuple[str, str, str, str, str]  # source, subject, activity, split, licen
 _MINUTE = 30 * 60
 
 
-def summary(clips: Iterable[Clip]) -> str:
+def summary(clips: Iterable[Clip], left_out: Sequence[str] = ()) -> str:
     """A text table of clips, one line for each source, subject, activity, split and licence, and a line of sums.
 
-    Frames that are cut are counted by reason (see ``cuts``), once each under the first that holds. A last line tells how many
-    clips are refused for training because nobody stated their licence.
+    Frames that are cut are counted by reason (see ``cuts``), once each under the first that holds. A line tells how many clips
+    are refused for training because nobody stated their licence; sentences about what was ``left_out`` follow.
     """
     frames: Counter[_Key] = Counter()
     count: Counter[_Key] = Counter()
@@ -55,4 +55,4 @@ def summary(clips: Iterable[Clip]) -> str:
     unstated = sum(clips_of for key, clips_of in count.items() if key[4] == UNSTATED)
     if unstated:
         lines.append(f"{unstated} clips are not trained on: state their licence in clips.json or clips.csv")
-    return "\n".join(line.rstrip() for line in lines)
+    return "\n".join(line.rstrip() for line in (*lines, *left_out))
