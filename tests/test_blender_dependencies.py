@@ -133,6 +133,10 @@ def by_driven_distance(stage: Stage, follower: Any) -> None:
     variable.targets[0].id, variable.targets[0].bone_target = stage.ann, "head"
 
 
+def by_a_driver_script(stage: Stage, follower: Any) -> None:
+    follower.driver_add("location", 0).driver.expression = "bpy.data.objects['Ann'].location[0]"
+
+
 def by_a_driven_property(stage: Stage, follower: Any) -> None:
     middle = stage.empty("Middle")
     middle["height"] = 0.0
@@ -166,7 +170,7 @@ def by_shrinkwrap(stage: Stage, follower: Any) -> None:
 
 WAYS = [
     by_copy_location, by_child_of, by_armature_constraint, by_a_constraint_switched_on_later, by_driver, by_driven_distance,
-    by_a_driven_property, by_a_chain, by_another_rig, by_a_vertex_of_the_body, by_shrinkwrap,
+    by_a_driver_script, by_a_driven_property, by_a_chain, by_another_rig, by_a_vertex_of_the_body, by_shrinkwrap,
 ]
 Way = Callable[[Stage, Any], None]
 
@@ -337,6 +341,41 @@ def test_a_root_on_a_cloth_is_read_as_it_hangs(stage: Stage) -> None:
     read = stage.read(frame_start=5)
     assert np.allclose(read.controls.root[:, 2, 3], stage.played(stage.root, 2, 5, 40), atol=1e-4)
     assert np.ptp(read.controls.root[:, 2, 3]) > 1.0
+
+
+def test_a_tablecloth_has_the_shape_that_it_has_fallen_into(stage: Stage) -> None:
+    stage.bpy.ops.mesh.primitive_grid_add(x_subdivisions=6, y_subdivisions=6, size=1.0, location=(0, 0, 2))
+    cloth = stage.bpy.context.object
+    cloth.modifiers.new("Cloth", "CLOTH")
+    stage.furniture.objects.link(cloth)
+    read = stage.read(frame_start=20)
+    low = next(solid for solid in read.scene.solids if solid.name == cloth.name).vertices[:, 2].min()
+    for frame in range(1, 21):
+        stage.scene.frame_set(frame)
+    evaluated = cloth.evaluated_get(stage.bpy.context.evaluated_depsgraph_get())
+    assert low == pytest.approx(min(vertex.co.z for vertex in evaluated.data.vertices), abs=1e-4) and low < -0.5
+    assert [each for each in read.warnings if "shape" in each and cloth.name in each]
+
+
+def test_a_simulation_zone_is_read_as_it_grows(stage: Stage) -> None:
+    """Each frame lifts a plate's vertices by a centimetre; the root hangs on one of them."""
+    tree = stage.bpy.data.node_groups.new("Grows", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    kinds = ("NodeGroupInput", "GeometryNodeSimulationInput", "GeometryNodeSetPosition", "GeometryNodeSimulationOutput",
+             "NodeGroupOutput")
+    source, begin, lift, end, out = (tree.nodes.new(kind) for kind in kinds)
+    begin.pair_with_output(end)
+    lift.inputs["Offset"].default_value = (0, 0, 0.01)
+    for a, b in ((source.outputs[0], begin.inputs[0]), (begin.outputs["Geometry"], lift.inputs["Geometry"]),
+                 (lift.outputs[0], end.inputs["Geometry"]), (end.outputs["Geometry"], out.inputs[0])):
+        tree.links.new(a, b)
+    plate = stage.box("Plate", stage.scene.collection)
+    plate.modifiers.new("Grows", "NODES").node_group = tree
+    stage.root.parent, stage.root.parent_type = plate, "VERTEX"
+    read = stage.read(frame_start=10)
+    assert np.allclose(read.controls.root[:, 2, 3], stage.played(stage.root, 2, 10, 40), atol=1e-5)
+    assert np.ptp(read.controls.root[:, 2, 3]) == pytest.approx(0.30, abs=1e-4)
 
 
 def test_reading_a_simulation_may_be_cancelled_and_notices_a_changed_frame(stage: Stage) -> None:

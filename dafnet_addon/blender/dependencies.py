@@ -1,10 +1,11 @@
 """What an object of the scene follows, near or far: its place, its shape, and the simulations that move it.
 
 Blender's own graph of dependencies cannot be asked for this, so what that graph is built from is read: parents, constraints
-(of bones, too), drivers, modifiers with their node groups, shape keys, collections. Names in driver scripts
-(``bpy.data.objects["…"]``) are unknown to Blender and to us.
+(of bones, too), drivers, modifiers with their node groups, shape keys, collections. What a driver's script names itself
+(``bpy.data.objects["…"]``) counts as well, though Blender does not know of it.
 """
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -20,8 +21,12 @@ _SHAPE = ("modifiers[", "pose.", "instance_")
 """How the data paths of an object begin that move it, and that shape it."""
 _SIMULATED = {"CLOTH", "SOFT_BODY", "PARTICLE_SYSTEM", "PARTICLE_INSTANCE", "DYNAMIC_PAINT", "FLUID", "COLLISION"}
 """Modifiers that name what they may push against: ``Simulation.met``, not what they follow."""
-_ON_SURFACES = {"SHRINKWRAP", "FOLLOW_PATH", "CLAMP_TO", "FOLLOW_TRACK", "OBJECT_SOLVER", "TRANSFORM_CACHE"}
-"""Constraints that follow their target's shape and not its place alone."""
+_BY_PLACE = {
+    "COPY_LOCATION", "COPY_ROTATION", "COPY_SCALE", "COPY_TRANSFORMS", "LIMIT_DISTANCE", "TRANSFORM", "DAMPED_TRACK",
+    "TRACK_TO", "LOCKED_TRACK", "STRETCH_TO", "CHILD_OF", "FLOOR", "PIVOT", "ACTION", "ARMATURE", "IK",
+}
+"""Constraints that follow their target's place, and its shape only where they name a bone or a vertex group of it."""
+_QUOTED = re.compile(r"""["'](.+?)["']""")
 _NESTED = 2
 """How deep in a constraint or a modifier what it points to may lie."""
 
@@ -163,7 +168,7 @@ def _shaped(owner: bpy.types.Object) -> Iterator[_Aspect]:
 def _constrained(constraints: Iterable[bpy.types.Constraint], owner: bpy.types.Object) -> Iterator[_Aspect]:
     for constraint in _on(constraints, owner):
         parts = [constraint, *getattr(constraint, "targets", ())]
-        inside = constraint.type in _ON_SURFACES or any(getattr(part, "subtarget", "") for part in parts)
+        inside = constraint.type not in _BY_PLACE or any(getattr(part, "subtarget", "") for part in parts)
         yield from _aspects(_pointed(constraint, _NESTED), _IN_SHAPE if inside else _IN_PLACE)
 
 
@@ -201,6 +206,8 @@ def _driven(owner: bpy.types.ID, paths: str | tuple[str, ...]) -> Iterator[_Aspe
     for curve in data.drivers if data else ():
         if curve.mute or not curve.data_path.startswith(paths):
             continue
+        if "bpy." in curve.driver.expression:
+            yield from _aspects(bpy.data.objects.get(name) for name in _QUOTED.findall(curve.driver.expression))
         for variable in curve.driver.variables:
             for target in variable.targets:
                 if target.id is None:

@@ -92,11 +92,11 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     leading |= {f"{_TARGETS[role]} '{target.name}'": target for role, target in targets.items()}
     _require_independent(dependencies, armature, leading)
     furniture = furniture_of(settings, dependencies)
-    sources = [source] if source else []
-    simulations = dependencies.simulations([root, *targets.values()], shaped=False)
-    simulations += dependencies.simulations([*sources, *(furniture.members if furniture else ())])
-
+    sources, members = [source] if source else [], furniture.members if furniture else set()
     frames = range(settings.frame_start, settings.frame_end + 1)
+    simulations = dependencies.simulations([root, *targets.values(), *members], shaped=False)
+    simulations += dependencies.simulations(sources)
+    simulations += [each for each in dependencies.simulations(members) if each.since < frames[0]]  # it has a shape by then
     modes: list[str] = []
     influences: dict[str, list[float]] = defaultdict(list)
     tracks = defaultdict(list)
