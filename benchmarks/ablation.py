@@ -10,7 +10,6 @@ need other sizes are left out.
 
 import argparse
 import json
-import os
 import shutil
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -25,6 +24,7 @@ from dafnet_addon.data.held_out import HeldClip, held_out
 from dafnet_addon.model.config import SMALL, ModelConfig
 from dafnet_addon.training import precision
 from dafnet_addon.training.batches import Pool
+from dafnet_addon.training.checkpoints import checkpoint_file
 from dafnet_addon.training.evaluate import captured, measured, rows_of
 from dafnet_addon.training.export import export
 from dafnet_addon.training.train import Run, TrainingConfig, train_part, trained
@@ -77,8 +77,8 @@ def variant(
     model, training = replace(base, **changed), replace(TRAINING, minutes_flow=minutes, **trained_as)
     folder = out / name.replace(" ", "_").replace(":", "").replace(",", "")
     folder.mkdir(parents=True, exist_ok=True)
-    if not (folder / "predictor.pt").exists():
-        shutil.copy(predictor, folder / "predictor.pt")
+    if not checkpoint_file(folder, "predictor").exists():
+        shutil.copy(predictor, folder)
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
         for job in [pool.submit(_train, p, dataset, folder, model, training, begin_with) for p in ("upper", "lower")]:
             job.result()
@@ -112,17 +112,16 @@ def main() -> None:
     parser.add_argument("--from", dest="begin_with", type=Path, metavar="WEIGHTS")
     options = parser.parse_args()
     begin_with = load_weights(options.begin_with) if options.begin_with else None
-    torch.set_num_threads(max(1, (os.cpu_count() or 2)))
     precision.announce(TRAINING.mixed)
     clips = captured(held_out(options.folder))[:: options.every]
     first = options.output / "predictor"
-    if not (first / "predictor.pt").exists():
+    if not checkpoint_file(first, "predictor").exists():
         train_part("predictor", options.dataset, first, MODEL, replace(TRAINING, minutes_predictor=2.0))
     results: dict[str, dict[str, Any]] = {}
     for name, (changed, _) in VARIANTS.items():
         if begin_with is not None and changed.keys() & {"shared_encoder", "mask"}:
             continue
-        predictor = first / "predictor.pt"
+        predictor = checkpoint_file(first, "predictor")
         results[name] = variant(name, options.dataset, options.output, options.minutes, predictor, clips, begin_with)
         (options.output / "ablation.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
         (options.output / "ablation.md").write_text(table(results) + "\n", encoding="utf-8")

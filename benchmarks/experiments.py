@@ -27,7 +27,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from dafnet_addon.baselines.flows import parts_of
 from dafnet_addon.baselines.samp import SMALL_SAMP, SampConfig
@@ -39,6 +38,7 @@ from dafnet_addon.data.held_out import HeldClip, held_out
 from dafnet_addon.data.paper_test import paper_test
 from dafnet_addon.model.config import SMALL, ModelConfig
 from dafnet_addon.training import precision
+from dafnet_addon.training.checkpoints import Checkpoint, checkpoint_file
 from dafnet_addon.training.evaluate import Measured, captured, measured, row
 from dafnet_addon.training.export import export
 from dafnet_addon.training.processes import spread_out
@@ -89,7 +89,7 @@ def _at(runs: Path, budget: str) -> Path:
 
 def _train(dataset: Path, samp: SampConfig, job: Job) -> None:
     if job.part in NETWORKS:
-        train_samp(job.part, samp, dataset, job.folder / f"{job.part}.pt", replace(job.training, batch=32))
+        train_samp(job.part, samp, dataset, checkpoint_file(job.folder, job.part), replace(job.training, batch=32))
     else:
         train_part(job.part, dataset, job.folder, job.model, job.training, threads=1)
 
@@ -115,7 +115,7 @@ def train(
 ) -> None:
     """Train every system with its budgets; ``minutes`` of one core for each whole system, the shared predictor not counted."""
     first = runs / "predictor"
-    if not (first / "predictor.pt").exists():
+    if not checkpoint_file(first, "predictor").exists():
         train_part("predictor", dataset, first, model, training)
     for budget in BUDGETS:
         spent = replace(training, minutes_flow=minutes)
@@ -126,8 +126,8 @@ def train(
         jobs = list(_jobs(runs, budget, model, spent))
         for job in jobs:
             job.folder.mkdir(parents=True, exist_ok=True)
-            if job.model.predicts and not (job.folder / "predictor.pt").exists():
-                shutil.copy(first / "predictor.pt", job.folder)
+            if job.model.predicts and not checkpoint_file(job.folder, "predictor").exists():
+                shutil.copy(checkpoint_file(first, "predictor"), job.folder)
         list(spread_out(partial(_train, dataset, samp), jobs, processes))
         for folder in {job.folder for job in jobs if job.part not in NETWORKS}:
             flow, predictor, statistics = trained(folder)
@@ -137,8 +137,9 @@ def train(
 
 def steps_of(folder: Path) -> str:
     """How many steps each network in a run's folder took."""
-    files = [file for part in ("upper", "lower", "whole", *NETWORKS) if (file := folder / f"{part}.pt").exists()]
-    return " + ".join(str(torch.load(file, weights_only=False, map_location="cpu")["step"]) for file in files) or "–"
+    parts = ("upper", "lower", "whole", *NETWORKS)
+    files = [file for part in parts if (file := checkpoint_file(folder, part)).exists()]
+    return " + ".join(str(Checkpoint.read(file).progress()[0]) for file in files) or "–"
 
 
 Measuring = Callable[[Sequence[HeldClip]], list[Measured]]
@@ -157,7 +158,7 @@ def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
     for budget in BUDGETS[:1] if table == "table1" else BUDGETS:
         at = _at(runs, budget)
         for name, (network, kind) in SAMP.items() if table == "table1" else ():
-            file = at / network / f"{network}.pt"
+            file = checkpoint_file(at / network, network)
             out[f"{name}, {budget}"] = steps_of(file.parent), partial(measured_samp, file, kind)
         for name, changed in compared.items():
             if budget != BUDGETS[0] and name not in (*(("MoGlow",) if budget == BUDGETS[1] else ()), *STEPPED):

@@ -273,7 +273,7 @@ def _evaluate(options: argparse.Namespace) -> None:
     from .training.report import contact_sheets, report, text
 
     clips = held_out(options.folder)
-    if options.weights and options.weights.suffix == ".pt":
+    if options.weights and options.weights.suffix in (".checkpoint", ".pt"):
         _evaluate_samp(options, clips)
         return
     weights = load_weights(options.weights)

@@ -150,14 +150,14 @@ def test_resuming_is_exact(dataset, tmp_path):
 def test_a_loss_that_is_no_number_stops_with_the_last_good_state(dataset, tmp_path):
     folder = tmp_path / "run"
     _until("predictor", dataset, folder, steps=2)
-    before = (folder / "predictor.pt").read_bytes()
+    before = (folder / "predictor.checkpoint").read_bytes()
     with np.load(dataset / "pool-0000.npz") as z:
         pool = {name: z[name] for name in z.files}
     pool["velocity"] = pool["velocity"] * np.nan
     np.savez(dataset / "pool-0000.npz", **pool)
     with pytest.raises(InputError, match="no number"):
         train_part("predictor", dataset, folder, TINY, _config(2))
-    assert (folder / "predictor.pt").read_bytes() == before
+    assert (folder / "predictor.checkpoint").read_bytes() == before
 
 
 def test_what_is_exported_is_what_was_trained(dataset, tmp_path):
@@ -258,7 +258,14 @@ def test_configurations_are_read_and_bad_ones_refused(tmp_path):
         model, config = read_config(file)
         assert model.actions == 10 and config.batch > 0
     bad = tmp_path / "bad.toml"
-    for text, words in (("preset = 'huge'", "unknown"), ("[model]\nwidht = 3", "unknown setting"), ("= 3", "cannot be read")):
+    for text, words in (
+        ("= 3", "cannot be read"), ("preset = 'huge'", "unknown"), ("preset = [1]", "unknown"),
+        ("[model]\nwidht = 3", "unknown setting"), ("model = 3", "unknown setting 'model'"),
+        ("[modle]\nwidth = 3", "unknown setting 'modle'"), ("training = 3", "by name"),
+        ("[model]\nwidth = 'wide'", "'width'"), ("[model]\nwidth = 0", "'width' must be"),
+        ("[training]\nbatch = 0", "'batch' must be"), ("[training]\nmixed = 1", "'mixed'"),
+        ("[training]\npeak = nan", "'peak'"),
+    ):
         bad.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=words):
             read_config(bad)

@@ -7,7 +7,7 @@ poses alone (section 6.1: it "failed to generate plausible motions").
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -74,6 +74,11 @@ class SampConfig:
     latent: int = 64
     frames: int = 60
     mixed: bool = False
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if name != "mixed" and not 1 <= value <= 1 << 16:
+                raise ValueError(f"'{name}' must be 1 to {1 << 16}")
 
 
 PAPER_SAMP = SampConfig()

@@ -8,8 +8,9 @@ from pathlib import Path
 import torch
 
 from ..core.errors import InputError
-from ..training.train import TrainingConfig, checkpoint, clock_of, dataset_pool, descend
-from .samp import MotionNet, SampConfig, SampTraining, network_of
+from ..training.checkpoints import Checkpoint, generators, of_training, write_checkpoint
+from ..training.train import TrainingConfig, clock_of, dataset_pool, descend
+from .samp import KINDS, MotionNet, SampConfig, SampTraining, network_of
 
 __all__ = ["load_samp", "train_samp"]
 
@@ -21,21 +22,21 @@ def train_samp(
     """Train "samp" or "samp-ob", or go on with it, until its budget is spent; the number of steps that it took.
 
     ``file`` is saved as it goes; a loss that is no number stops the run with the last good state kept. Raises InputError then,
-    and without a dataset.
+    without a dataset, and where ``file`` is another network's.
     """
     torch.set_num_threads(threads)
     torch.manual_seed(training.seed)
     pool = dataset_pool(dataset)
-    run = SampTraining(kind, config, pool.statistics(), "cpu", pool)
+    device = torch.device("cpu")
+    run = SampTraining(kind, config, pool.statistics(), device, pool)
     optimiser = torch.optim.Adam(run.network.parameters(), lr=training.peak)
     step, seconds = 0, 0.0
     if file.exists():
-        state = torch.load(file, weights_only=True)
-        run.network.load_state_dict(state["network"])
-        optimiser.load_state_dict(state["optimiser"])
-        step, seconds = state["step"], state["seconds"]
-        torch.set_rng_state(state["generator"])
-    clock, losses = clock_of(torch.device("cpu")), []
+        kept = Checkpoint.read(file)
+        kept.restore(run.network, optimiser)
+        step, seconds = kept.progress()
+        kept.set_generators(device)
+    clock, losses = clock_of(device), []
     while (share := training.share(step, seconds)) < 1.0:
         begin = clock()
         loss = run.loss(pool, torch.randint(len(pool), (training.batch,)), share)
@@ -46,18 +47,22 @@ def train_samp(
             mean = sum(losses) / len(losses)
             if not math.isfinite(mean):
                 raise InputError(f"The loss of '{kind}' is no number by step {step}; resume with a lower peak rate.")
-            checkpoint(file, {
-                "kind": kind, "config": asdict(config), "network": run.network.state_dict(),
-                "optimiser": optimiser.state_dict(), "step": step, "seconds": seconds, "generator": torch.get_rng_state(),
-            })
+            drawn = {f"generator.{name}": state for name, state in generators(device).items()}
+            state = {"kind": kind, "config": asdict(run.config), "step": step, "seconds": seconds}
+            write_checkpoint(file, {**of_training(run.network, optimiser), **drawn}, state)
             progress(training.share(step, seconds), mean)
             losses.clear()
     return step
 
 
 def load_samp(file: Path) -> tuple[str, MotionNet]:
-    """The kind and the network of a checkpoint."""
-    state = torch.load(file, weights_only=True)
-    network = network_of(state["kind"], SampConfig(**state["config"]))
-    network.load_state_dict(state["network"])
-    return state["kind"], network
+    """The kind and the network of a checkpoint. Raises InputError where it is none of SAMP's, or damaged."""
+    kept = Checkpoint.read(file)
+    if kept.state.get("kind") not in KINDS:
+        raise kept.refused("it holds none of SAMP's networks")
+    kind, config = kept.text("kind"), kept.settings(SampConfig, "config")
+    with torch.device("meta"):
+        kept.fits(network_of(kind, config))
+    network = network_of(kind, config)
+    kept.restore(network)
+    return kind, network

@@ -2,9 +2,12 @@
 
 from dataclasses import asdict, dataclass
 
-__all__ = ["ModelConfig", "PAPER", "SMALL", "UPPER_SIZE", "LOWER_SIZE", "POSE_SIZE", "VELOCITY_SIZE", "SENSOR_SIZE"]
+__all__ = [
+    "ModelConfig", "PAPER", "SMALL", "UPPER_SIZE", "LOWER_SIZE", "POSE_SIZE", "VELOCITY_SIZE", "AHEAD_SIZE", "SENSOR_SIZE",
+]
 
-POSE_SIZE, UPPER_SIZE, LOWER_SIZE, VELOCITY_SIZE, SENSOR_SIZE = 66, 42, 24, 3, 2640
+POSE_SIZE, UPPER_SIZE, LOWER_SIZE, VELOCITY_SIZE, AHEAD_SIZE, SENSOR_SIZE = 66, 42, 24, 3, 18, 2640
+_MOST = {"steps_upper": 64, "steps_lower": 64, "steps_whole": 64, "layers": 16, "history": 70, "ahead": AHEAD_SIZE}
 
 
 @dataclass(frozen=True)
@@ -19,6 +22,8 @@ class ModelConfig:
     ``mask``: 22 values beside the observation say which joints are given. ``action_temperature``: softmax temperature after
     training (paper, section 4.2). ``history``: past frames that the predictor (and MoGlow) sees. ``ahead``: numbers that tell
     the flow where the root will be (``core.root.ahead``), or 0 as in the paper.
+
+    Raises ValueError where a size is out of its range.
     """
 
     system: str = "dafnet"
@@ -37,6 +42,14 @@ class ModelConfig:
     action_temperature: float = 0.7
     history: int = 10
     ahead: int = 0
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            least, most = 0 if name == "ahead" else 1, _MOST.get(name, 1 << 16)
+            if type(value) is int and not least <= value <= most:
+                raise ValueError(f"'{name}' must be {least} to {most}")
+        if not self.action_temperature > 0.0:
+            raise ValueError("'action_temperature' must be above 0")
 
     @property
     def predicts(self) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from ..core.errors import WeightsError
+from ..core.files import whole_file
 from ..core.skeleton import JOINTS, OFFSETS
 from ..core.weights import FORMAT, Weights, quantised, read_safetensors, write_safetensors
 from ..model.config import VELOCITY_SIZE, ModelConfig
@@ -105,12 +106,12 @@ def export(
         else:
             tensors[name], tensors[f"{name}.scale"] = quantised(array)
     tensors |= {f"{part}.spread": matrix for part, matrix in (spread or {}).items()}
-    write_safetensors(file, tensors, {"format": FORMAT, "config": json.dumps(description), **words})
+    with whole_file(file) as part:
+        write_safetensors(part, tensors, {"format": FORMAT, "config": json.dumps(description), **words})
 
 
 def annotate(file: Path, words: Mapping[str, str]) -> None:
     """Add to, or replace, words of a weights file's metadata; its tensors stay as they are, to the bit."""
     tensors, metadata = read_safetensors(file)
-    part = file.with_suffix(".part")
-    write_safetensors(part, tensors, {**metadata, **words})
-    part.rename(file)
+    with whole_file(file) as part:
+        write_safetensors(part, tensors, {**metadata, **words})

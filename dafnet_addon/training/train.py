@@ -1,14 +1,13 @@
 """Trains the action predictor, then the two-part flow on top of it (paper, section 5.1, figure 7).
 
-A run lives in a folder: ``predictor.pt``, ``upper.pt``, ``lower.pt`` (each resumes exactly where it was saved), ``log.jsonl``,
-and ``tensorboard``.
+A run lives in a folder: ``predictor.checkpoint``, ``upper.checkpoint``, ``lower.checkpoint`` (each resumes exactly where it
+was saved), ``log.jsonl``, and ``tensorboard``.
 Time, not steps, is the budget: the learning rate follows the share of the minutes that is spent.
 """
 
 import json
 import math
 import multiprocessing
-import os
 import time
 import tomllib
 from collections.abc import Callable
@@ -17,24 +16,45 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from torch import nn
 
 from ..baselines.flows import flow_of, parts_of
 from ..core.errors import InputError
 from ..core.weights import Weights
-from ..model.config import LOWER_SIZE, PAPER, POSE_SIZE, SMALL, UPPER_SIZE, ModelConfig
+from ..model.config import (
+    AHEAD_SIZE,
+    LOWER_SIZE,
+    PAPER,
+    POSE_SIZE,
+    SMALL,
+    UPPER_SIZE,
+    VELOCITY_SIZE,
+    ModelConfig,
+)
 from ..model.flow import BodyFlow, Coupling, EnvironmentEncoder
 from ..model.predictor import GMVAE, ActionPredictor, gumbel_temperature
 from . import precision, ranks
 from .batches import Batch, Pool, Statistics, observation_for
+from .checkpoints import (
+    Checkpoint,
+    checkpoint_file,
+    generators,
+    of_training,
+    set_generators,
+    typed,
+    write_checkpoint,
+)
 from .export import adopt_part, adopt_predictor, adopted_statistics
 from .free_run import lower_loss, upper_loss
 
 __all__ = [
-    "TrainingConfig", "read_config", "Run", "account", "checkpoint", "clock_of", "dataset_pool", "descend", "train",
-    "train_part", "trained",
+    "TrainingConfig", "read_config", "Run", "account", "clock_of", "dataset_pool", "descend", "train", "train_part", "trained",
 ]
+
+_MOST_NUMBERS = 1 << 28
+"""Of the networks that a checkpoint's settings describe: a GB; the paper's sizes are a seventh of it."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +88,12 @@ class TrainingConfig:
     save_every: int = 100
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            least = 1 if name in ("batch", "warmup", "save_every") else 0
+            if value < least:
+                raise ValueError(f"'{name}' must be {least} or more")
+
     def share(self, step: int, seconds: float) -> float:
         """Share of the flow's budget that is spent."""
         return min(1.0, step / self.steps_flow if self.steps_flow else seconds / max(60.0 * self.minutes_flow, 1e-9))
@@ -79,19 +105,24 @@ class TrainingConfig:
 
 
 def read_config(file: Path) -> tuple[ModelConfig, TrainingConfig]:
-    """Model and training configuration of a TOML file: ``preset``, ``[model]`` and ``[training]`` override the defaults."""
+    """Model and training configuration of a TOML file: ``preset``, ``[model]`` and ``[training]`` override the defaults.
+
+    Raises InputError where the file cannot be read, or a setting is unknown, of another type or out of range.
+    """
     try:
         table = tomllib.loads(Path(file).read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError) as error:
         raise InputError(f"The configuration '{file}' cannot be read ({error}); check the path and its TOML.") from error
-    presets = {"paper": PAPER, "small": SMALL}
-    if table.get("preset", "small") not in presets:
-        raise InputError(f"The preset '{table['preset']}' is unknown; use one of {', '.join(presets)}.")
+    presets = {"paper": PAPER.as_dict(), "small": SMALL.as_dict()}
+    preset, given, training = table.pop("preset", "small"), table.pop("model", {}), table.pop("training", {})
+    if not isinstance(preset, str) or preset not in presets:
+        raise InputError(f"The preset '{preset}' is unknown; use one of {', '.join(presets)}.")
     try:
-        model = replace(presets[table.get("preset", "small")], **table.get("model", {}))
-        return model, TrainingConfig(**table.get("training", {}))
-    except TypeError as error:
-        raise InputError(f"The configuration '{file}' has an unknown setting ({error}); remove it.") from error
+        if table or not isinstance(given, dict):
+            raise ValueError(f"unknown setting '{min(table, default='model')}' outside of [model] and [training]")
+        return typed(ModelConfig, {**presets[preset], **given}), typed(TrainingConfig, training)
+    except ValueError as error:
+        raise InputError(f"The configuration '{file}' cannot be used ({error}); change it there.") from None
 
 
 class Run:
@@ -136,26 +167,39 @@ class Run:
         return self.config.share(self.step, self.seconds)
 
     def save(self) -> None:
-        state = {
-            "model": self.model.as_dict(), "config": asdict(self.config), "statistics": asdict(self.statistics),
-            "network": self.network.state_dict(), "optimiser": self.optimiser.state_dict(), "step": self.step,
-            "seconds": self.seconds, "adopted": self.adopted, "generators": _generators(self.device),
+        """Keep the run as it is, to be gone on with exactly from here."""
+        statistics = {name: torch.from_numpy(value.astype(float)) for name, value in asdict(self.statistics).items()}
+        tensors = {
+            **of_training(self.network, self.optimiser),
+            **{f"generator.{name}": state for name, state in generators(self.device).items()},
+            **{f"statistics.{name}": values for name, values in statistics.items()},
         }
-        checkpoint(self.folder / f"{self.part}.pt", state)
+        write_checkpoint(checkpoint_file(self.folder, self.part), tensors, {
+            "model": self.model.as_dict(), "config": asdict(self.config), "step": self.step, "seconds": self.seconds,
+            "adopted": self.adopted,
+        })
 
     @staticmethod
     def load(part: str, folder: Path, config: TrainingConfig | None = None, device: str = "cpu") -> "Run":
-        """The run saved in ``folder``; ``config`` replaces its settings, a longer budget for example."""
-        # The checkpoint is the trainer's own file, holding optimiser and generator states; weights that ship are never pickled.
-        state = torch.load(folder / f"{part}.pt", weights_only=False, map_location="cpu")
-        run = Run(
-            part, folder, ModelConfig(**state["model"]), config or TrainingConfig(**state["config"]),
-            Statistics(**state["statistics"]), device,
-        )
-        run.network.load_state_dict(state["network"])
-        run.optimiser.load_state_dict(state["optimiser"])
-        run.step, run.seconds, run.adopted = state["step"], state["seconds"], state["adopted"]
-        _set_generators(state["generators"], run.device)
+        """The run saved in ``folder``; ``config`` replaces its settings, a longer budget for example.
+
+        Raises InputError where the checkpoint is missing, damaged, of an earlier version, or does not fit itself.
+        """
+        kept = Checkpoint.read(checkpoint_file(folder, part))
+        model = kept.settings(ModelConfig, "model")
+        if part != "predictor" and part not in parts_of(model):
+            raise kept.refused(f"its model has no part '{part}'")
+        with torch.device("meta"):
+            gmvae, flow = GMVAE(model), flow_of(model)
+            if sum(p.numel() for network in (gmvae, flow) for p in network.parameters()) > _MOST_NUMBERS:
+                raise kept.refused("its model is too large")
+            kept.fits(gmvae if part == "predictor" else flow.parts()[part])
+        settings = config or kept.settings(TrainingConfig, "config")
+        run = Run(part, folder, model, settings, _statistics_of(kept), device)
+        kept.restore(run.network, run.optimiser)
+        run.step, run.seconds = kept.progress()
+        run.adopted = kept.text("adopted")
+        kept.set_generators(run.device)
         return run
 
     def hidden(self, occupancy: torch.Tensor) -> torch.Tensor:
@@ -225,26 +269,24 @@ class Run:
     @torch.no_grad()
     def held_loss(self, held: Pool, windows: int = 50) -> float:
         """The loss on unseen bodies, with the same draws each time."""
-        state = _generators(self.device)
+        state = generators(self.device)
         torch.manual_seed(1)
         rows = torch.arange(min(windows, len(held)))
         loss = float(self.loss(held.batch(rows, self.statistics, self.model)))
-        _set_generators(state, self.device)
+        set_generators(state, self.device)
         return loss
 
 
-def _generators(device: torch.device) -> dict[str, torch.Tensor]:
-    """States of the generators that draw: the CPU's and the device's."""
-    states = {"cpu": torch.get_rng_state()}
-    if device.type == "cuda":
-        states["cuda"] = torch.cuda.get_rng_state(device)
-    return states
-
-
-def _set_generators(states: dict[str, torch.Tensor], device: torch.device) -> None:
-    torch.set_rng_state(states["cpu"])
-    if device.type == "cuda" and "cuda" in states:
-        torch.cuda.set_rng_state(states["cuda"], device)
+def _statistics_of(kept: Checkpoint) -> Statistics:
+    """What a checkpoint's run standardises with. Raises InputError where it is nothing to standardise with."""
+    found = {}
+    for what, size in (("pose", POSE_SIZE), ("velocity", VELOCITY_SIZE), ("ahead", AHEAD_SIZE)):
+        for name in (f"{what}_mean", f"{what}_std"):
+            values = kept.tensor(f"statistics.{name}", torch.empty(size, dtype=torch.double)).numpy()
+            if not np.isfinite(values).all() or (name.endswith("std") and (values <= 0.0).any()):
+                raise kept.refused(f"'statistics.{name}' cannot be divided by or added")
+            found[name] = values
+    return Statistics(**found)
 
 
 def dataset_pool(dataset: Path, device: str = "cpu") -> Pool:
@@ -258,14 +300,6 @@ def dataset_pool(dataset: Path, device: str = "cpu") -> Pool:
 def clock_of(device: torch.device) -> Callable[[], float]:
     """Seconds that count: a processor's own, so that other work takes nothing from the training; else the clock's."""
     return time.monotonic if device.type != "cpu" else lambda: time.process_time() / torch.get_num_threads()
-
-
-def checkpoint(file: Path, state: dict[str, Any]) -> None:
-    """Save a trainer's own state, whole or not at all."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    part = file.with_suffix(".part")
-    torch.save(state, part)
-    part.rename(file)
 
 
 def descend(
@@ -302,7 +336,7 @@ def train_part(
     pool = dataset_pool(dataset, device)
     held = Pool(lambda: [Path(dataset) / "held.npz"], torch.device(device))
     predictor = None if part == "predictor" or not model.predicts else Run.load("predictor", folder, device=device)
-    if (folder / f"{part}.pt").exists():
+    if checkpoint_file(folder, part).exists():
         run = Run.load(part, folder, config, device)
     else:
         # All parts are standardised alike, whatever shards there were when each began.
@@ -342,12 +376,13 @@ def train_part(
                     "part": part, "step": run.step, "minutes": run.seconds / 60, "loss": mean, "held_out": held_out,
                     "windows": len(pool),
                 }
+                progress(part, run.share, mean)
+                run.save()
+                # The log comes after what it tells of: what a killed process had not saved is told once, by the next one.
                 with (folder / "log.jsonl").open("a", encoding="utf-8") as f:
                     f.write(json.dumps(values) + "\n")
                 for name in ("loss", "held_out", "windows"):
                     writer.add_scalar(name, values[name], run.step)
-                progress(part, run.share, mean)
-                run.save()
             recent.clear()
             pool.refresh()
     return run
@@ -373,7 +408,7 @@ def train(
         for part in names:
             train_part(part, dataset, folder, model, config, device=device, begin_with=begin_with)
         return
-    threads = max(1, (os.cpu_count() or 2) // len(names))
+    threads = max(1, torch.get_num_threads() // len(names))
     with ProcessPoolExecutor(len(names), mp_context=multiprocessing.get_context("spawn")) as pool:
         begin = time.monotonic()
         parts = [
@@ -401,7 +436,7 @@ def trained(folder: Path) -> tuple[BodyFlow, ActionPredictor | None, Statistics]
 def _checkpoints(folder: Path) -> dict[str, Run]:
     """The latest checkpoints of a run's folder, the predictor's first."""
     parts = ("predictor", "upper", "lower", "whole")
-    return {part: Run.load(part, folder) for part in parts if (folder / f"{part}.pt").exists()}
+    return {part: Run.load(part, folder) for part in parts if checkpoint_file(folder, part).exists()}
 
 
 def account(folder: Path, dataset: Path) -> dict[str, str]:
