@@ -19,11 +19,14 @@ from typing import TYPE_CHECKING, Any
 
 from .core.errors import DafnetError, InputError
 from .core.take import MODES
+from .core.text import printable
 
 if TYPE_CHECKING:
     from .data.held_out import HeldClip
 
 __all__ = ["main", "run"]
+
+_SHOWN = 2000  # characters of each thing that ``info`` prints; --json gives all
 
 
 def main(argv: Sequence[str] | None = None, in_blender: bool = False) -> int:
@@ -213,16 +216,12 @@ def _info(options: argparse.Namespace) -> None:
         "file": str(weights.path), "bytes": weights.path.stat().st_size,
         "parameters": sum(int(tensor.size) for tensor in weights.tensors.values()),
     }
-    for key, value in sorted(weights.metadata.items()):
-        try:
-            described[key] = json.loads(value)
-        except ValueError:
-            described[key] = value
+    described |= {key: weights.says(key) for key in sorted(weights.metadata) if key not in described}
     if options.json:
         print(json.dumps(described, indent=2))
         return
     for key, value in described.items():
-        print(f"{key}: {value if isinstance(value, str | int) else json.dumps(value)}")
+        print(f"{printable(key)}: {printable(value if isinstance(value, str) else json.dumps(value), _SHOWN)}")
 
 
 def _prepare(options: argparse.Namespace) -> None:

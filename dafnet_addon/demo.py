@@ -81,7 +81,7 @@ def demo_report(
     report = {
         "seats": seat_report(take.joints, path, take.fps, SEATS),
         "standing_pelvis_height": standing_pelvis_height(take.joints, path, take.fps),
-        "metrics": {"generated": generated, "ground_truth": json.loads(weights.metadata.get("ground_truth", "{}"))},
+        "metrics": {"generated": generated, "ground_truth": weights.says("ground_truth") or {}},
         "note": "ground_truth was measured on held-out motion capture with the same code; the weights file carries it.",
         "seconds": seconds,
     }

@@ -189,7 +189,9 @@ def test_lower_noise_leaves_the_upper_body_alone_at_the_first_frame(weights):
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"layers": 0}, "size"), ({"steps_upper": -1}, "size"), ({"width": float("inf")}, "size"), ({"code": "many"}, "size"),
+        ({"layers": 0}, "'layers'"), ({"steps_upper": -1}, "'steps_upper'"), ({"width": float("inf")}, "'width'"),
+        ({"code": "many"}, "'code'"), ({"history": True}, "'history'"), ({"mask": 1}, "'mask'"), ({"ahead": 18.0}, "'ahead'"),
+        ({"history": 65536}, "'history'"), ({"system": ["dafnet"]}, "system"),
         ({"action_temperature": 0}, "temperature"), ({"action_temperature": float("nan")}, "temperature"),
     ],
 )

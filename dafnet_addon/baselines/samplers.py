@@ -49,4 +49,5 @@ def sampler_of(weights: Weights, device: str | None = None) -> Sampler:
     """The sampler of the system that the weights are of. Raises WeightsError where the file does not fit it."""
     model = weights.config.get("model")
     system = model.get("system", "dafnet") if isinstance(model, dict) else "dafnet"
-    return _SAMPLERS.get(system, Sampler)(weights, device)
+    known = isinstance(system, str) and system in _SAMPLERS
+    return (_SAMPLERS[system] if known else Sampler)(weights, device)

@@ -16,6 +16,7 @@ import numpy as np
 from ..core.errors import InputError
 from ..core.progress import drained
 from ..core.root import POSITION_SIGMA, YAW_SIGMA, root_from_joints, root_from_matrices, smoothed, to_root, to_world
+from ..core.rotations import normalised
 from ..core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
 from ..core.solids import Scene
 from ..core.take import Controls
@@ -206,7 +207,7 @@ def _told(
 
 
 def _rigid(matrices: np.ndarray, unit: float, what: str) -> np.ndarray:
-    """Matrices (T, 4, 4) in metres and without scale; x is made to fit y and z."""
+    """Matrices (T, 4, 4) in metres, without scale and shear: y stays as it is, z and then x are made to fit it."""
     if not np.isfinite(matrices).all():
         raise InputError(f"The {what} has a transform that is not a number; clear its transform or fix what drives it.")
     length = np.linalg.norm(matrices[:, :3, :3], axis=1, keepdims=True)
@@ -214,6 +215,8 @@ def _rigid(matrices: np.ndarray, unit: float, what: str) -> np.ndarray:
         raise InputError(f"The {what} is scaled to zero; give it a scale.")
     out = matrices.copy()
     out[:, :3, :3] /= length
+    y, z = out[:, :3, 1], out[:, :3, 2]
+    out[:, :3, 2] = normalised(z - (y * z).sum(axis=1, keepdims=True) * y)
     out[:, :3, 0] = np.cross(out[:, :3, 1], out[:, :3, 2])
     out[:, :3, 3] *= unit
     return out

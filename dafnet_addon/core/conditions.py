@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .checks import in_frames
 from .distance import prepared_steps, rigid_split, scaled
 from .errors import InputError
 from .occupancy import distance, occupancy_steps
@@ -16,7 +17,7 @@ from .sampler import Conditions
 from .sensor import SPHERES
 from .skeleton import END_EFFECTORS, MODEL_ORDER, UPPER
 from .solids import Box, Mesh, Scene
-from .take import MODES, Controls
+from .take import Controls
 
 __all__ = ["Shot", "over_a_seat", "shot_steps", "PREROLL"]
 
@@ -46,34 +47,6 @@ class Shot:
     scene: Scene
     share: np.ndarray
     warnings: tuple[str, ...]
-
-
-def _checked_modes(mode: str | object, frames: int) -> np.ndarray:
-    modes = np.array([mode] * frames if isinstance(mode, str) else list(mode))  # type: ignore[call-overload]
-    wrong = sorted(set(modes.tolist()) - set(MODES))
-    if wrong:
-        raise InputError(f"The mode '{wrong[0]}' is unknown; use FREE, EE or FULL.")
-    if len(modes) != frames:
-        raise InputError(f"There are {len(modes)} modes for {frames} frames; give one word, or one for each frame.")
-    return modes
-
-
-def _check(controls: Controls) -> None:
-    frames = len(controls)
-    if np.shape(controls.root) != (frames, 4, 4) or frames == 0:
-        raise InputError("The root must be one 4 × 4 matrix for each frame; give at least one frame.")
-    if not np.isfinite(controls.root).all():
-        bad = int(np.flatnonzero(~np.isfinite(controls.root).all(axis=(1, 2)))[0])
-        raise InputError(f"The root's transform is not a number at frame {bad}; fix its keys, drivers or constraints.")
-    if not np.isfinite(controls.fps) or controls.fps <= 0:
-        raise InputError(f"The frame rate is {controls.fps}; give a positive number of frames a second.")
-    if not np.isfinite(controls.scale) or controls.scale <= 0:
-        raise InputError(f"The character's scale is {controls.scale}; give a positive number.")
-    shapes = {"upper_body": (frames, len(UPPER), 3), **dict.fromkeys(END_EFFECTORS, (frames, 3))}
-    for name, shape in shapes.items():
-        value = getattr(controls, name)
-        if value is not None and np.shape(value) != shape:
-            raise InputError(f"'{name}' has the shape {np.shape(value)}; it must be {shape}, like the root's frames.")
 
 
 def _path_of(controls: Controls, times: np.ndarray, target: np.ndarray, warnings: list[str]) -> RootPath:
@@ -189,9 +162,12 @@ def over_a_seat(occupancy: np.ndarray) -> bool:
 
 def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]:
     """Everything that the model is told; yields progress in [0, 1], solid by solid. Raises InputError for bad controls."""
-    _check(controls)
+    if not isinstance(scene, Scene) or not isinstance(controls, Controls):
+        raise InputError("What is to be generated is not given as a Scene and Controls; make one of each.")
+    for solid in scene.solids:
+        in_frames(solid.matrices() if isinstance(solid, Box) else solid.matrix, solid.name, len(controls))
     warnings: list[str] = []
-    modes = _checked_modes(controls.mode, len(controls))
+    modes = np.array([controls.mode] * len(controls) if isinstance(controls.mode, str) else controls.mode)
     frames = covering_frames(len(controls), controls.fps)
     times, target = frame_times(len(controls), controls.fps), frame_times(frames, MODEL_FPS)
     path = _path_of(controls, times, target, warnings)

@@ -7,9 +7,10 @@ from time import perf_counter
 
 import numpy as np
 
+from .checks import MOST_SEED, number, whole
 from .cleanup import CleanUp, cleaning_steps
 from .conditions import PREROLL, Shot, shot_steps
-from .errors import InputError, WeightsError
+from .errors import InputError
 from .kinematics import blend_switches, fit, forward_kinematics, global_from_local, local_from_global
 from .metrics import summary
 from .occupancy import distance, tops_under
@@ -41,7 +42,10 @@ _CONDITIONED, _SAMPLED = 0.15, 0.85
 
 @dataclass(frozen=True)
 class Draw:
-    """What one take is drawn with: ``seed`` and ``temperature``; the legs may have their own, None goes with the body's."""
+    """What one take is drawn with: ``seed`` and ``temperature``; the legs may have their own, None goes with the body's.
+
+    Seeds are whole numbers from 0 to ``MOST_SEED``, temperatures from 0 to 10. Raises InputError for others.
+    """
 
     seed: int = 0
     lower_seed: int | None = None
@@ -49,9 +53,13 @@ class Draw:
     lower_temperature: float | None = None
 
     def __post_init__(self) -> None:
-        for temperature in (self.temperature, self.lower_temperature):
-            if temperature is not None and not 0 <= temperature <= _HOTTEST:
-                raise InputError(f"The temperature is {temperature}; give 0 or a small positive number such as 1.")
+        hold = partial(object.__setattr__, self)
+        hold("seed", whole(self.seed, "The seed", 0, MOST_SEED))
+        hold("temperature", number(self.temperature, "The temperature", 0.0, _HOTTEST))
+        if self.lower_seed is not None:
+            hold("lower_seed", whole(self.lower_seed, "The seed of the legs", 0, MOST_SEED))
+        if self.lower_temperature is not None:
+            hold("lower_temperature", number(self.lower_temperature, "The temperature of the legs", 0.0, _HOTTEST))
 
 
 def _kept(resume: Take, frame: int, path: RootPath) -> np.ndarray:
@@ -185,8 +193,6 @@ def takes_steps(
         calm = yield from within(sampler.run(without, np.zeros((1, 66))), _CONDITIONED, sampling)
         conditions = _led_over(conditions, shot.share, model_order(calm.poses[:, 0]))
     made = yield from within(sampler.run(conditions, z, kept, shown), sampling, _SAMPLED)
-    if not np.isfinite(made.poses).all():
-        raise WeightsError(f"The weights '{weights.path}' give poses that are no numbers; choose another file.")
     seconds = {"conditions": conditioned - started, "sampling": perf_counter() - conditioned}
 
     source, target = frame_times(len(shot.path), MODEL_FPS), frame_times(len(controls), controls.fps)

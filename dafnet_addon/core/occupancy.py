@@ -10,8 +10,8 @@ from functools import partial
 
 import numpy as np
 
+from .checks import in_frames
 from .distance import BAND, FLOOR, grid_of, rigid_split
-from .errors import InputError
 from .progress import drained
 from .root import RootPath
 from .rotations import rotate, transpose
@@ -45,10 +45,7 @@ def _fields(scene: Scene, floor: np.ndarray, reach: float) -> Iterator[_Field]:
     frames = len(floor)
     for solid in scene.solids:
         matrices = solid.matrices() if isinstance(solid, Box) else rigid_split(solid.matrix)[0]
-        if matrices.ndim == 3 and len(matrices) not in (1, frames):
-            raise InputError(
-                f"'{solid.name}' has {len(matrices)} frames and the root {frames}; give it one matrix or one a frame."
-            )
+        in_frames(matrices, solid.name, frames)
         matrices = np.broadcast_to(matrices, (frames, 4, 4))
         rotation, position = matrices[:, :3, :3], matrices[:, :3, 3]
         if isinstance(solid, Box):

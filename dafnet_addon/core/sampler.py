@@ -4,21 +4,23 @@ Everything that is known in advance (occupancy, velocity, observation) goes thro
 frames at once; only the recurrent part and the action predictor, which looks at the poses just made, are left per frame.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from .errors import WeightsError
+from .checks import shaped
+from .errors import InputError, WeightsError
 from .progress import drained, within
 from .root import AHEAD
 from .skeleton import LOWER, MODEL_ORDER, OFFSETS, UPPER
+from .text import printable
 from .threads import one_thread
 from .weights import Weights
 
-__all__ = ["Conditions", "Made", "Sampler", "model_order", "smpl_order", "velocities_up_to"]
+__all__ = ["MOST_ACTIONS", "Conditions", "Made", "Sampler", "model_order", "smpl_order", "velocities_up_to"]
 
 Array = Any  # numpy.ndarray or torch.Tensor
 
@@ -26,7 +28,17 @@ _UPPER_SIZE, _LOWER_SIZE = 3 * len(UPPER), 3 * len(LOWER)
 _POSE_SIZE = _UPPER_SIZE + _LOWER_SIZE
 _ORDER = np.array([3 * j + k for j in MODEL_ORDER for k in range(3)])
 _INVERSE = np.argsort(_ORDER)
-_SIZES = ("actions", "history", "predictor_code", "predictor_width", "width", "layers", "code")
+MOST_ACTIONS = 256
+"""That a predictor may tell apart; the paper's has 10."""
+_SIZES = {
+    "actions": MOST_ACTIONS, "history": 120, "predictor_code": 4096, "predictor_width": 4096, "width": 4096, "layers": 8,
+    "code": 4096,
+}
+"""The sizes of a model, and the largest that is run of each: several times those of the paper."""
+_MOST_STEPS = 32
+_LARGEST = 1e6  # of the numbers in a tensor; trained ones are under a hundred
+_HUGEST = 1e30  # of the numbers in an inverse, so that single precision holds them
+_FARTHEST = 100.0  # metres from the root that a joint of a pose may be
 _LOG_TURN = float(np.log(2.0 * np.pi))
 _PASSING = 10  # frames in which a resumed take's noise becomes its own
 
@@ -80,26 +92,41 @@ def _unusable(weights: Weights, what: str) -> WeightsError:
     return WeightsError(f"The weights '{weights.path}' cannot be used: {what}; choose another file.")
 
 
-def _sizes(weights: Weights, systems: tuple[str, ...], names: tuple[str, ...]) -> dict[str, int]:
-    """The model's sizes by name, checked: positive, finite, of these systems, this skeleton and frame rate."""
+def _sizes(weights: Weights, systems: tuple[str, ...], parts: Iterable[str]) -> dict[str, int]:
+    """The sizes of a model of these parts by name, checked: of these systems, this skeleton and frame rate, none too large."""
     config: dict[str, Any] = weights.config
-    model, fps, offsets = config.get("model"), config.get("fps"), config.get("offsets", [])
-    if not isinstance(model, dict) or not {"mask", "shared_encoder", *names} <= model.keys():
-        raise _unusable(weights, "they do not say how their model is built")
-    if model.get("system", "dafnet") not in systems:
-        raise _unusable(weights, f"they are of the system '{model['system']}', which only 'dafnet evaluate' runs")
-    sizes = {name: model[name] for name in names}
-    if not all(isinstance(size, int) and 0 < size <= 65536 for size in sizes.values()):
-        raise _unusable(weights, "a size of their model is no number from 1 to 65536")
-    temperature = model.get("action_temperature")
-    if not isinstance(temperature, int | float) or not 1e-3 < temperature < 1e3:
-        raise _unusable(weights, "their action temperature is no positive number")
-    foresight = model.get("ahead", 0)
-    if foresight not in (0, 3 * len(AHEAD)):
-        raise _unusable(weights, "they are told of the root's way in another manner")
-    sizes["ahead"] = foresight
-    if fps != 30 or np.shape(offsets) != OFFSETS.shape or not np.allclose(offsets, OFFSETS):
-        raise _unusable(weights, "they were made for another skeleton or frame rate")
+    model = config.get("model")
+    if not isinstance(model, dict):
+        raise _unusable(weights, "they do not say how their model is built ('model')")
+    system = model.get("system", "dafnet")
+    if system not in systems:
+        raise _unusable(weights, f"they are of the system '{printable(system, 40)}', which only 'dafnet evaluate' runs")
+
+    def said(name: str, accepts: Callable[[Any], bool], wanted: str, default: Any = None) -> Any:
+        value = model.get(name, default)
+        if not accepts(value):
+            raise _unusable(weights, f"'{name}' of their model is {printable(value, 40)}, not {wanted}")
+        return value
+
+    def size(name: str, most: int) -> int:
+        return said(name, lambda value: type(value) is int and 0 < value <= most, f"a whole number from 1 to {most}")
+
+    largest = _SIZES | {f"steps_{part}": _MOST_STEPS for part in parts}
+    sizes = {name: size(name, most) for name, most in largest.items()}
+    foresight = 3 * len(AHEAD)
+    sizes["ahead"] = said("ahead", lambda value: type(value) is int and value in (0, foresight), f"0 or {foresight}", 0)
+    for name in ("mask", "shared_encoder"):
+        said(name, lambda value: isinstance(value, bool), "true or false")
+    said(
+        "action_temperature", lambda value: type(value) in (int, float) and 1e-3 < value < 1e3, "a number from 0.001 to 1000",
+    )
+    try:
+        offsets = shaped(config.get("offsets"), "offsets", OFFSETS.shape)
+    except InputError:
+        offsets = np.zeros(OFFSETS.shape)
+    for name, fits in (("fps", config.get("fps") == 30), ("offsets", np.allclose(offsets, OFFSETS))):
+        if not fits:
+            raise _unusable(weights, f"they were made for another skeleton or frame rate ('{name}')")
     return sizes
 
 
@@ -185,21 +212,25 @@ class Sampler:
             import torch
 
             self.xp = torch
-        c = _sizes(weights, self.systems, (*_SIZES, *(f"steps_{name}" for name in self.parts)))
+        c = _sizes(weights, self.systems, self.parts)
         self.mask, shared = bool(self.config["mask"]), bool(self.config["shared_encoder"])
         self.action_temperature = float(self.config["action_temperature"])
         self.actions, self.history, self.width = c["actions"], c["history"], c["width"]
 
         def array(name: str, *shape: int) -> np.ndarray:
-            return weights.require(name, shape).astype(np.float64)
+            found = weights.require(name, shape).astype(np.float64)
+            if found.size and np.abs(found).max() > _LARGEST:
+                raise _unusable(weights, f"'{name}' holds {np.abs(found).max():.0e}, which no training gives")
+            return found
 
         self.pose_mean, self.pose_std = array("pose_mean", _POSE_SIZE), array("pose_std", _POSE_SIZE)
         self.velocity_mean, self.velocity_std = array("velocity_mean", 3), array("velocity_std", 3)
         self.ahead = c["ahead"]
         told = ("ahead_mean", "ahead_std")
         self.ahead_mean, self.ahead_std = (array(name, self.ahead) if self.ahead else np.zeros(0) for name in told)
-        if min(self.pose_std.min(), self.velocity_std.min(), self.ahead_std.min(initial=1.0)) < 1e-6:
-            raise _unusable(weights, "its deviations are not positive")
+        for name in ("pose_std", "velocity_std", "ahead_std"):
+            if getattr(self, name).min(initial=1.0) < 1e-6:
+                raise _unusable(weights, f"'{name}' is not positive")
 
         self._spread = np.eye(_POSE_SIZE)
         for name, columns in self.parts.items():
@@ -255,10 +286,12 @@ class Sampler:
         condition = self.fresh + self.moving + c["code"] + observed
         bias, log_scale = array(f"{name}.bias", size), array(f"{name}.log_scale", size)
         weight = array(f"{name}.weight", size, size)
-        if np.abs(log_scale).max() > 30 or np.linalg.cond(weight) > 1e8:
+        if np.abs(log_scale).max() > 30 or not np.linalg.cond(weight) <= 1e8:
             raise _unusable(self.weights, f"'{name}' cannot be inverted")
         exponent = np.exp(log_scale)
         inverse = np.linalg.inv(weight)
+        if not np.abs(inverse / exponent[:, None]).max() < _HUGEST:
+            raise _unusable(self.weights, f"'{name}' cannot be inverted")
         layers = []
         for i in range(c["layers"]):
             inputs = half + condition if i == 0 else width
@@ -285,12 +318,12 @@ class Sampler:
     def noise(
         self, seed: int, lower_seed: int | None = None, temperature: float = 1.0, lower_temperature: float | None = None,
     ) -> np.ndarray:
-        """A take's noise vector (1, 66), upper part first, held constant; each part has a seed and, if wished, a temperature of
-        its own, so legs vary under one trunk. At temperature 1 takes differ as captured ones do, where the weights say how far
-        those do.
+        """A take's noise vector (1, 66), upper part first, held constant; each part has a seed (0 or more) and, if wished, a
+        temperature of its own, so legs vary under one trunk. At temperature 1 takes differ as captured ones do, where the
+        weights say how far those do.
         """
         seeds = (seed, 0, _UPPER_SIZE), (seed if lower_seed is None else lower_seed, 1, _LOWER_SIZE)
-        drawn = [np.random.default_rng([abs(s), part]).standard_normal(size) for s, part, size in seeds]
+        drawn = [np.random.default_rng([s, part]).standard_normal(size) for s, part, size in seeds]
         heat = np.full(_POSE_SIZE, temperature)
         heat[_UPPER_SIZE:] = temperature if lower_temperature is None else lower_temperature
         return heat * (self._spread @ np.concatenate(drawn))[None]
@@ -408,7 +441,7 @@ class Sampler:
         ``z`` (B, 66): one noise vector a take, upper part first, held constant. ``kept`` (N, B, 66), SMPL order, metres: the
         first N frames as they are to stay; the model goes on from them, its noise passing over ten frames from the one that
         the last kept pose is made of to ``z``, so that nothing jumps. ``watch`` is shown each frame of the first take as it
-        is made: its index and pose (66,) as above.
+        is made: its index and pose (66,) as above. Raises WeightsError where the poses are no body's.
         """
         noise = self._to(z)
         yield from within(self.start_steps(conditions, takes=len(z)), 0.0, 0.0)
@@ -416,7 +449,8 @@ class Sampler:
         first, last = len(known), noise
         poses, actions, densities = [], [], []
         for t in range(len(conditions)):
-            with one_thread():  # frame by frame: whoever drains this generator has the threads back in between
+            # Frame by frame: whoever drains this generator has the threads back in between. Poses are judged below.
+            with one_thread(), np.errstate(over="ignore", invalid="ignore"):
                 if t < first:
                     pose = known[t]
                     now, told, log_det = self.absorb(t, pose)
@@ -429,10 +463,16 @@ class Sampler:
             poses.append(pose)
             actions.append(told[:, : self.actions])
             if watch is not None:
-                watch(t, self._metres(self._from(pose[:1]))[0])
+                watch(t, self._judged(self._metres(self._from(pose[:1])))[0])
             yield (t + 1) / len(conditions)
         stacked, told, density = (self._from(self.xp.stack(each)).astype(np.float64) for each in (poses, actions, densities))
-        return Made(self._metres(stacked), told, density)
+        return Made(self._judged(self._metres(stacked)), told, density)
+
+    def _judged(self, poses: np.ndarray) -> np.ndarray:
+        """Poses in metres. Raises WeightsError where they are no body's."""
+        if not (np.abs(poses) < _FARTHEST).all():
+            raise _unusable(self.weights, "their poses are no numbers, or farther than 100 metres from the root")
+        return poses
 
     def _metres(self, poses: np.ndarray) -> np.ndarray:
         """Inverse of ``standardised``."""

@@ -1,19 +1,24 @@
-"""Furniture as the core sees it: boxes, triangle meshes, and the scene that holds them."""
+"""Furniture as the core sees it: boxes, triangle meshes, and the scene that holds them.
+
+Each checks what it is made of (``InputError``), takes lists for arrays, and holds arrays from then on.
+"""
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .checks import FARTHEST, array, corners, inside, rotations, shaped
 from .errors import InputError
+from .text import printable
 
 if TYPE_CHECKING:
     from .distance import DistanceGrid
 
 __all__ = ["Box", "Mesh", "Scene", "box_distance"]
 
-_FARTHEST = 1e9  # vertex times matrix; grids of single-precision numbers mean nothing long before
-
+_UNTRUE = 1e-3  # of an affine matrix: how far its last row may be from 0 0 0 1
 
 @dataclass(frozen=True)
 class Box:
@@ -26,6 +31,24 @@ class Box:
     half_size: np.ndarray
     rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
     name: str = "box"
+
+    def __post_init__(self) -> None:
+        hold = partial(object.__setattr__, self)
+        hold("name", printable(self.name))
+        whose = f"of the box '{self.name}'"
+        center = shaped(self.center, f"The center {whose}", (3,), (-1, 3))
+        half_size = shaped(self.half_size, f"The half_size {whose}", (3,))
+        rotation = shaped(self.rotation, f"The rotation {whose}", (3, 3), (-1, 3, 3))
+        hold("center", inside(center, f"The center {whose}", FARTHEST))
+        hold("half_size", inside(half_size, f"The half_size {whose}", FARTHEST))
+        hold("rotation", rotations(inside(rotation, f"The rotation {whose}", FARTHEST), f"The rotation {whose}"))
+        if (half_size < 0).any():
+            raise InputError(f"The half_size {whose} is negative; give half its length, width and height in metres.")
+        frames = [len(center) if center.ndim == 2 else 1, len(rotation) if rotation.ndim == 3 else 1]
+        if 0 in frames or len({*frames} - {1}) > 1:
+            raise InputError(
+                f"The center and rotation {whose} have {frames[0]} and {frames[1]} frames; give one of each, or one a frame."
+            )
 
     def matrices(self) -> np.ndarray:
         """(4, 4) or (T, 4, 4) rigid frames of the box."""
@@ -51,12 +74,25 @@ class Mesh:
     grid: "DistanceGrid | None" = None
 
     def __post_init__(self) -> None:
-        if len(self.triangles) and int(np.max(self.triangles)) >= len(self.vertices):
-            raise InputError(f"The mesh '{self.name}' has triangles that name missing vertices; clean it up and try again.")
-        if not np.isfinite(self.vertices).all() or not np.isfinite(self.matrix).all():
-            raise InputError(f"The mesh '{self.name}' has a coordinate that is not a number; fix its geometry or transform.")
-        if len(self.vertices) and float(np.abs(self.vertices).max()) * float(np.abs(self.matrix).max()) > _FARTHEST:
-            raise InputError(f"The mesh '{self.name}' reaches out millions of metres; fix its geometry or transform.")
+        hold = partial(object.__setattr__, self)
+        hold("name", printable(self.name))
+        whose = f"of the mesh '{self.name}'"
+        vertices = array(self.vertices, f"The vertices {whose}")
+        vertices = vertices.reshape(0, 3) if vertices.size == 0 else shaped(vertices, f"The vertices {whose}", (-1, 3))
+        matrix = shaped(self.matrix, f"The matrix {whose}", (4, 4), (-1, 4, 4))
+        if 0 in matrix.shape:
+            raise InputError(f"The matrix {whose} has no frames; give one matrix, or one a frame.")
+        if not np.isfinite(vertices).all() or not np.isfinite(matrix).all():
+            part = "vertices" if not np.isfinite(vertices).all() else "matrix"
+            raise InputError(f"The {part} {whose} have a coordinate that is not a number; fix its geometry or transform.")
+        if np.abs(matrix[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max() > _UNTRUE:
+            raise InputError(f"The matrix {whose} is of no scale, rotation and place; its last row has to be 0 0 0 1.")
+        far = float(np.abs(vertices).max(initial=0.0)), float(np.abs(matrix[..., :3, :3]).max())
+        if max(*far, far[0] * far[1], float(np.abs(matrix[..., :3, 3]).max())) > FARTHEST:
+            raise InputError(f"The mesh '{self.name}' reaches out millions of metres; fix its vertices or its matrix.")
+        hold("vertices", vertices)
+        hold("triangles", corners(self.triangles, f"The triangles {whose}", len(vertices)))
+        hold("matrix", matrix)
 
 
 @dataclass(frozen=True)
@@ -64,6 +100,11 @@ class Scene:
     """Everything that the character may touch or must avoid. An empty scene is a bare floor."""
 
     solids: "tuple[Box | Mesh, ...] | list[Box | Mesh]" = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.solids, tuple | list) or not all(isinstance(each, Box | Mesh) for each in self.solids):
+            raise InputError("The solids of a scene are something other than boxes and meshes; give a list of Box and Mesh.")
+        object.__setattr__(self, "solids", tuple(self.solids))
 
 
 def box_distance(points: np.ndarray, half_size: np.ndarray) -> np.ndarray:

@@ -1,26 +1,55 @@
-"""A take and what was asked for, as bytes: for a file to keep, so that it can be cleaned up again or gone on from later."""
+"""A take and what was asked for, as bytes: for a file to keep, so that it can be cleaned up again or gone on from later.
+
+The bytes are a compressed NPZ. Files come from strangers, so none of it is believed: an array's header is read before the
+array, and no more is unpacked than the take's own number of frames asks for.
+"""
 
 import io
 import json
+import math
+import re
 import zipfile
+import zlib
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
+from .checks import FARTHEST, MOST_FRAMES, inside, number, whole
+from .conditions import PREROLL
 from .errors import InputError
+from .resampling import covering_frames
 from .root import RootPath
+from .sampler import MOST_ACTIONS
+from .skeleton import END_EFFECTORS, UPPER
 from .take import Controls, Take
+from .text import printable, read_json
 
 __all__ = ["packed", "unpacked"]
 
-_KINDS = {"take": Take, "controls": Controls}
+_VERSION = 1
+"""Of the packing. What was packed before there were versions is packed so, too."""
+_MOST_WORDS, _MOST = 1 << 20, 1e30  # bytes of all that is no array; figures
+_ROWS: dict[str, tuple[int, ...]] = {
+    "controls.root": (4, 4), "controls.upper_body": (len(UPPER), 3),
+    **{f"controls.{name}": (3,) for name in END_EFFECTORS},
+    **{f"controls.{name}_rotation": (3, 3) for name in END_EFFECTORS},
+    **{f"controls.{name}_influence": () for name in END_EFFECTORS},
+    "take.joints": (22, 3), "take.rotations": (22, 4), "take.root": (4, 4),
+}
+"""The arrays that have a row for each frame of the controls, and the shape of a row."""
+_FREE = {name for name in _ROWS if name.startswith("controls.") and name != "controls.root"}
+_HEADER = re.compile(rb"\{'descr': '([^']*)', 'fortran_order': (True|False), 'shape': \(([\d, ]*)\), \} *\n")
+_DAMAGED = (
+    ValueError, KeyError, EOFError, OSError, OverflowError, NotImplementedError, RuntimeError, zlib.error, zipfile.BadZipFile,
+)
+"""What Python's reader of ZIP files raises for bytes that are none."""
 
 
 def packed(take: Take, controls: Controls) -> bytes:
     """Both as one compressed NPZ, arrays in single precision; nothing in it is pickled."""
     arrays: dict[str, np.ndarray] = {}
-    plain: dict[str, Any] = {}
+    plain: dict[str, Any] = {"version": _VERSION}
     for kind, thing in (("take", take), ("controls", controls)):
         for each in fields(thing):
             name, value = f"{kind}.{each.name}", getattr(thing, each.name)
@@ -29,29 +58,135 @@ def packed(take: Take, controls: Controls) -> bytes:
             elif isinstance(value, np.ndarray):
                 arrays[name] = value
             elif value is not None:
-                plain[name] = value
+                plain[name] = _sayable(value)
     out = io.BytesIO()
     text = np.frombuffer(json.dumps(plain).encode(), np.uint8)
     np.savez_compressed(out, plain=text, **{name: a.astype(np.float32) for name, a in arrays.items()})
     return out.getvalue()
 
 
+def _sayable(value: Any) -> Any:
+    """A number, or figures by name, with None for what JSON has no word for."""
+    if isinstance(value, dict):
+        return {name: _sayable(each) for name, each in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def unpacked(data: bytes) -> tuple[Take, Controls]:
-    """Inverse of ``packed``. Raises InputError where the bytes are no take."""
+    """Inverse of ``packed``. Raises InputError, which names the field, where the bytes are no take that can be used."""
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        values: dict[str, Any] = json.loads(arrays.pop("plain").tobytes())
-        for name, array in arrays.items():
-            values[name] = array.astype(float)
-        place, yaw = (values.pop(f"take.path.{part}") for part in ("position", "yaw"))
-        values["take.path"] = RootPath(place, yaw)
-        values["take.warnings"] = tuple(values["take.warnings"])
-        made = []
-        for kind, cls in _KINDS.items():
-            known = {each.name for each in fields(cls)}
-            given = {name.removeprefix(f"{kind}."): value for name, value in values.items() if name.startswith(f"{kind}.")}
-            made.append(cls(**{name: value for name, value in given.items() if name in known}))
-    except (ValueError, KeyError, TypeError, OSError, zipfile.BadZipFile) as error:
-        raise InputError("The motion that the take was made of cannot be read; generate it again.") from error
-    return made[0], made[1]
+        with zipfile.ZipFile(io.BytesIO(data)) as file:
+            said = _words(file)
+            fps = number(said.get("controls.fps"), "'controls.fps'", 1.0, 1000.0)
+            arrays = _arrays(file, fps)
+        return _take(said, arrays, fps), _controls(said, arrays)
+    except InputError as error:
+        why = str(error).partition(";")[0].rstrip(".")
+        raise InputError(f"The motion that the take was made of cannot be read ({why}); generate it again.") from error
+    except _DAMAGED as error:
+        raise InputError("The motion that the take was made of cannot be read (it is damaged); generate it again.") from error
+
+
+def _words(file: zipfile.ZipFile) -> dict[str, Any]:
+    """All that is no array."""
+    with _opened(file, "plain") as member:
+        shape, _ = _header(member, "plain", "|u1")
+        if len(shape) != 1 or shape[0] > _MOST_WORDS:
+            raise InputError("'plain' has an impossible shape")
+        text = _read(member, "plain", shape[0])
+    try:
+        said = read_json(text.decode())
+    except ValueError as error:
+        raise InputError(f"'plain' {'is not text' if isinstance(error, UnicodeDecodeError) else error}") from error
+    if not isinstance(said, dict):
+        raise InputError("'plain' is not an object")
+    whole(said.get("version", 1), "'version'", 1, _VERSION)
+    return said
+
+
+def _opened(file: zipfile.ZipFile, name: str) -> Any:
+    try:
+        info = file.getinfo(f"{name}.npy")
+    except KeyError as error:
+        raise InputError(f"'{name}' is missing") from error
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):  # the others may claim gigabytes to begin with
+        raise InputError(f"'{name}' is compressed in another way")
+    return file.open(info)
+
+
+def _header(member: Any, name: str, dtype: str) -> tuple[tuple[int, ...], bool]:
+    """Shape of an array in NPY format, version 1, and whether its first axis runs fastest. Refuses another ``dtype``."""
+    start = member.read(10)
+    found = _HEADER.fullmatch(member.read(int.from_bytes(start[8:], "little")))
+    if start[:8] != b"\x93NUMPY\x01\x00" or found is None:
+        raise InputError(f"'{name}' is no array")
+    if found[1].decode("latin-1") != dtype:
+        raise InputError(f"'{name}' holds {printable(found[1].decode('latin-1'), 20)}, not {dtype}")
+    sizes = found[3].decode().replace(" ", "").split(",")
+    shape = tuple(int(size[:12]) for size in sizes if size)
+    return shape, found[2] == b"True"
+
+
+def _read(member: Any, name: str, count: int) -> bytes:
+    """The rest of a member, which has to be of so many bytes."""
+    data: bytes = member.read(count)
+    if len(data) != count or member.read(1):
+        raise InputError(f"the size of '{name}' is not that of its shape")
+    return data
+
+
+def _arrays(file: zipfile.ZipFile, fps: float) -> dict[str, np.ndarray]:
+    """All arrays by name, finite, each of the shape that the number of frames, ``fps`` a second, asks for."""
+    with _opened(file, "controls.root") as member:
+        frames = whole((*_header(member, "controls.root", "<f4")[0], 0)[0], "the length of 'controls.root'", 1, MOST_FRAMES)
+    with _opened(file, "take.action") as member:
+        shape, _ = _header(member, "take.action", "<f4")
+        actions = whole(shape[1] if len(shape) == 2 else None, "the width of 'take.action'", 0, MOST_ACTIONS)
+    made = whole(covering_frames(frames, fps), "the number of frames", 1, MOST_FRAMES)
+    wanted = {name: (frames, *row) for name, row in _ROWS.items()} | {
+        "take.action": (frames, actions), "take.poses": (PREROLL + made, 66),
+        "take.path.position": (made, 3), "take.path.yaw": (made,),
+    }
+    there, arrays = set(file.namelist()), {}
+    for name, shape in wanted.items():
+        if name in _FREE and f"{name}.npy" not in there:
+            continue
+        with _opened(file, name) as member:
+            found, fortran = _header(member, name, "<f4")
+            if found != shape:
+                raise InputError(f"'{name}' has the shape {found}, not {shape}")
+            data = np.frombuffer(_read(member, name, 4 * math.prod(shape)), "<f4")
+        arrays[name] = inside(
+            data.reshape(shape, order="F" if fortran else "C").astype(float), f"'{name}'", FARTHEST, free=name in _FREE,
+        )
+    return arrays
+
+
+def _controls(said: dict[str, Any], arrays: dict[str, np.ndarray]) -> Controls:
+    known = {each.name for each in fields(Controls)}
+    given = {name.removeprefix("controls."): value for name, value in {**said, **arrays}.items()}
+    return Controls(**{name: value for name, value in given.items() if name in known})
+
+
+def _take(said: dict[str, Any], arrays: dict[str, np.ndarray], fps: float) -> Take:
+    def figures(name: str) -> dict[str, float | None]:
+        found = said.get(name)
+        if not isinstance(found, dict):
+            raise InputError(f"'{name}' is {printable(found, 40)}")
+        return {key: None if value is None else number(value, f"'{name}'", -_MOST, _MOST) for key, value in found.items()}
+
+    for name in ("fps", "scale"):
+        if said.get(f"take.{name}") != said.get(f"controls.{name}"):
+            raise InputError(f"'take.{name}' is not that of the controls")
+    likelihood, warnings = said.get("take.log_likelihood"), said.get("take.warnings")
+    if not isinstance(warnings, list) or not all(isinstance(each, str) for each in warnings):
+        raise InputError("'take.warnings' is something other than sentences")
+    seconds = {key: value for key, value in figures("take.seconds").items() if value is not None}
+    return Take(
+        fps=fps, joints=arrays["take.joints"], rotations=arrays["take.rotations"], root=arrays["take.root"],
+        action=arrays["take.action"], scale=number(said.get("take.scale"), "'take.scale'", 1e-3, 1e3), poses=arrays["take.poses"],
+        path=RootPath(arrays["take.path.position"], arrays["take.path.yaw"]),
+        log_likelihood=math.nan if likelihood is None else number(likelihood, "'take.log_likelihood'", -_MOST, _MOST),
+        raw_metrics=figures("take.raw_metrics"), metrics=figures("take.metrics"), seconds=seconds,
+        warnings=tuple(printable(each, 1000) for each in warnings),
+    )

@@ -2,14 +2,24 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
+from .checks import FARTHEST, MOST_FRAMES, inside, number, rotations, shaped
+from .errors import InputError
+from .resampling import covering_frames
 from .root import RootPath
+from .skeleton import END_EFFECTORS, UPPER
+from .text import printable
 
 __all__ = ["MODES", "Controls", "Take"]
 
 MODES = ("FREE", "EE", "FULL")
+
+_SLOWEST, _FASTEST = 1.0, 1000.0  # frames a second
+_SMALLEST, _LARGEST = 1e-3, 1e3  # sizes over the canonical body
+_LONGEST_BLEND = 600.0  # seconds
 
 
 @dataclass(frozen=True)
@@ -23,6 +33,9 @@ class Controls:
     ``skeleton.UPPER`` for FULL; ``pelvis_given``: whether its pelvis counts, or only the rest of it. ``…_influence`` (T,): how
     far a target counts, from 0, where it is free, to 1; all of it where None. ``blend``: seconds in which the body comes over
     where the mode changes. ``scale``: the character's size over the canonical body of 1.75 m.
+
+    Lists will do for arrays. Raises InputError, which names the field, for what cannot be used: another shape, what is not a
+    number, a rotation that is none, a mode that is unknown, more than ``MOST_FRAMES`` frames.
     """
 
     fps: float
@@ -42,8 +55,55 @@ class Controls:
     blend: float = 1 / 3
     scale: float = 1.0
 
+    def __post_init__(self) -> None:
+        hold = partial(object.__setattr__, self)
+        hold("fps", number(self.fps, "The frame rate", _SLOWEST, _FASTEST, "frames a second"))
+        hold("scale", number(self.scale, "The character's scale", _SMALLEST, _LARGEST))
+        hold("blend", number(self.blend, "The blend", 0.0, _LONGEST_BLEND, "seconds"))
+        hold("root", _checked_root(self.root))
+        frames = len(self)
+        if max(frames, covering_frames(frames, self.fps)) > MOST_FRAMES:
+            raise InputError(f"The root has {frames} frames at {self.fps:g} a second, more than a shot may have; split it.")
+        hold("mode", _checked_mode(self.mode, frames))
+        if not isinstance(self.pelvis_given, bool | np.bool_):
+            raise InputError(f"'pelvis_given' is {printable(self.pelvis_given, 40)}; give True or False.")
+
+        like, free = ", like the root's frames", "give metres, or NaN where it is free"
+        shapes: dict[str, tuple[int, ...]] = {"upper_body": (frames, len(UPPER), 3)}
+        for name in END_EFFECTORS:
+            shapes |= {name: (frames, 3), f"{name}_rotation": (frames, 3, 3), f"{name}_influence": (frames,)}
+        for name, shape in shapes.items():
+            if getattr(self, name) is not None:
+                what = f"'{name}'"
+                found = shaped(getattr(self, name), what, shape, like=like)
+                is_share = name.endswith("_influence")
+                inside(found, what, FARTHEST, free=not is_share, fix="give numbers from 0 to 1" if is_share else free)
+                hold(name, rotations(found, what) if name.endswith("_rotation") else found)
+
     def __len__(self) -> int:
         return len(self.root)
+
+
+def _checked_root(root: object) -> np.ndarray:
+    found = shaped(root, "The root", (-1, 4, 4), like=", one matrix for each frame")
+    if not len(found):
+        raise InputError("The root has no frames; give at least one frame, a 4 × 4 matrix.")
+    broken = np.flatnonzero(~np.isfinite(found).all(axis=(1, 2)))
+    if len(broken):
+        raise InputError(f"The root's transform is not a number at frame {broken[0]}; fix its keys, drivers or constraints.")
+    return inside(found, "The root", FARTHEST)
+
+
+def _checked_mode(mode: object, frames: int) -> str | tuple[str, ...]:
+    modes = (mode,) if isinstance(mode, str) else mode.tolist() if isinstance(mode, np.ndarray) else mode
+    if not isinstance(modes, tuple | list):
+        raise InputError(f"The mode is {printable(mode, 40)}; use FREE, EE or FULL, one word or one for each frame.")
+    wrong = [each for each in modes if not isinstance(each, str) or each not in MODES]
+    if wrong:
+        raise InputError(f"The mode '{printable(wrong[0], 40)}' is unknown; use FREE, EE or FULL.")
+    if not isinstance(mode, str) and len(modes) != frames:
+        raise InputError(f"There are {len(modes)} modes for {frames} frames; give one word, or one for each frame.")
+    return mode if isinstance(mode, str) else tuple(modes)
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,15 @@ from typing import Any
 import numpy as np
 
 from .errors import WeightsError
+from .text import printable, read_json
 
 __all__ = ["FORMAT", "Weights", "load_weights", "read_safetensors", "write_safetensors", "quantised"]
 
 FORMAT = "dafnet-1"
 """Value of the metadata key ``format``; another one means other tensors."""
 
-_MOST_HEADER, _MOST_FILE = 1 << 20, 1 << 31
+_MOST_HEADER, _MOST_FILE = 1 << 20, 1 << 29  # bytes; the paper's model in single precision is a quarter of that
+_SHOWN = 60  # characters of a name in a sentence
 _DTYPES = {"F64": "<f8", "F32": "<f4", "F16": "<f2", "BF16": "<u2", "I64": "<i8", "I32": "<i4", "I8": "i1", "U8": "u1"}
 _WRITTEN = {np.dtype(code): name for name, code in _DTYPES.items() if name != "BF16"}
 
@@ -29,29 +31,27 @@ _WRITTEN = {np.dtype(code): name for name, code in _DTYPES.items() if name != "B
 def read_safetensors(path: str | Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Tensors (read-only, BF16 widened to float32, all else as stored) and metadata of a ``.safetensors`` file.
 
-    Raises WeightsError where the file is missing, truncated, over 2 GiB, or its header is not what the format asks for:
-    too long, not JSON, an unknown type, offsets that leave the file, overlap, leave holes or differ from the shape.
+    Raises WeightsError where the file is missing, truncated, over 512 MiB, or its header is not what the format asks for:
+    too long, no JSON that ``read_json`` takes, an unknown type, offsets that leave the file, overlap, leave holes or differ
+    from the shape.
     """
     path = Path(path)
     header, data = _parts(path)
 
-    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        if len({key for key, _ in pairs}) != len(pairs):
-            raise _damaged(path, "its header names something twice")
-        return dict(pairs)
-
     try:
-        entries = json.loads(header.decode("utf-8"), object_pairs_hook=unique)
-    except (ValueError, RecursionError) as error:
-        raise _damaged(path, "its header is not JSON") from error
+        entries = read_json(header.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        raise _damaged(path, "its header is not text") from error
+    except ValueError as error:
+        raise _damaged(path, f"its header {error}") from error
     if not isinstance(entries, dict):
         raise _damaged(path, "its header is not an object")
     metadata = entries.pop("__metadata__", {})
     if not isinstance(metadata, dict) or not all(isinstance(value, str) for value in metadata.values()):
         raise _damaged(path, "its metadata is not text")
 
-    for entry in entries.values():
-        _check_entry(path, entry)
+    for name, entry in entries.items():
+        _check_entry(path, printable(name, _SHOWN), entry)
     spans = sorted(entry["data_offsets"] for entry in entries.values())
     if [begin for begin, _ in spans] + [len(data)] != [0] + [end for _, end in spans]:
         raise _damaged(path, "its tensors overlap, leave holes or leave the file")
@@ -80,7 +80,7 @@ def _parts(path: Path) -> tuple[bytes, bytes]:
         with path.open("rb") as file:
             size = file.seek(0, 2)
             if size > _MOST_FILE:
-                raise WeightsError(f"The weights file '{path.name}' is larger than 2 GiB; choose another file.")
+                raise WeightsError(f"The weights file '{path.name}' is larger than 512 MiB; choose another file.")
             file.seek(0)
             length = int.from_bytes(file.read(8), "little")
             if not 2 <= length <= min(size - 8, _MOST_HEADER):
@@ -96,23 +96,24 @@ def _parts(path: Path) -> tuple[bytes, bytes]:
     return header, data
 
 
-def _check_entry(path: Path, entry: object) -> None:
+def _check_entry(path: Path, name: str, entry: object) -> None:
     """Raise WeightsError unless this describes one tensor whose bytes are as many as its shape asks for."""
     if not isinstance(entry, dict) or set(entry) != {"dtype", "shape", "data_offsets"}:
-        raise _damaged(path, "a tensor is not described as it should be")
+        raise _damaged(path, f"'{name}' is not described as it should be")
     dtype, shape, offsets = entry["dtype"], entry["shape"], entry["data_offsets"]
     if not isinstance(dtype, str) or dtype not in _DTYPES:
-        raise _damaged(path, "a tensor has an unknown type")
-    if not _are_counts(shape) or len(shape) > 8:
-        raise _damaged(path, "a tensor has an impossible shape")
+        raise _damaged(path, f"'{name}' has an unknown type")
+    # A tensor without values may not be huge in its other directions either: NumPy makes none.
+    if not _are_counts(shape) or len(shape) > 8 or math.prod(size or 1 for size in shape) > _MOST_FILE:
+        raise _damaged(path, f"'{name}' has an impossible shape")
     if not _are_counts(offsets) or len(offsets) != 2:
-        raise _damaged(path, "a tensor has impossible offsets")
+        raise _damaged(path, f"'{name}' has impossible offsets")
     if offsets[1] - offsets[0] != math.prod(shape) * np.dtype(_DTYPES[dtype]).itemsize:
-        raise _damaged(path, "a tensor's size is not that of its shape")
+        raise _damaged(path, f"the size of '{name}' is not that of its shape")
 
 
 def _are_counts(values: Any) -> bool:
-    """Whether this is a list of whole numbers from 0 to 2 GiB (JSON's true is a number to Python, not to us)."""
+    """Whether this is a list of whole numbers from 0 to 512 MiB (JSON's true is a number to Python, not to us)."""
     return isinstance(values, list) and all(type(value) is int and 0 <= value <= _MOST_FILE for value in values)
 
 
@@ -170,6 +171,14 @@ class Weights:
             raise _other_version(self.path, f"'{name}' has the shape {tensor.shape}, not {tuple(shape)}")
         return tensor
 
+    def says(self, key: str) -> Any:
+        """What the metadata says under a key: parsed where it is JSON, as it stands where not, None where it says nothing."""
+        said = self.metadata.get(key)
+        try:
+            return None if said is None else read_json(said)
+        except ValueError:
+            return said
+
 
 def load_weights(path: str | Path | None = None) -> Weights:
     """Read a weights file, or the one that ships in ``weights_stub`` beside the package where ``path`` is None.
@@ -179,16 +188,18 @@ def load_weights(path: str | Path | None = None) -> Weights:
     path = _shipped() if path is None else Path(path)
     stored, metadata = read_safetensors(path)
     if metadata.get("format") != FORMAT:
-        raise _other_version(path, f"its format is '{metadata.get('format', 'unknown')}', not '{FORMAT}'")
+        said = printable(metadata.get("format", "unknown"), _SHOWN)
+        raise _other_version(path, f"its format is '{said}', not '{FORMAT}'")
     try:
-        config = json.loads(metadata.get("config", ""))
-    except (ValueError, RecursionError) as error:
-        raise _damaged(path, "its description of the model is not JSON") from error
+        config = read_json(metadata.get("config", ""))
+    except ValueError as error:
+        raise _damaged(path, f"its config {error}") from error
     if not isinstance(config, dict):
-        raise _damaged(path, "its description of the model is not an object")
+        raise _damaged(path, "its config is not an object")
 
     tensors = {}
     for name, array in stored.items():
+        shown = printable(name, _SHOWN)
         if name.endswith(".scale") and name.removesuffix(".scale") in stored:
             continue
         with np.errstate(over="ignore", invalid="ignore"):
@@ -196,7 +207,7 @@ def load_weights(path: str | Path | None = None) -> Weights:
             if array.dtype == np.int8:
                 tensor *= _row_scales(path, stored, name)
         if not np.isfinite(tensor).all():
-            raise _damaged(path, f"'{name}' holds values that are not numbers")
+            raise _damaged(path, f"'{shown}' holds values that are not numbers")
         tensors[name] = tensor
     return Weights(tensors, config, metadata, path)
 
@@ -205,7 +216,7 @@ def _row_scales(path: Path, stored: dict[str, np.ndarray], name: str) -> np.ndar
     """The scales of an 8-bit tensor, shaped to multiply its rows."""
     rows, scale = stored[name], stored.get(f"{name}.scale")
     if scale is None or rows.ndim == 0 or scale.shape != rows.shape[:1]:
-        raise _damaged(path, f"the 8-bit tensor '{name}' lacks its scales")
+        raise _damaged(path, f"the 8-bit tensor '{printable(name, _SHOWN)}' lacks its scales")
     return scale.astype(np.float32).reshape(-1, *[1] * (rows.ndim - 1))
 
 

@@ -1,0 +1,69 @@
+"""Words from outside (a file's metadata, the names in a scene): made safe to show, and read as JSON."""
+
+import json
+import math
+import unicodedata
+from typing import Any
+
+__all__ = ["printable", "read_json"]
+
+_DEEPEST = 32  # lists and objects within each other
+_LONGEST = 18  # digits of a whole number
+
+
+def printable(words: object, most: int = 200) -> str:
+    """The words on one line, whatever they are: at most ``most`` characters of them, and "…" for what is cut off.
+
+    What a terminal would obey instead of showing it (control characters, line ends, marks that turn the direction of
+    writing, halves of characters) becomes its escape, such as ``\\x1b``.
+    """
+    try:
+        text = str(words)
+    except ValueError:  # Python writes no whole number of more than 4300 digits
+        text = f"a huge {type(words).__name__}"
+    if len(text) > most:
+        text = text[:most] + "…"
+    return "".join(each if _is_shown(each) else each.encode("unicode_escape").decode("ascii") for each in text)
+
+
+def _is_shown(character: str) -> bool:
+    return character.isprintable() or unicodedata.category(character) == "Zs"
+
+
+def read_json(text: str) -> Any:
+    """What a JSON text says.
+
+    Raises ValueError, whose words go on from the text's name ("is not JSON"), for what is no JSON, NaN and infinity, whole
+    numbers of more than 18 digits, a name that comes twice in an object, halves of characters, and what is nested over 32 deep.
+    """
+    try:
+        found = json.loads(text, object_pairs_hook=_once, parse_int=_whole)
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise ValueError("is not JSON") from error
+    _check(found, _DEEPEST)
+    return found
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    if len({key for key, _ in pairs}) != len(pairs):
+        raise ValueError("names something twice")
+    return dict(pairs)
+
+
+def _whole(digits: str) -> int:
+    if len(digits) > _LONGEST:
+        raise ValueError("holds a number that is too large")
+    return int(digits)
+
+
+def _check(value: Any, deeper: int) -> None:
+    if isinstance(value, dict | list):
+        if deeper == 0:
+            raise ValueError("is nested too deep")
+        for each in (*value.keys(), *value.values()) if isinstance(value, dict) else value:
+            _check(each, deeper - 1)
+    elif isinstance(value, str):
+        if any("\ud800" <= each <= "\udfff" for each in value):
+            raise ValueError("holds half a character")
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise ValueError("holds a number that is not finite")
