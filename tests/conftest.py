@@ -6,6 +6,7 @@ installed.
 """
 
 import importlib
+import importlib.util
 import os
 import sys
 import tempfile
@@ -22,6 +23,16 @@ if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 if "bpy" not in sys.modules:
     os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="dafnet_tests_")
+
+if importlib.util.find_spec("hypothesis"):
+    from hypothesis import HealthCheck, Phase, settings
+
+    settings.register_profile(
+        "tenth", max_examples=100, derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck),
+        phases=(Phase.generate, Phase.shrink),
+    )
+    settings.register_profile("full", settings.get_profile("tenth"), max_examples=1000)
+    settings.load_profile("tenth")
 
 _state = {"enabled": False, "status": 0}
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from .checks import FARTHEST, MOST_FRAMES, inside, number, whole
+from .checks import FARTHEST, MOST_FRAMES, inside, number, shaped, whole
 from .conditions import PREROLL
 from .errors import InputError
 from .resampling import covering_frames
@@ -39,7 +39,12 @@ _ROWS: dict[str, tuple[int, ...]] = {
 }
 """The arrays that have a row for each frame of the controls, and the shape of a row."""
 _FREE = {name for name in _ROWS if name.startswith("controls.") and name != "controls.root"}
-_HEADER = re.compile(rb"\{'descr': '([^']*)', 'fortran_order': (True|False), 'shape': \(([\d, ]*)\), \} *\n")
+_MOST_HEADER = 256  # bytes
+_HEADER = re.compile(
+    rb"\x93NUMPY\x01\0..\{'descr': '([^']{1,20})', 'fortran_order': (True|False), 'shape': \(([\d, ]{0,80})\), \} *\n",
+    re.DOTALL,
+)
+"""Of an array in a file, as NumPy writes it: type, whether the first axis runs fastest, sizes."""
 _DAMAGED = (
     ValueError, KeyError, EOFError, OSError, OverflowError, NotImplementedError, RuntimeError, zlib.error, zipfile.BadZipFile,
 )
@@ -89,11 +94,7 @@ def unpacked(data: bytes) -> tuple[Take, Controls]:
 
 def _words(file: zipfile.ZipFile) -> dict[str, Any]:
     """All that is no array."""
-    with _opened(file, "plain") as member:
-        shape, _ = _header(member, "plain", "|u1")
-        if len(shape) != 1 or shape[0] > _MOST_WORDS:
-            raise InputError("'plain' has an impossible shape")
-        text = _read(member, "plain", shape[0])
+    text = _array(file, "plain", "|u1", _MOST_WORDS).tobytes()
     try:
         said = read_json(text.decode())
     except ValueError as error:
@@ -104,61 +105,45 @@ def _words(file: zipfile.ZipFile) -> dict[str, Any]:
     return said
 
 
-def _opened(file: zipfile.ZipFile, name: str) -> Any:
+def _array(file: zipfile.ZipFile, name: str, dtype: str, most: int) -> np.ndarray:
+    """An array of this type, of not more than ``most`` numbers: what claims to be larger is not unpacked."""
     try:
         info = file.getinfo(f"{name}.npy")
     except KeyError as error:
         raise InputError(f"'{name}' is missing") from error
-    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):  # the others may claim gigabytes to begin with
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):  # others may claim gigabytes to begin with
         raise InputError(f"'{name}' is compressed in another way")
-    return file.open(info)
-
-
-def _header(member: Any, name: str, dtype: str) -> tuple[tuple[int, ...], bool]:
-    """Shape of an array in NPY format, version 1, and whether its first axis runs fastest. Refuses another ``dtype``."""
-    start = member.read(10)
-    found = _HEADER.fullmatch(member.read(int.from_bytes(start[8:], "little")))
-    if start[:8] != b"\x93NUMPY\x01\x00" or found is None:
+    if info.file_size > most * np.dtype(dtype).itemsize + _MOST_HEADER:
+        raise InputError(f"'{name}' is larger than the take's frames ask for")
+    data = file.read(info)
+    found = _HEADER.match(data)
+    if found is None:
         raise InputError(f"'{name}' is no array")
-    if found[1].decode("latin-1") != dtype:
-        raise InputError(f"'{name}' holds {printable(found[1].decode('latin-1'), 20)}, not {dtype}")
-    sizes = found[3].decode().replace(" ", "").split(",")
-    shape = tuple(int(size[:12]) for size in sizes if size)
-    return shape, found[2] == b"True"
-
-
-def _read(member: Any, name: str, count: int) -> bytes:
-    """The rest of a member, which has to be of so many bytes."""
-    data: bytes = member.read(count)
-    if len(data) != count or member.read(1):
+    kind, first_fastest, sizes = (each.decode("latin-1") for each in found.groups())
+    if kind != dtype:
+        raise InputError(f"'{name}' holds {printable(kind, 20)}, not {dtype}")
+    shape = tuple(int(size) for size in sizes.replace(" ", "").split(",") if size)
+    if math.prod(shape) * np.dtype(dtype).itemsize != len(data) - found.end():
         raise InputError(f"the size of '{name}' is not that of its shape")
-    return data
+    flat = np.frombuffer(data, dtype, offset=found.end())
+    return flat.reshape(shape, order="F" if first_fastest == "True" else "C")
 
 
 def _arrays(file: zipfile.ZipFile, fps: float) -> dict[str, np.ndarray]:
     """All arrays by name, finite, each of the shape that the number of frames, ``fps`` a second, asks for."""
-    with _opened(file, "controls.root") as member:
-        frames = whole((*_header(member, "controls.root", "<f4")[0], 0)[0], "the length of 'controls.root'", 1, MOST_FRAMES)
-    with _opened(file, "take.action") as member:
-        shape, _ = _header(member, "take.action", "<f4")
-        actions = whole(shape[1] if len(shape) == 2 else None, "the width of 'take.action'", 0, MOST_ACTIONS)
-    made = whole(covering_frames(frames, fps), "the number of frames", 1, MOST_FRAMES)
-    wanted = {name: (frames, *row) for name, row in _ROWS.items()} | {
-        "take.action": (frames, actions), "take.poses": (PREROLL + made, 66),
+    root, there = _array(file, "controls.root", "<f4", 16 * MOST_FRAMES), set(file.namelist())
+    frames = whole(root.size // 16, "the number of frames in 'controls.root'", 1, MOST_FRAMES)
+    made = whole(covering_frames(frames, fps), "the number of frames in 'take.poses'", 1, MOST_FRAMES)
+    wanted: dict[str, tuple[int, ...]] = {name: (frames, *row) for name, row in _ROWS.items()} | {
+        "take.action": (frames, -1), "take.poses": (PREROLL + made, 66),
         "take.path.position": (made, 3), "take.path.yaw": (made,),
     }
-    there, arrays = set(file.namelist()), {}
+    arrays = {}
     for name, shape in wanted.items():
-        if name in _FREE and f"{name}.npy" not in there:
-            continue
-        with _opened(file, name) as member:
-            found, fortran = _header(member, name, "<f4")
-            if found != shape:
-                raise InputError(f"'{name}' has the shape {found}, not {shape}")
-            data = np.frombuffer(_read(member, name, 4 * math.prod(shape)), "<f4")
-        arrays[name] = inside(
-            data.reshape(shape, order="F" if fortran else "C").astype(float), f"'{name}'", FARTHEST, free=name in _FREE,
-        )
+        if name not in _FREE or f"{name}.npy" in there:
+            most = math.prod(MOST_ACTIONS if size == -1 else size for size in shape)
+            found = shaped(_array(file, name, "<f4", most), f"'{name}'", shape)
+            arrays[name] = inside(found, f"'{name}'", FARTHEST, free=name in _FREE).astype(float)
     return arrays
 
 
@@ -184,7 +169,8 @@ def _take(said: dict[str, Any], arrays: dict[str, np.ndarray], fps: float) -> Ta
     seconds = {key: value for key, value in figures("take.seconds").items() if value is not None}
     return Take(
         fps=fps, joints=arrays["take.joints"], rotations=arrays["take.rotations"], root=arrays["take.root"],
-        action=arrays["take.action"], scale=number(said.get("take.scale"), "'take.scale'", 1e-3, 1e3), poses=arrays["take.poses"],
+        action=arrays["take.action"], scale=number(said.get("take.scale"), "'take.scale'", 1e-3, 1e3),
+        poses=arrays["take.poses"],
         path=RootPath(arrays["take.path.position"], arrays["take.path.yaw"]),
         log_likelihood=math.nan if likelihood is None else number(likelihood, "'take.log_likelihood'", -_MOST, _MOST),
         raw_metrics=figures("take.raw_metrics"), metrics=figures("take.metrics"), seconds=seconds,

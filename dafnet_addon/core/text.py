@@ -3,6 +3,7 @@
 import json
 import math
 import unicodedata
+from numbers import Number
 from typing import Any
 
 __all__ = ["printable", "read_json"]
@@ -12,18 +13,24 @@ _LONGEST = 18  # digits of a whole number
 
 
 def printable(words: object, most: int = 200) -> str:
-    """The words on one line, whatever they are: at most ``most`` characters of them, and "…" for what is cut off.
+    """Text, a number or None on one line: at most ``most`` characters, and "…" for what is cut off; of all else, its type.
 
     What a terminal would obey instead of showing it (control characters, line ends, marks that turn the direction of
     writing, halves of characters) becomes its escape, such as ``\\x1b``.
     """
-    try:
-        text = str(words)
-    except ValueError:  # Python writes no whole number of more than 4300 digits
-        text = f"a huge {type(words).__name__}"
+    text = words if isinstance(words, str) else _brief(words)
     if len(text) > most:
         text = text[:most] + "…"
     return "".join(each if _is_shown(each) else each.encode("unicode_escape").decode("ascii") for each in text)
+
+
+def _brief(thing: object) -> str:
+    if not isinstance(thing, Number | None):
+        return f"of the type {type(thing).__name__}"  # all of an array's numbers take long to write
+    try:
+        return str(thing)
+    except ValueError:  # Python writes no whole number of more than 4300 digits
+        return "a huge number"
 
 
 def _is_shown(character: str) -> bool:
