@@ -165,8 +165,8 @@ VALUES = [
 ]
 STRANGE = [
     None, True, False, 0, 1, -1, 2, 30, 10**6, 2**31, 3_000_000_000, 10**400, 1.5, "", "FREE", "30", b"FREE", [], {}, (),
-    object(), [[1.0, 2.0], [3.0]], [None], ["EE"] * FRAMES, ["EE", 3], np.array("FREE"), np.array(None), np.zeros((0, 3)), np.int64(7),
-    np.float32(24.0), np.zeros((2,) * 20), "\x1b[31m", "\ud800", 1j, np.array([1 + 1j]), {"a": 1}, *VALUES,
+    object(), [[1.0, 2.0], [3.0]], [None], ["EE"] * FRAMES, ["EE", 3], np.array("FREE"), np.array(None), np.zeros((0, 3)),
+    np.int64(7), np.float32(24.0), np.zeros((2,) * 20), "\x1b[31m", "\ud800", 1j, np.array([1 + 1j]), {"a": 1}, *VALUES,
 ]
 HARMLESS: list[Callable[[np.ndarray], Any]] = [
     lambda a: a.tolist(), lambda a: a.astype(np.float32), np.asfortranarray, lambda a: a.copy(), lambda a: tuple(a.tolist()),
