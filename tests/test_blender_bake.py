@@ -193,8 +193,9 @@ def test_all_other_curves_play_on_as_they_did(blender, addon) -> None:
     noise = curves["dafnet.head_influence", 0].modifiers.new("NOISE")
     noise.strength, noise.use_restricted_range, noise.frame_start, noise.frame_end = 0.3, True, 5, 60
     envelope = curves["dafnet.hand_left_influence", 0].modifiers.new("ENVELOPE")
-    for frame, low in ((1.0, -0.2), (30.0, -2.0)):
-        envelope.control_points.add(frame).min = low
+    for frame in (1.0, 30.0):
+        envelope.control_points.add(frame)
+    envelope.control_points.foreach_set("min", [-0.2, -2.0])
     right = curves["dafnet.hand_right_influence", 0]
     right.extrapolation = "LINEAR"
     first, last = right.keyframe_points

@@ -57,8 +57,15 @@ def _keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
 
 def _modifier(source: bpy.types.FModifier, target: bpy.types.FModifier) -> None:
     _alike(source, target)
-    for point in getattr(source, "control_points", ()):
-        _alike(point, target.control_points.add(point.frame))
+    if source.type != "ENVELOPE":
+        return
+    old, new = source.control_points, target.control_points
+    for k in range(len(old)):
+        new.add(float(k))
+    for name in ("frame", "min", "max"):  # set one by one, each may crash Blender: it takes the point for a modifier then
+        values = np.empty(len(old), np.float32)
+        old.foreach_get(name, values)
+        new.foreach_set(name, values)
 
 
 def _alike(source: Any, target: Any, apart: tuple[str, ...] = ()) -> None:
