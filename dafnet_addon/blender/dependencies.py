@@ -72,12 +72,12 @@ class Dependencies:
 
     def simulations(self, owners: Iterable[bpy.types.Object], shaped: bool = True) -> list[Simulation]:
         """The simulations, none of them baked, that move these objects or with ``shaped`` also shape them."""
-        found: dict[str, Simulation] = {}
+        found: dict[Simulation, None] = {}
         for owner, what in self._all(_Aspect(owner, _IN_SHAPE if shaped else _IN_PLACE) for owner in owners):
             if isinstance(owner, bpy.types.Object) and what in {_IN_PLACE, _IN_SHAPE}:
-                for simulation in (*self._rigid(owner), *(self._soft(owner) if what == _IN_SHAPE else ())):
-                    found.setdefault(simulation.name, simulation)
-        return list(found.values())
+                found |= dict.fromkeys(self._rigid(owner))
+                found |= dict.fromkeys(self._soft(owner) if what == _IN_SHAPE else ())
+        return list(found)
 
     def _all(self, aspects: Iterable[_Aspect]) -> set[_Aspect]:
         """These and all that they follow."""

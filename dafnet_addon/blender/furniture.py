@@ -6,7 +6,6 @@ there to be cut out of something else.
 
 from collections import defaultdict
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import bpy
@@ -19,7 +18,7 @@ from .armature import metres_per_unit
 from .dependencies import Dependencies
 from .properties import Settings, find_collection, find_object, find_scene
 
-__all__ = ["Furniture", "array", "furniture_now", "furniture_of", "reshaped"]
+__all__ = ["Furniture", "array", "furniture_now", "furniture_of"]
 
 _DRAWN_THROUGH = {"WIRE", "BOUNDS"}
 _CHANGED = 1e-3
@@ -66,24 +65,6 @@ def furniture_now(context: bpy.types.Context, settings: Settings) -> dict[str, l
     for solid in furniture.solids(metres_per_unit(scene)):
         found[solid.name].append(solid)
     return dict(found)
-
-
-@contextmanager
-def reshaped(scene: bpy.types.Scene) -> Iterator[set[bpy.types.Object]]:
-    """The objects that Blender shapes anew when a frame is set, added by Blender itself until the block ends."""
-    found: set[bpy.types.Object] = set()
-
-    def note(changed: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-        if changed == scene:
-            ids = (update.id.original for update in depsgraph.updates if update.is_updated_geometry)
-            found.update(each for each in ids if isinstance(each, bpy.types.Object))
-
-    handlers = bpy.app.handlers.frame_change_post
-    handlers.append(note)
-    try:
-        yield found
-    finally:
-        handlers.remove(note)
 
 
 class Furniture:

@@ -4,9 +4,7 @@ One unit of Blender is ``metres_per_unit`` metres; everything handed to the core
 read, so keys, constraints, drivers, modifiers and instances all count; what is hidden in the viewport does not exist.
 """
 
-from collections import defaultdict
 from collections.abc import Generator, Iterator
-from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,9 +22,9 @@ from .armature import is_character, metres_per_unit
 from .baker import laid_over, require_bakeable
 from .compat import action_curves
 from .dependencies import Dependencies, Simulation
-from .furniture import Furniture, array, furniture_of, reshaped
+from .furniture import Furniture, array, furniture_of
 from .mannequin import FACING
-from .playback import frame_kept, in_order
+from .playback import play_steps
 from .properties import Settings, find_action, find_object, find_scene
 from .rig_properties import map_of
 from .rig_reading import joints_of, pose_matrices
@@ -35,7 +33,6 @@ from .takes import stored
 
 __all__ = ["ReadScene", "read_steps", "read_scene"]
 
-_BATCH = 16
 _TURNED = np.radians(0.1)
 _TARGETS = {"head": "head target", "hand_left": "left hand target", "hand_right": "right hand target"}
 
@@ -98,71 +95,79 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     simulations = dependencies.simulations([root, *targets.values(), *members], shaped=False)
     simulations += dependencies.simulations(sources)
     simulations += [each for each in dependencies.simulations(members) if each.since < frames[0]]  # it has a shape by then
-    modes: list[str] = []
-    influences: dict[str, list[float]] = defaultdict(list)
-    tracks = defaultdict(list)
-    bones: list[np.ndarray] = []
-    bodies: list[np.ndarray] = []
-    played = in_order(frames, simulations)
-    last = scene.frame_current
-    with frame_kept(scene) if simulations else nullcontext():
-        for start in range(0, len(played), _BATCH):
-            if simulations and scene.frame_current != last:
-                raise InputError("The current frame was changed while a simulation was read; generate again.")
-            with nullcontext() if simulations else frame_kept(scene), reshaped(scene) as shaped:
-                for frame in played[start : start + _BATCH]:
-                    shaped.clear()
-                    scene.frame_set(frame)
-                    if frame < frames[0]:
-                        continue
-                    depsgraph = context.evaluated_depsgraph_get()
-                    if frame == frames[0]:
-                        _require_alive(depsgraph, [armature, root, *targets.values(), *sources])
-                    if furniture and frame == frames[0]:
-                        furniture.begin(depsgraph)
-                    elif furniture:
-                        furniture.add(depsgraph, shaped)
-                    modes.append(settings.mode or armature.dafnet.mode)
-                    for role in targets:
-                        influences[role].append(getattr(armature.dafnet, f"{role}_influence"))
-                    tracks["root"].append(array(root.evaluated_get(depsgraph).matrix_world))
-                    for role, target in targets.items():
-                        evaluated = target.evaluated_get(depsgraph)
-                        tracks[role].append(array(evaluated.matrix_world))
-                        tracks[f"{role} local"].append(array(evaluated.matrix_local))
-                    if source:
-                        evaluated = source.evaluated_get(depsgraph)
-                        bodies.append(array(evaluated.matrix_world))
-                        bones.append(pose_matrices(evaluated, places))
-                last = scene.frame_current
-            yield min(start + _BATCH, len(played)) / (len(played) + 1)
+    tracks = _Tracks(armature, root, targets, source, places)
 
+    def look(frame: int, depsgraph: bpy.types.Depsgraph, shaped: set[bpy.types.Object]) -> None:
+        if frame == frames[0]:
+            _require_alive(depsgraph, [armature, root, *targets.values(), *sources])
+        if furniture and frame == frames[0]:
+            furniture.begin(depsgraph)
+        elif furniture:
+            furniture.add(depsgraph, shaped)
+        tracks.add(depsgraph)
+
+    yield from play_steps(context, frames, simulations, look)
+
+    modes = [settings.mode] * len(frames) if settings.mode else tracks.modes
     warnings = tuple(_told(armature, furniture, dependencies, simulations))
     fps = scene.render.fps / scene.render.fps_base
-    root_matrices = _rigid(np.array(tracks["root"]), unit, f"root '{root.name}'")
+    root_matrices = _rigid(np.array(tracks.root), unit, f"root '{root.name}'")
     given: dict[str, Any] = {}
     for role, target in targets.items():
-        matrices = _rigid(np.array(tracks[role]), unit, f"{_TARGETS[role]} '{target.name}'")
+        matrices = _rigid(np.array(tracks.targets[role]), unit, f"{_TARGETS[role]} '{target.name}'")
         given[role] = matrices[:, :3, 3]
-        if _is_turned(target, np.array(tracks[f"{role} local"])):
+        if _is_turned(target, np.array(tracks.local[role])):
             given[f"{role}_rotation"] = matrices[:, :3, :3]
     if source and "FULL" in modes:
         if dependencies.follows(source, armature):
             raise InputError(f"The upper body's source '{source.name}' follows the character itself; mute what ties it to it.")
-        given["upper_body"] = _carried(source, source_map, np.array(bones), np.array(bodies), unit, root_matrices, size, fps)
+        bones, bodies = np.array(tracks.bones), np.array(tracks.bodies)
+        given["upper_body"] = _carried(source, source_map, bones, bodies, unit, root_matrices, size, fps)
     elif settings.upper_body_take and "FULL" in modes:
         given["upper_body"] = _of_take(settings, np.array([mode == "FULL" for mode in modes]), root_matrices, size, fps)
     elif "FULL" in modes:
         raise InputError(f"The mode of '{armature.name}' is FULL but no source is set; choose one to copy from.")
     for role in targets:
-        if min(influences[role]) < 1.0:
-            given[f"{role}_influence"] = np.array(influences[role])
+        if min(tracks.influences[role]) < 1.0:
+            given[f"{role}_influence"] = np.array(tracks.influences[role])
     mode = modes[0] if len(set(modes)) == 1 else tuple(modes)
     controls = Controls(fps=fps, root=root_matrices, mode=mode, blend=settings.blend_frames / fps, scale=size, **given)
 
     solids = furniture.solids(unit) if furniture else ()
     yield 1.0
     return ReadScene(Scene(solids), controls, warnings)
+
+
+class _Tracks:
+    """What is read of a character and of what leads it, frame by frame; matrices (4, 4) in Blender units."""
+
+    def __init__(
+        self, armature: bpy.types.Object, root: bpy.types.Object, targets: dict[str, bpy.types.Object],
+        source: bpy.types.Object | None, places: list[str | None],
+    ) -> None:
+        self._armature, self._root, self._targets, self._source, self._places = armature, root, targets, source, places
+        self.modes: list[str] = []
+        self.influences: dict[str, list[float]] = {role: [] for role in targets}
+        self.root: list[np.ndarray] = []
+        self.targets: dict[str, list[np.ndarray]] = {role: [] for role in targets}
+        self.local: dict[str, list[np.ndarray]] = {role: [] for role in targets}
+        self.bodies: list[np.ndarray] = []
+        self.bones: list[np.ndarray] = []
+
+    def add(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Note the frame that the scene shows now."""
+        own = self._armature.dafnet
+        self.modes.append(own.mode)
+        self.root.append(array(self._root.evaluated_get(depsgraph).matrix_world))
+        for role, target in self._targets.items():
+            evaluated = target.evaluated_get(depsgraph)
+            self.influences[role].append(getattr(own, f"{role}_influence"))
+            self.targets[role].append(array(evaluated.matrix_world))
+            self.local[role].append(array(evaluated.matrix_local))
+        if self._source:
+            evaluated = self._source.evaluated_get(depsgraph)
+            self.bodies.append(array(evaluated.matrix_world))
+            self.bones.append(pose_matrices(evaluated, self._places))
 
 
 def _require_independent(
