@@ -16,7 +16,6 @@ differ more from each other than the two systems do, so that the tables' interva
 
 import argparse
 import json
-import os
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -110,7 +109,7 @@ def _jobs(runs: Path, budget: str, model: ModelConfig, training: TrainingConfig)
 
 
 def train(
-    dataset: Path, runs: Path, minutes: float, processes: int = os.cpu_count() or 1, model: ModelConfig = MODEL,
+    dataset: Path, runs: Path, minutes: float, processes: int | None = None, model: ModelConfig = MODEL,
     training: TrainingConfig = TRAINING, samp: SampConfig = SMALL_SAMP,
 ) -> None:
     """Train every system with its budgets; ``minutes`` of one core for each whole system, the shared predictor not counted."""
@@ -291,7 +290,7 @@ def main() -> int:
     training = commands.add_parser("train")
     training.add_argument("dataset", type=Path)
     training.add_argument("--minutes", type=float, default=20.0, help="of one core, for each system")
-    training.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    training.add_argument("--processes", type=int, default=None, help="else one a core")
     for name in (*TABLES, "paired"):
         commands.add_parser(name).add_argument("folder", type=Path)
     for command in commands.choices.values():

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from .core.errors import DafnetError, InputError
 from .core.take import MODES
 from .core.text import printable
+from .core.threads import cores
 
 if TYPE_CHECKING:
     from .data.held_out import HeldClip
@@ -104,7 +105,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     prepare.add_argument("folder", type=Path, metavar="FOLDER", help="holds the motion files")
     prepare.add_argument("-o", "--output", type=Path, required=True, metavar="DATASET")
     prepare.add_argument("--windows", type=int, default=12000, help="how many training windows")
-    prepare.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    prepare.add_argument("--processes", type=int, default=cores())
     prepare.add_argument("--seed", type=int, default=0)
 
     train = command("train", _train, "train a model, or go on with a run, and write its weights")

@@ -1,10 +1,11 @@
 """A task of many items, shared out over the machine's cores."""
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from typing import Any
+
+from ..core.threads import cores
 
 __all__ = ["spread_out"]
 
@@ -21,7 +22,7 @@ def spread_out(
 
     Where one is enough it is this one, without what a new process costs.
     """
-    processes = max(1, min(processes or os.cpu_count() or 1, len(items)))
+    processes = max(1, min(processes or cores(), len(items)))
     if processes == 1:
         start()
         for done, item in enumerate(items):

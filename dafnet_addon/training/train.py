@@ -22,6 +22,7 @@ from torch import nn
 
 from ..baselines.flows import flow_of, parts_of
 from ..core.errors import InputError
+from ..core.threads import cores
 from ..core.weights import Weights
 from ..model.config import (
     AHEAD_SIZE,
@@ -408,7 +409,7 @@ def train(
         for part in names:
             train_part(part, dataset, folder, model, config, device=device, begin_with=begin_with)
         return
-    threads = max(1, torch.get_num_threads() // len(names))
+    threads = max(1, min(torch.get_num_threads(), cores()) // len(names))
     with ProcessPoolExecutor(len(names), mp_context=multiprocessing.get_context("spawn")) as pool:
         begin = time.monotonic()
         parts = [
