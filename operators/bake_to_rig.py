@@ -4,15 +4,15 @@ from typing import Any
 
 import bpy
 
-from ..dafnet_addon.blender.onto_rig import bake_onto_rig
+from ..dafnet_addon.blender.onto_rig import Baked, bake_onto_rig
 from ..dafnet_addon.blender.rig_properties import character_for, map_of, rig_of
 from .generate import idle
 from .reporting import reported
 
 __all__ = ["DAFNET_OT_bake_to_rig"]
 
-_FAR = 0.02
-"""Metres of mean error above which the user is warned."""
+_FAR, _TURNED = 0.02, 8.0
+"""Mean error above which the user is warned: metres, degrees."""
 
 
 class DAFNET_OT_bake_to_rig(bpy.types.Operator):
@@ -38,13 +38,21 @@ class DAFNET_OT_bake_to_rig(bpy.types.Operator):
             baked = bake_onto_rig(
                 context, character_for(context, rig), rig, map_of(rig), root_motion=own.root_motion, limbs=own.limbs,
             )
-            errors = ", ".join(f"{part} {100 * mean:.1f} ({100 * most:.1f})" for part, (mean, most) in baked.errors.items())
-            if max(mean for mean, _ in baked.errors.values()) > _FAR and baked.overruled:
+            if off := _off(baked):
                 bones = ", ".join(f"'{bone}'" for bone in baked.overruled[:3])
-                self.report({"WARNING"}, f"Off by more than 2 cm; mute the constraints and drivers of {bones} and bake again")
-            elif max(baked.errors["wrists"][0], baked.errors["ankles"][0]) > _FAR:
-                self.report({"WARNING"}, "Hands or feet are off by more than 2 cm; the rig's limbs are short for this motion")
+                why = f"mute the constraints and drivers of {bones} and bake again" if bones else "its proportions are others"
+                self.report({"WARNING"}, f"The rig is off the character's motion, {off}: {why}")
+            places = ", ".join(f"{part} {100 * mean:.1f} ({100 * most:.1f})" for part, (mean, most) in baked.errors.items())
+            limbs = ", ".join(f"{limb} {mean:.0f} ({most:.0f})" for limb, (mean, most) in baked.angles.items())
             size = "" if baked.ratio == 1.0 else f", motion scaled by {baked.ratio:.2f}"
-            self.report({"INFO"}, f"'{baked.action.name}': off by cm, mean (largest): {errors}{size}")
+            told = f"off by cm, mean (largest): {places}; by degrees: {limbs}{size}"
+            self.report({"INFO"}, f"'{baked.action.name}': {told}")
             return {"FINISHED"}
         return {"CANCELLED"}
+
+
+def _off(baked: Baked) -> str:
+    """What of a bake is off by so much that it is seen, with its mean error; empty where nothing is."""
+    places = [f"{part} by {100 * mean:.0f} cm" for part, (mean, _) in baked.errors.items() if mean > _FAR]
+    limbs = [f"{limb} by {mean:.0f} degrees" for limb, (mean, _) in baked.angles.items() if mean > _TURNED]
+    return ", ".join(limbs + places)

@@ -10,7 +10,10 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["BUILDERS", "character_body", "mixamo", "odd", "rigify", "rigify_metarig", "smpl_x", "unreal", "vrm"]
+__all__ = [
+    "BUILDERS", "RESTS", "character_body", "mixamo", "odd", "of_file", "rest_pose", "rested", "rigify", "rigify_metarig",
+    "smpl_x", "unreal", "vrm",
+]
 
 Point = Sequence[float]
 # Facing -y, left at +x, metres; the left side only.
@@ -297,3 +300,84 @@ BUILDERS: dict[str, Callable[..., Any]] = {
     "odd": odd,
 }
 """Builders by the convention's name."""
+
+
+Turn = tuple[str, str, Point]
+"""A bone, a joint further along its limb, and where in the room the way from the one to the other is to point."""
+
+
+def rested(bpy: Any, rig: Any, turns: Sequence[Turn], more: Sequence[tuple[str, Point, float]] = ()) -> Any:
+    """The same rig at rest in another pose: its bones aimed by ``turns``, and turned by ``more``: bone, axis, degrees.
+
+    The axes are the room's; the pose becomes the rest pose, as *Apply Pose as Rest Pose* makes it.
+    """
+    from mathutils import Matrix, Vector
+
+    def turned(name: str, turn: Any) -> None:
+        bone, world = rig.pose.bones[name], rig.matrix_world
+        here = Matrix.Translation(world @ bone.head)
+        bone.matrix = world.inverted() @ here @ turn.to_4x4() @ here.inverted() @ world @ bone.matrix
+        bpy.context.view_layer.update()
+
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="POSE")
+    for name, axis, degrees in more:
+        turned(name, Matrix.Rotation(np.radians(degrees), 3, Vector(axis)))
+    for name, along, direction in turns:
+        bpy.context.view_layer.update()
+        way = rig.matrix_world @ rig.pose.bones[along].head - rig.matrix_world @ rig.pose.bones[name].head
+        turned(name, way.rotation_difference(Vector(direction)).to_matrix())
+    bpy.ops.pose.armature_apply(selected=False)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return rig
+
+
+RESTS = ("hanging", "forward", "sitting", "twisted", "bent", "leaning")
+
+
+def rest_pose(kind: str, joints: dict[str, str]) -> tuple[list[Turn], list[tuple[str, Point, float]]]:
+    """What ``rested`` needs for one of ``RESTS``, for a rig whose bones by joint are ``joints``."""
+    turns: list[Turn] = []
+    spine = [joints[joint] for joint in ("spine1", "spine2", "spine3") if joint in joints]
+    more: list[tuple[str, Point, float]] = {
+        "twisted": [(spine[-1], (0, 0, 1), 40.0)], "bent": [(bone, (1, 0, 0), 75.0 / len(spine)) for bone in spine],
+        "leaning": [(joints["pelvis"], (0, 1, 0), 7.0), (joints["pelvis"], (0, 0, 1), 25.0)],
+    }.get(kind, [])
+    for side, out in (("left", 1.0), ("right", -1.0)):
+        upper, lower = {
+            "hanging": ((0.08 * out, 0.05, -1), (0.08 * out, 0.05, -1)), "forward": ((0, -1, 0.05), (0, -1, 0.05)),
+            "sitting": ((0.15 * out, -0.3, -1), (-0.1 * out, -1, -0.1)),
+            "twisted": ((0.3 * out, -0.2, -1), (0.6 * out, -0.8, 0.3)),
+            "bent": ((0.15 * out, -0.3, -1), (0.15 * out, -0.3, -1)), "leaning": (None, None),
+        }[kind]
+        limb = [joints[f"{side}_{joint}"] for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")]
+        if upper is not None:
+            turns += [(limb[0], limb[1], upper), (limb[1], limb[2], lower)]
+        if kind == "sitting":
+            turns += [(limb[3], limb[4], (0.2 * out, -1, -0.05)), (limb[4], limb[5], (0, 0.1, -1))]
+            if f"{side}_foot" in joints:
+                turns.append((limb[5], joints[f"{side}_foot"], (0.1 * out, -1, -0.45)))
+    return turns, more
+
+
+def of_file(bpy: Any, file: Any) -> Any:
+    """A character's armature as its rest pose is told in a JSON file (``shared/data/rigs``)."""
+    import json
+
+    told = json.loads(file.read_text(encoding="utf-8"))
+    armature = bpy.data.objects.new(file.stem, bpy.data.armatures.new(file.stem))
+    bpy.context.scene.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    for bone in told["bones"]:
+        edit = armature.data.edit_bones.new(bone["name"])
+        edit.head, edit.tail = bone["head"], bone["tail"]
+        edit.align_roll(bone["z_axis"])
+        if bone["parent"]:
+            edit.parent = armature.data.edit_bones[bone["parent"]]
+            edit.use_connect = bool(bone["connected"])
+    bpy.ops.object.mode_set(mode="OBJECT")
+    armature.matrix_world = _matrix(np.array(told["object_matrix"]))
+    for bone in armature.pose.bones:
+        bone.rotation_mode = told["rotation_mode"]
+    return armature

@@ -155,8 +155,8 @@ def test_a_body_of_its_own_keeps_the_motion(addon: Callable[[str], Any], takes: 
         turn = rotations.matrix_from_vector(np.array([0.0, -0.8 * sign, 0.0]))
         down[[elbow, wrist]] = down[shoulder] + (down[[elbow, wrist]] - down[shoulder]) @ turn.T
     down[[3, 13, 14]] = np.nan
-    lesser = retargeting.Body(retargeting.filled(down), np.isfinite(down).all(axis=1), body.fingers)
-    assert np.abs(lesser.rest - np.where(np.isfinite(down), down, skeleton.REST)).max() < 0.05
+    lesser = retargeting.laid(down)
+    assert np.abs(lesser.rest - skeleton.REST).max() < 0.05
     landed = retargeting.onto(motion, body, lesser, root).motion
     off = np.linalg.norm(landed.joints - take.joints, axis=-1).mean(axis=0)
     assert off[[1, 2, 7, 8, 10, 11]].max() < 1e-6 and off[[15, 20, 21]].max() < CENTIMETRE
@@ -682,3 +682,184 @@ def test_full_mode_refuses_what_it_does_not_know(stage: Stage) -> None:
     settings = stage.addon("dafnet_addon.blender.properties").settings_of(stage.ann, stage.scene)
     with pytest.raises(stage.error, match="'Odd' has no bone for the"):
         stage.addon("dafnet_addon.blender.scene_reader").read_scene(stage.bpy.context, settings)
+
+
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
+ENDS = {
+    "upper arms": ((16, 18), (17, 19)), "forearms": ((18, 20), (19, 21)), "thighs": ((1, 4), (2, 5)),
+    "shins": ((4, 7), (5, 8)), "shoulders": ((16, 17),),
+}
+BENT = {"elbows": ((16, 18, 20), (17, 19, 21)), "knees": ((1, 4, 7), (2, 5, 8))}
+
+
+def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Degrees between vectors (…, 3)."""
+    a, b = (v / np.linalg.norm(v, axis=-1, keepdims=True) for v in (a, b))
+    return np.degrees(np.arccos(np.clip((a * b).sum(-1), -1.0, 1.0)))
+
+
+def seen_off(joints: np.ndarray, source: np.ndarray) -> dict[str, np.ndarray]:
+    """What an eye sees of two motions (T, 22, 3): by how many degrees limbs, trunk and head lie otherwise, and bend."""
+    off = {name: np.concatenate([between(joints[:, b] - joints[:, a], source[:, b] - source[:, a]) for a, b in pairs])
+           for name, pairs in ENDS.items()}
+    for name, triples in BENT.items():
+        off[name] = np.concatenate([
+            np.abs(between(ours[:, 0] - ours[:, 1], ours[:, 2] - ours[:, 1])
+                   - between(theirs[:, 0] - theirs[:, 1], theirs[:, 2] - theirs[:, 1]))
+            for ours, theirs in ((joints[:, limb], source[:, limb]) for limb in map(list, triples))])
+    hips, theirs = joints[:, [1, 2]].mean(axis=1), source[:, [1, 2]].mean(axis=1)
+    off["trunk"] = between(joints[:, [16, 17]].mean(axis=1) - hips, source[:, [16, 17]].mean(axis=1) - theirs)
+    off["head"] = between(joints[:, 15] - hips, source[:, 15] - theirs)
+    return off
+
+
+class World:
+    """Where a rig's joints are in the room, and what FULL reads from it."""
+
+    def __init__(self, stage: Stage, rig: Any) -> None:
+        self.stage, self.rig, self.map = stage, rig, stage.rigs.detected(rig)
+        self.names = stage.addon("dafnet_addon.core.skeleton").JOINTS
+
+    def played(self, frames: range) -> np.ndarray:
+        known = [j for j, name in enumerate(self.names) if self.map.place(name)]
+        joints = np.full((len(frames), 22, 3), np.nan)
+        joints[:, known] = [self.stage.heads(self.rig, [self.map.place(self.names[j]) for j in known], f) for f in frames]
+        return joints
+
+    def read(self, frames: range) -> np.ndarray:
+        """Joints (T, 22, 3) of the canonical body that moves as the rig does."""
+        reading = self.stage.addon("dafnet_addon.blender.rig_reading")
+        bodies, poses = [], []
+        for frame in frames:
+            self.stage.scene.frame_set(frame)
+            evaluated = self.rig.evaluated_get(self.stage.bpy.context.evaluated_depsgraph_get())
+            bodies.append(np.array(evaluated.matrix_world))
+            poses.append(reading.pose_matrices(evaluated, [self.map.place(name) for name in self.names]))
+        return reading.joints_of(self.rig, self.map, np.array(bodies), np.array(poses), 1.0)
+
+
+@pytest.mark.parametrize("rest", rig_builders.RESTS)
+@pytest.mark.parametrize("kind", ["mixamo", "unreal", "vrm"])
+def test_the_rest_pose_does_not_matter(stage: Stage, kind: str, rest: str) -> None:
+    """Arms hanging or ahead, sitting, twisted, bent, leaning: limbs, trunk and head lie in the room as the character's.
+
+    And FULL reads them back so.
+    """
+    stage.play("write")
+    rig = stage.build(kind)
+    rig_builders.rested(stage.bpy, rig, *rig_builders.rest_pose(rest, stage.rigs.detected(rig).joints))
+    baked = stage.bake(kind, rig)
+    for part, distances in stage.errors(kind, rig).items():
+        assert distances.mean() < CENTIMETRE, part
+    world, frames = World(stage, rig), range(1, len(stage.take) + 1, 9)
+    played = world.played(frames)
+    for part, off in seen_off(played, stage.take.joints[::9]).items():
+        assert off.mean() < 4.0 and off.max() < 6.0, f"{part} {off.mean():.1f} ({off.max():.1f})"
+    assert max(mean for mean, _ in baked.angles.values()) < 5.0
+    for part, off in seen_off(world.read(frames), played).items():
+        assert off.max() < 5.0, f"{part} read {off.mean():.1f} ({off.max():.1f})"
+
+
+@pytest.mark.parametrize("size", [0.01, 1.0, 100.0])
+def test_bones_may_point_anywhere_and_objects_stand_anyhow(stage: Stage, size: float) -> None:
+    """Random tails and rolls, an object of any scale that is turned: nothing of it is seen."""
+    stage.play("write")
+    rig = stage.build("vrm")
+    rng = np.random.default_rng(5)
+    stage.bpy.context.view_layer.objects.active = rig
+    stage.bpy.ops.object.mode_set(mode="EDIT")
+    for bone in rig.data.edit_bones:
+        bone.use_connect = False
+    turn = stage.addon("dafnet_addon.core.rotations").matrix_from_vector(np.array([0.4, -1.1, 0.6]))
+    for bone in rig.data.edit_bones:
+        head = turn @ np.array(bone.head) / size
+        bone.head, bone.tail = head, head + 0.1 * rng.normal(size=3) / size
+        bone.roll = rng.uniform(-3.0, 3.0)
+    stage.bpy.ops.object.mode_set(mode="OBJECT")
+    rig.scale = (size,) * 3
+    rig.rotation_euler = (0.7, 0.2, -2.0)
+    stage.bake("vrm", rig)
+    assert max(distances.mean() for distances in stage.errors("vrm", rig).values()) < CENTIMETRE
+    played = World(stage, rig).played(range(1, len(stage.take) + 1, 9))
+    for part, off in seen_off(played, stage.take.joints[::9]).items():
+        assert off.max() < 6.0, f"{part} {off.mean():.1f} ({off.max():.1f})"
+
+
+BVH = ["accad_male1_B3_walk", "accad_male1_A9_lie_down", "cmu69_69_02_1", "cmu_daz_14_12_wash_windows",
+       "cmu_daz_14_30_sit_stepstool", "snu_ys2010_walk_turn_180"]
+
+
+def imported(stage: Stage, name: str) -> Any:
+    """A real BVH as Blender's own importer brings it in, in metres."""
+    file = SHARED / "mocap" / "raw_samples" / f"{name}.bvh"
+    if not file.is_file():
+        pytest.skip(f"needs the motion file {file}")
+    if not hasattr(stage.bpy.ops.import_anim, "bvh"):
+        pytest.skip("this Blender has no importer of BVH")
+    stage.bpy.ops.import_anim.bvh(filepath=str(file), global_scale=0.01)
+    return stage.bpy.context.object
+
+
+@pytest.mark.parametrize("name", BVH)
+def test_full_mode_reads_real_imports_as_they_are_seen(stage: Stage, name: str) -> None:
+    """Whatever pose they rest in: trunks bent by a right angle, arms ahead, legs astride, collars on one side only."""
+    rig = imported(stage, name)
+    end = int(rig.animation_data.action.frame_range[1])
+    world, frames = World(stage, rig), range(2, end, max(1, end // 40))
+    source, read = world.played(frames), world.read(frames)
+    for part, off in seen_off(read, source).items():
+        most = 0.1 if part in ("upper arms", "forearms", "elbows", "thighs", "shins", "knees") else 6.0
+        assert off.max() < most, f"{part} {off.mean():.1f} ({off.max():.1f})"
+    way = [joints[:, 15] - joints[:, [1, 2]].mean(axis=1) for joints in (read, source)]
+    size = np.linalg.norm(way[0], axis=1).max() / np.linalg.norm(way[1], axis=1).max()
+    assert np.linalg.norm(way[0] - size * way[1], axis=1).max() < 4.0 * CENTIMETRE, "the head over the hips"
+
+
+REAL = {  # mean degrees of arms, legs and trunk that the bakes may be off; proportions that differ are all that is left
+    "mixamo_gltf_woman": (1.0, 4.0, 4.0), "mixamo_gltf_soldier": (1.0, 6.0, 4.0), "vrm_b": (1.0, 19.0, 5.0),
+    "robot_gltf": (1.0, 26.0, 5.0), "chibi_gltf": (1.0, 31.0, 6.0),
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("take", ["walk", "sit", "write"])
+def test_real_characters_keep_the_motions_shape(stage: Stage, name: str, take: str) -> None:
+    """And the report says what an eye sees."""
+    file = SHARED / "rigs" / f"{name}.json"
+    if not file.is_file():
+        pytest.skip(f"needs the rest pose {file}")
+    rig = rig_builders.of_file(stage.bpy, file)
+    stage.play(take)
+    baked = stage.bake(name, rig)
+    step = 3
+    off = seen_off(World(stage, rig).played(range(1, len(stage.take) + 1, step)), stage.take.joints[::step])
+    arms, legs, trunk = REAL[name]
+    for parts, most in ((("upper arms", "forearms", "elbows"), arms), (("thighs", "shins", "knees"), legs),
+                        (("trunk", "head"), trunk)):
+        for part in parts:
+            assert off[part].mean() < most, f"{part} {off[part].mean():.1f} ({off[part].max():.1f})"
+    for limb, parts in (("arm", ("upper arms", "forearms", "elbows")), ("leg", ("thighs", "shins", "knees"))):
+        told = max(baked.angles[f"{side} {limb}"][0] for side in ("left", "right"))
+        assert told > max(off[part].mean() for part in parts) - 2.5, "the report is no better than what is seen"
+
+
+def test_a_bake_that_is_off_is_warned_about(stage: Stage) -> None:
+    """Long arms: the hands land, so the elbows are bent, and the report names the arms in degrees."""
+    stage.play("walk")
+    rig = stage.build("mixamo", arms=1.2)
+    stage.bpy.context.view_layer.objects.active = rig
+    messages: list[tuple[set[str], str]] = []
+    operator = stage.addon("operators.bake_to_rig").DAFNET_OT_bake_to_rig
+
+    class Reporter:
+        def report(self, kind: set[str], message: str) -> None:
+            messages.append((kind, message))
+
+    assert operator.execute(Reporter(), stage.bpy.context) == {"FINISHED"}
+    warned = [message for kind, message in messages if kind == {"WARNING"}]
+    assert len(warned) == 1 and "left arm by" in warned[0] and "degrees" in warned[0]
+    assert "wrists 0.0" in messages[-1][1] and "left arm" in messages[-1][1], "places and angles are told together"
+    messages.clear()
+    stage.bpy.context.view_layer.objects.active = stage.build("mixamo")
+    operator.execute(Reporter(), stage.bpy.context)
+    assert [kind for kind, _ in messages] == [{"INFO"}]

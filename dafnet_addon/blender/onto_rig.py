@@ -11,7 +11,7 @@ import numpy as np
 from mathutils import Euler, Matrix, Quaternion
 
 from ..core.errors import InputError
-from ..core.retargeting import Landed, canonical_body, onto
+from ..core.retargeting import canonical_body, limb_errors, onto
 from ..core.root import root_from_matrices
 from ..core.rotations import continuous_signs, normalised, quaternion_from_matrix
 from ..core.skeleton import JOINTS
@@ -26,7 +26,7 @@ from .rigs import RigMap, in_names_of, required
 
 __all__ = ["Baked", "bake_onto_rig", "frames_played"]
 
-_CHECKED = 12
+_CHECKED = 24
 """Frames in which the result is measured."""
 _BONE_PATH = re.compile(r'^pose\.bones\["(.+?)"\](?:\["(.+)"\])?')
 Curves = Callable[[str, int, str], bpy.types.FCurve]
@@ -35,12 +35,14 @@ Curves = Callable[[str, int, str], bpy.types.FCurve]
 @dataclass(frozen=True)
 class Baked:
     """The new ``action``; ``errors``: mean and largest distance (metres) of wrists, ankles, head and pelvis (the middle of the
-    hip joints) from where they were to lie, measured on the rig as Blender plays it. ``ratio``: the rig's size over the
+    hip joints) from where they were to lie. ``angles``: mean and largest angle (degrees) by which limbs and trunk lie otherwise
+    than the character's (``limb_errors``). Both are measured on the rig as Blender plays it. ``ratio``: the rig's size over the
     character's, by which the motion was scaled. ``overruled``: keyed bones that constraints or drivers of their own move, too.
     """
 
     action: bpy.types.Action
     errors: dict[str, tuple[float, float]]
+    angles: dict[str, tuple[float, float]]
     ratio: float
     overruled: tuple[str, ...] = ()
 
@@ -129,7 +131,8 @@ def _bake(
     _, scale = rigid_parts(still, f"armature '{rig.name}'")
     shape = shape_of(rig, rig_map, pose_matrices(evaluated, places), scale)
     path, _ = root_from_matrices(_facing(read.bodies))
-    landed = onto(character_motion(character, read.bodies, read.poses), canonical_body(wish.size), shape.body, path.position)
+    motion = character_motion(character, read.bodies, read.poses)
+    landed = onto(motion, canonical_body(wish.size), shape.body, path.position)
     carrier = path.matrices()
     carrier[:, :3, :3] = scale * carrier[:, :3, :3] @ shape.axes.T
     objects = carrier if wish.root_motion == "OBJECT" else still
@@ -141,7 +144,8 @@ def _bake(
         previous.use_fake_user = True
     if held.loose:
         _settle_loose(context, rig, controls, held, made, curves, wish.frames)
-    return Baked(action, _measured(context, rig, rig_map, landed, wish), landed.ratio, _overruled(rig, controls))
+    errors, angles = _measured(context, rig, rig_map, landed.targets, motion.joints, wish)
+    return Baked(action, errors, angles, landed.ratio, _overruled(rig, controls))
 
 
 def _overruled(rig: bpy.types.Object, controls: list[Control]) -> tuple[str, ...]:
@@ -356,19 +360,23 @@ def _settle_loose(
 
 
 def _measured(
-    context: bpy.types.Context, rig: bpy.types.Object, rig_map: RigMap, landed: Landed, wish: _Wish,
-) -> dict[str, tuple[float, float]]:
-    """Errors as in ``Baked``."""
+    context: bpy.types.Context, rig: bpy.types.Object, rig_map: RigMap, targets: np.ndarray, source: np.ndarray, wish: _Wish,
+) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[float, float]]]:
+    """Errors and angles as in ``Baked``, of the joints' targets and the source's joints (T, 22, 3)."""
     chosen = np.unique(np.linspace(0, len(wish.frames) - 1, _CHECKED).astype(int))
-    parts = {"wrists": (20, 21), "ankles": (7, 8), "head": (15,), "pelvis": (1, 2)}
-    found: dict[str, list[np.ndarray]] = {part: [] for part in parts}
-    for t in chosen:
-        context.scene.frame_set(int(wish.frames[t]))
+    bones = {j: rig_map.place(name) for j, name in enumerate(JOINTS) if rig_map.place(name)}
+    played = np.full((len(chosen), len(JOINTS), 3), np.nan)
+    for t, frame in enumerate(wish.frames[chosen]):
+        context.scene.frame_set(int(frame))
         evaluated = rig.evaluated_get(context.evaluated_depsgraph_get())
-        for part, joints in parts.items():
-            bones = [rig_map.place(JOINTS[j]) for j in joints]
-            at = np.array([evaluated.matrix_world @ evaluated.pose.bones[bone].head for bone in bones])
-            off = at - landed.targets[t, list(joints)]
-            off = off.mean(axis=0, keepdims=True) if part == "pelvis" else off
-            found[part].append(wish.unit * np.linalg.norm(off, axis=-1))
-    return {part: (float(np.mean(values)), float(np.max(values))) for part, values in found.items()}
+        for j, bone in bones.items():
+            played[t, j] = evaluated.matrix_world @ evaluated.pose.bones[bone].head
+
+    def told(values: np.ndarray) -> tuple[float, float]:
+        return float(np.mean(values)), float(np.max(values))
+
+    off = played - targets[chosen]
+    parts = {"wrists": off[:, [20, 21]], "ankles": off[:, [7, 8]], "head": off[:, [15]],
+             "pelvis": off[:, [1, 2]].mean(axis=1, keepdims=True)}
+    errors = {part: told(wish.unit * np.linalg.norm(values, axis=-1)) for part, values in parts.items()}
+    return errors, {limb: told(values) for limb, values in limb_errors(played, source[chosen]).items()}

@@ -87,13 +87,22 @@ def controls_of(rig: bpy.types.Object, rig_map: RigMap, limbs: str, carried_by_r
             ends.append(Control(names["pole"], joints[1], moves=True, pole=k))
     for j, joint in enumerate(JOINTS):
         if joint in rig_map.joints and j not in replaced:
-            controls.append(Control(rig_map.joints[joint], j, moves=j == 0))
+            controls.append(Control(rig_map.joints[joint], j, moves=j == 0 or _apart(rig, rig_map, j)))
     controls += sorted(ends, key=lambda control: control.pole is not None)
     for control in controls:
         bone = rig.data.bones[control.bone]
         if control.moves and bone.parent and bone.use_connect:
             raise InputError(f"The bone '{bone.name}' is connected to its parent and cannot move; disconnect it in edit mode.")
     return controls
+
+
+def _apart(rig: bpy.types.Object, rig_map: RigMap, joint: int) -> bool:
+    """Whether a hand or foot hangs on no bone of the body, as where inverse kinematics was lost on the way into Blender."""
+    if joint not in (limb[2] for limb in LIMBS.values()):
+        return False
+    bone = rig.data.bones[rig_map.joints[JOINTS[joint]]]
+    body = {name for name in rig_map.joints.values() if name != rig_map.root}
+    return bone.parent is not None and not any(above.name in body for above in bone.parent_recursive)
 
 
 def settled(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.types.Object:

@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.retargeting import Body, Motion, canonical_body, filled, onto
-from ..core.rotations import normalised, rotate, transpose
+from ..core.retargeting import Body, Motion, canonical_body, laid, onto
+from ..core.rotations import normalised, rotate, rotation_between, transpose
 from ..core.skeleton import JOINTS, PARENTS
 from .mannequin import FACING
 from .rigs import RigMap
@@ -22,7 +22,7 @@ class Shape:
     """A rig at rest.
 
     ``axes`` (3, 3): columns are the canonical frame's axes in the armature's space. ``rest`` (22, 4, 4): matrices of the
-    joints' bones in that space, NaN where it has none. ``body``: the same as a body, in world lengths.
+    joints' bones in that space, NaN where it has none. ``body``: the rig's body, in world lengths.
     """
 
     axes: np.ndarray
@@ -55,29 +55,41 @@ def shape_of(armature: bpy.types.Object, rig_map: RigMap, rest: np.ndarray, scal
     heads = rest[:, :3, 3]
     axes = _axes(heads)
     present = np.array([rig_map.joints.get(name) is not None for name in JOINTS])
-    fingers = np.full((2, 3), np.nan)
-    for k, name in enumerate(("left_wrist", "right_wrist")):
-        hand = armature.data.bones.get(rig_map.place(name) or "")
-        tips = [b.head_local for b in hand.children if "thumb" not in b.name.lower()] if hand else []
-        tips = [tip for tip in tips if (tip - hand.head_local).length > 0.1 * hand.length]
-        if tips:
-            fingers[k] = (np.mean([np.array(tip) for tip in tips], axis=0) - np.array(hand.head_local)) @ axes
-    return Shape(axes, rest, Body(filled(scale * heads @ axes), present, fingers))
+    bones = [armature.data.bones.get(rig_map.place(name) or "") for name in ("left_wrist", "right_wrist")]
+    return Shape(axes, rest, laid(scale * heads @ axes, present, np.array([_hand(bone) @ axes for bone in bones])))
+
+
+def _hand(hand: bpy.types.Bone | None) -> np.ndarray:
+    """Where the fingers point, and the way across them to the thumb's side (2, 3), armature's space; NaN where unknown."""
+    found = np.full((2, 3), np.nan)
+    if hand is None:
+        return found
+    tips = {tip.name.lower(): np.array(tip.head_local - hand.head_local) for tip in hand.children}
+    tips = {name: tip for name, tip in tips.items() if "thumb" not in name and np.linalg.norm(tip) > 0.1 * hand.length}
+    if tips:
+        found[0] = np.mean(list(tips.values()), axis=0)
+    index, little = (next((tip for name, tip in tips.items() if word in name), None) for word in ("index", "pinky"))
+    if index is not None and little is not None:
+        found[1] = index - little
+    return found
 
 
 def _axes(heads: np.ndarray) -> np.ndarray:
-    """Columns right, forward, up of a body by its joints (22, 3); the armature's own axes where they are near."""
-    right = normalised(heads[2] - heads[1]) + normalised(heads[17] - heads[16])
-    up = _snapped(heads[15] - 0.5 * (heads[1] + heads[2]))
-    right = _snapped(right - (right @ up) * up)
-    right = normalised(right - (right @ up) * up)
+    """Columns right, forward, up of a body by its joints at rest (22, 3).
+
+    Up is the armature's own axis nearest to the way from the ankles to the head, so that the object stands upright; right is
+    one of its axes, too, where one is near.
+    """
+    up = _nearest_axis(heads[15] - 0.5 * (heads[7] + heads[8]))
+    hips, shoulders = (unit - (unit @ up) * up for unit in map(normalised, (heads[2] - heads[1], heads[17] - heads[16])))
+    right = normalised(hips + shoulders if hips @ shoulders > 0.0 else hips)
+    right = _nearest_axis(right) if np.abs(right).max() > _SNAP else right
     return np.stack([right, np.cross(up, right), up], axis=1)
 
 
-def _snapped(direction: np.ndarray) -> np.ndarray:
-    unit = normalised(direction)
-    k = int(np.argmax(np.abs(unit)))
-    return np.sign(unit[k]) * np.eye(3)[k] if abs(unit[k]) > _SNAP else unit
+def _nearest_axis(direction: np.ndarray) -> np.ndarray:
+    k = int(np.argmax(np.abs(direction)))
+    return np.sign(direction[k]) * np.eye(3)[k]
 
 
 def _world(bodies: np.ndarray, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -97,12 +109,16 @@ def character_motion(armature: bpy.types.Object, bodies: np.ndarray, poses: np.n
 def motion_of(shape: Shape, bodies: np.ndarray, poses: np.ndarray) -> Motion:
     """The motion of any rig, its joints' bones as for ``character_motion``; joints without a bone follow their parents."""
     joints, turned = _world(bodies, poses)
-    turns = turned @ transpose(shape.axes.T @ shape.rest[:, :3, :3])
+    frames = turned @ transpose(shape.body.alignment @ shape.axes.T @ shape.rest[:, :3, :3])
     for j, parent in enumerate(PARENTS):
         if not np.isfinite(shape.rest[j]).all():
-            turns[:, j] = turns[:, parent]
-            joints[:, j] = joints[:, parent] + rotate(turns[:, parent], shape.body.rest[j] - shape.body.rest[parent])
-    return Motion(joints, turns @ transpose(shape.body.alignment()))
+            frames[:, j] = frames[:, parent]
+            joints[:, j] = joints[:, parent] + rotate(frames[:, parent], shape.body.rest[j] - shape.body.rest[parent])
+    for collar, shoulder in ((13, 16), (14, 17)):
+        if not np.isfinite(shape.rest[collar]).all():  # what moves the shoulder has no bone in the map
+            along = rotate(frames[:, collar], shape.body.rest[shoulder] - shape.body.rest[collar])
+            frames[:, collar] = rotation_between(along, joints[:, shoulder] - joints[:, collar]) @ frames[:, collar]
+    return Motion(joints, frames)
 
 
 def joints_of(
@@ -121,4 +137,4 @@ def joints_of(
     shape = shape_of(armature, rig_map, matrices, scale)
     motion = motion_of(shape, bodies, poses)
     floor = motion.joints[:, 0] * (1.0, 1.0, 0.0) + (0.0, 0.0, bodies[0, 2, 3])
-    return onto(motion, shape.body, canonical_body(size), floor).motion.joints
+    return onto(motion, shape.body, canonical_body(size), floor, landing=False).motion.joints

@@ -198,7 +198,7 @@ _WORDS = {
     "pelvis": {"pelvis", "hips", "cog"}, "spine": {"spine", "chest", "upperchest", "torso", "abdomen", "waist", "back"},
     "neck": {"neck"}, "head": {"head", "skull"}, "collar": {"clavicle", "collar", "collarbone", "clav"},
     "shoulder": {"upperarm", "uparm", "shldr", "bicep", "humerus"},
-    "elbow": {"forearm", "lowerarm", "lowarm", "loarm", "elbow", "ulna"}, "wrist": {"hand", "wrist"},
+    "elbow": {"forearm", "lowerarm", "lowarm", "loarm", "elbow", "ulna"}, "wrist": {"hand", "wrist", "palm"},
     "hip": {"thigh", "upleg", "upperleg", "femur"}, "knee": {"shin", "calf", "lowerleg", "lowleg", "loleg", "knee", "crus"},
     "ankle": {"foot", "ankle"}, "foot": {"toe", "toes", "toebase", "ball"},
 }
