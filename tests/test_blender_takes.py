@@ -244,7 +244,8 @@ def test_cancelled_between_two_bakes_none_is_left(shot: Shot, before: bool) -> N
     assert len(shot.listed()) == len(listed) + 2
     steps.close()
     assert shot.listed() == listed and {action.name for action in shot.bpy.data.actions} == actions
-    assert (shot.ann.animation_data.action in listed) if before else not shot.ann.animation_data.action
+    data = shot.ann.animation_data
+    assert data.action in listed if before else data is None
 
 
 def test_deleted_between_two_bakes_none_is_left(shot: Shot) -> None:

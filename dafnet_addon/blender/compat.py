@@ -46,19 +46,28 @@ def assign_action(owner: bpy.types.Object, action: bpy.types.Action) -> None:
         data.action_slot = action.slots[0]
 
 
-def playing(owner: bpy.types.Object) -> Callable[[], None]:
-    """A function that lets ``owner`` play again what it plays now."""
+def playing(owner: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
+    """A function that lets ``owner``, as it may have to be found again, play what it plays now, mixed as it is now."""
     data = owner.animation_data
-    action = data.action if data else None
-    slot = data.action_slot if _SLOTS and action else None
+    if data is None:
+        return lambda found: found.animation_data_clear()
+    action = data.action
+    name, kept = (action.name_full, action.use_fake_user) if action else (None, False)
+    mixed = data.action_blend_type, data.action_influence
+    slot = data.action_slot.handle if _SLOTS and data.action_slot else None
+    last_slot = data.last_slot_identifier if _SLOTS else ""
 
-    def again() -> None:
-        if data is None:
-            owner.animation_data_clear()
-            return
+    def again(found: bpy.types.Object) -> None:
+        data = found.animation_data_create()
+        action = next((each for each in bpy.data.actions if each.name_full == name), None)
         data.action = action
-        if slot is not None:
-            data.action_slot = slot
+        data.action_blend_type, data.action_influence = mixed
+        if _SLOTS:
+            if action:
+                data.action_slot = next((each for each in action.slots if each.handle == slot), None)
+            data.last_slot_identifier = last_slot
+        if action:
+            action.use_fake_user = kept
 
     return again
 

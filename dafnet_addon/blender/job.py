@@ -4,6 +4,7 @@ A job knows objects by name only and looks them up at each stage, since they may
 """
 
 from collections.abc import Callable, Generator
+from contextlib import ExitStack
 from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -19,7 +20,6 @@ from ..core.progress import drained, within
 from ..core.take import Controls, Take
 from .armature import metres_per_unit
 from .baker import bake
-from .compat import assign_action
 from .properties import (
     CLEAN_UP,
     Settings,
@@ -31,8 +31,9 @@ from .properties import (
     settings_of,
     weights_path,
 )
+from .rollback import state_of, undone_on_failure
 from .scene_reader import read_steps
-from .takes import add_take, draw_of, drop_take, play_take, stored
+from .takes import add_take, draw_of, play_take, stored
 
 if TYPE_CHECKING:
     from ..core.weights import Weights
@@ -89,8 +90,8 @@ def steps(
 
     ``settings`` comes from ``settings_of(armature, scene, **overrides)``. Without ``weights`` those of the
     preferences, else the shipped ones, are loaded. ``watch``: see ``takes_steps``. The current frame is as it was at every
-    yield (but see ``read_steps`` for simulations), and until the last stage nothing in the scene is changed: an error
-    (``InputError``, ``WeightsError``) or ``close()`` leaves it untouched.
+    yield (but see ``read_steps`` for simulations). Any error (``InputError``, ``WeightsError`` or whatever else), and
+    ``close()``, leaves the scene as it was.
     """
     if weights is None:
         weights = load_weights(weights_path(context))
@@ -131,40 +132,34 @@ def steps(
 def _bake_steps(
     settings: Settings, takes: list[Take], controls: Controls, draws: list[Draw]
 ) -> Generator[float, None, list[bpy.types.Action]]:
-    """An action for each take, listed; the first one plays. All are made, or none: what came of a cancelled job goes again."""
+    """An action for each take, listed; the first one plays. All are made, or none: whatever stops it, nothing has changed."""
     names: list[str] = []
-    played = _playing(settings)
-    try:
+    with ExitStack() as undo:
+        undo.callback(_unbake, settings, names, state_of(_character(settings)))
         for take, draw in zip(takes, draws, strict=True):
-            armature, unit = find_object(settings, settings.armature, "character"), metres_per_unit(find_scene(settings))
-            action = bake(take, armature, settings.frame_start, f"{armature.name} take", unit)
-            names.append(action.name_full)
-            add_take(armature, action, take, controls, draw, settings.frame_start)
+            armature = _character(settings)
+            with undone_on_failure(armature):
+                unit = metres_per_unit(find_scene(settings))
+                action = bake(take, armature, settings.frame_start, f"{armature.name} take", unit)
+                add_take(armature, action, take, controls, draw, settings.frame_start)
+                names.append(action.name_full)
             if len(names) < len(takes):
                 yield len(names) / len(takes)
         actions = [find_action(name) for name in names]
-    except (GeneratorExit, InputError):
-        _unbake(settings, names, played)
-        raise
-    play_take(armature, actions[0])
+        play_take(armature, actions[0])
+        undo.pop_all()
     return actions
 
 
-def _playing(settings: Settings) -> str | None:
-    """The action that the character plays."""
-    data = find_object(settings, settings.armature, "character").animation_data
-    return data.action.name_full if data and data.action else None
+def _character(settings: Settings) -> bpy.types.Object:
+    return find_object(settings, settings.armature, "character")
 
 
-def _unbake(settings: Settings, names: list[str], played: str | None) -> None:
-    """Remove the actions of these names again, and let the character play what it did."""
-    made = [action for action in bpy.data.actions if action.name_full in names]
-    for armature in (o for o in find_scene(settings).objects if o.name_full == settings.armature):
-        for action in made:
-            drop_take(armature, [row.action for row in armature.dafnet.takes].index(action))
-        if played is not None:
-            assign_action(armature, find_action(played))
-    for action in made:
+def _unbake(settings: Settings, names: list[str], restore: Callable[[bpy.types.Object], None]) -> None:
+    """Give the character its state back if it is there, and remove the actions of these names."""
+    for armature in (o for o in bpy.data.objects if o.name_full == settings.armature):
+        restore(armature)
+    for action in [action for action in bpy.data.actions if action.name_full in names]:
         bpy.data.actions.remove(action)
 
 

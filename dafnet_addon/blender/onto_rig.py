@@ -1,8 +1,7 @@
 """The motion that a DAFNet character plays, hand edits included, onto an armature of the animator's own: a new action."""
 
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,12 +16,13 @@ from ..core.rotations import continuous_signs, normalised, quaternion_from_matri
 from ..core.skeleton import JOINTS
 from .armature import character_scale, metres_per_unit
 from .baker import TRANSFORMS, driven, key_curves
-from .compat import action_curves, assign_action, new_action, playing
+from .compat import action_curves, assign_action, new_action
 from .mannequin import FACING
 from .playback import frame_kept
 from .rig_controls import Attachments, Channels, Control, channels, controls_of, posed, probe, settled
 from .rig_reading import character_motion, pose_matrices, rigid_parts, shape_of
 from .rigs import RigMap, in_names_of, required
+from .rollback import undone_on_failure
 
 __all__ = ["Baked", "bake_onto_rig", "frames_played"]
 
@@ -85,7 +85,7 @@ def bake_onto_rig(
     required(rig, rig_map)
     controls = controls_of(rig, rig_map, limbs, root_motion == "BONE")
     read = _read(context, character, rig, frames)
-    with frame_kept(context.scene), _undone_on_failure(rig):
+    with frame_kept(context.scene), undone_on_failure(rig):
         return _bake(context, character, rig, rig_map, controls, read, _Wish(
             root_motion, limbs, np.array(frames, float), name or f"{character.name} on {rig.name}", size, unit))
 
@@ -198,29 +198,6 @@ def _read(context: bpy.types.Context, character: bpy.types.Object, rig: bpy.type
     if not all(np.isfinite(values).all() for values in (read.bodies, read.poses, read.above)):
         raise InputError(f"'{character.name}' or '{rig.name}' has a transform that is not a number; fix what drives it.")
     return read
-
-
-@contextmanager
-def _undone_on_failure(rig: bpy.types.Object) -> Iterator[None]:
-    """The rig's action, pose and settings as they were where the block fails."""
-    again, basis = playing(rig), rig.matrix_basis.copy()
-    poses = {bone.name: bone.matrix_basis.copy() for bone in rig.pose.bones}
-    values = {
-        (bone.name, key): value for bone in rig.pose.bones for key, value in bone.items() if isinstance(value, int | float)
-    }
-    before = set(bpy.data.actions)
-    try:
-        yield
-    except BaseException:
-        again()
-        for made in set(bpy.data.actions) - before:
-            bpy.data.actions.remove(made)
-        rig.matrix_basis = basis
-        for bone, matrix in poses.items():
-            rig.pose.bones[bone].matrix_basis = matrix
-        for (bone, key), value in values.items():
-            rig.pose.bones[bone][key] = value
-        raise
 
 
 def _animated(rig: bpy.types.Object) -> tuple[set[str], set[tuple[str, str]]]:
