@@ -22,6 +22,7 @@ from dafnet_addon.baselines.samplers import sampler_of
 from dafnet_addon.blender.demo_room import FURNITURE, Part
 from dafnet_addon.blender.stage import Colour, Stage, mixed, solids
 from dafnet_addon.core.conditions import PREROLL, shot_steps
+from dafnet_addon.core.files import whole_file
 from dafnet_addon.core.kinematics import fit, forward_kinematics
 from dafnet_addon.core.paths import Route, Stop, facing, route
 from dafnet_addon.core.progress import drained
@@ -604,14 +605,14 @@ def draw(
         print("Figures 15 and 16 compare systems and no other system's weights were given: left out.", file=sys.stderr)
         chosen = [number for number in chosen if number not in _OF_SEVERAL]
     studio = _Studio(load_weights(weights), {name: load_weights(file) for name, file in others.items()}, scale)
-    output.mkdir(parents=True, exist_ok=True)
     files = []
     for done, number in enumerate(chosen):
         progress(done / len(chosen))
         picture = FIGURES[number](studio)
         files.append(output / f"figure_{int(number):02d}.png")
         flat = picture.quantize(_COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-        flat.save(files[-1], optimize=True)
+        with whole_file(files[-1]) as part:
+            flat.save(part, format="PNG", optimize=True)
     progress(1.0)
     return files
 

@@ -109,6 +109,17 @@ def test_text_is_read_and_written_in_one_encoding_everywhere(file: Path) -> None
     assert not lines, f"{file.name}: say encoding=\"utf-8\" in line {lines}"
 
 
+@pytest.mark.parametrize("file", sources("dafnet_addon"), ids=lambda file: file.relative_to(ROOT).as_posix())
+def test_what_users_keep_is_written_whole(file: Path) -> None:
+    """That is, to the ``part`` of ``core.files.whole_file``, by which weights are written in ``training.export``."""
+    calls = [node for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if isinstance(node, ast.Call)]
+    written = {"write_text": lambda call: call.func.value, "write_bytes": lambda call: call.func.value}
+    written |= dict.fromkeys(("savefig", "save_as_mainfile"), lambda call: [*call.args, *(k.value for k in call.keywords)][0])
+    to = {ast.unparse(written[c.func.attr](c)) for c in calls if getattr(c.func, "attr", "") in written}
+    the_projects_own = file.name == "paper_test.py"
+    assert to <= {"part", "str(part)"} or file.name == "weights.py" or the_projects_own
+
+
 def test_importing_the_package_loads_its_core_and_numpy_alone() -> None:
     code = (
         "import sys, numpy; before = set(sys.modules); import dafnet_addon; assert callable(dafnet_addon.generate);"

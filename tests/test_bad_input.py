@@ -487,7 +487,7 @@ def test_whatever_becomes_a_mesh_is_read_and_moves(shot: Shot) -> None:
 
 @pytest.mark.parametrize(
     ("output", "words"),
-    [("{tmp}/file/out.blend", "file cannot be used"), ("{tmp}/folder.blend", "is a folder")],
+    [("{tmp}/file/out.blend", "file' is no folder"), ("{tmp}/folder.blend", "is a folder")],
 )
 def test_an_output_that_cannot_be_written(
     shot: Shot, capfd: pytest.CaptureFixture[str], output: str, words: str,

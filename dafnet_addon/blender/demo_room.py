@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
+from ..core.files import require_writable, save_text
 from ..core.paths import Route
 from ..core.progress import drained
 from ..core.root import smoothed
@@ -19,6 +20,7 @@ from ..core.weights import load_weights
 from ..demo import FPS, PLACES, Place, demo_report, demo_route, hand_target
 from . import job
 from .armature import create_character
+from .batch import save_scene
 from .compat import assign_action, new_action
 from .preview import look_at, render_film, render_sheet, use_workbench
 from .properties import ensure_registered
@@ -193,8 +195,10 @@ def run_demo(
 ) -> dict[str, Any]:
     """Build the room in an empty file, generate and bake, and write ``demo.blend``, its preview and ``report.json``.
 
-    Returns the report. ``progress`` is called with the part done, in [0, 1]. Raises WeightsError.
+    Returns the report. ``progress`` is called with the part done, in [0, 1]. Raises WeightsError, and InputError where the
+    folder cannot be written to.
     """
+    require_writable(folder / "demo.blend")
     loaded = load_weights(weights)
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     ensure_registered()
@@ -204,13 +208,10 @@ def run_demo(
     generating = 0.2 if preview else 1.0
     result = drained(job.steps(bpy.context, settings, loaded), lambda part: progress(generating * part))
 
-    folder.mkdir(parents=True, exist_ok=True)
     read = read_scene(bpy.context, settings)
     report = demo_report(result.take, read.scene, read.controls, loaded, result.seconds)
-    (folder / "report.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
-    scene_file = (folder / "demo.blend").resolve()
-    scene_file.unlink(missing_ok=True)  # else Blender would keep the old one as demo.blend1
-    bpy.ops.wm.save_as_mainfile(filepath=str(scene_file), compress=True)
+    save_text(folder / "report.json", json.dumps(report, indent=2))
+    save_scene(folder / "demo.blend", lambda: progress(generating), compress=True)
     if preview:
         frames = np.linspace(room.scene.frame_start, room.scene.frame_end, 16).astype(int).tolist()
         render_sheet(room.scene, folder / "sheet.png", frames)

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from ..core.files import whole_file
 from .compat import output_video
 
 __all__ = ["look_at", "render_film", "render_sheet", "use_workbench"]
@@ -42,22 +43,31 @@ def render_film(
 ) -> None:
     """Render every ``every``-th frame of the scene to an H.264 MP4 that plays at the scene's speed.
 
-    ``progress`` is called with the part done, in [0, 1]. The scene's render settings are left as the film needed them.
+    ``progress`` is called with the part done, in [0, 1]; the KeyboardInterrupt that it may raise is raised after the frame.
+    The scene's render settings are left as the film needed them.
     """
     use_workbench(scene)
     output_video(scene)
     scene.frame_step = every
     scene.render.fps_base *= every
     scene.render.use_file_extension = False
-    scene.render.filepath = str(path)
     span = max(scene.frame_end - scene.frame_start, 1)
+    stops: list[KeyboardInterrupt] = []
 
     def report(rendered: bpy.types.Scene, *_: object) -> None:
-        progress((rendered.frame_current - rendered.frame_start) / span)
+        try:
+            progress((rendered.frame_current - rendered.frame_start) / span)
+        except KeyboardInterrupt as stop:  # which Blender would print and forget
+            stops.append(stop)
+            rendered.frame_current = rendered.frame_end
 
     bpy.app.handlers.render_write.append(report)
     try:
-        bpy.ops.render.render(animation=True, scene=scene.name)
+        with whole_file(path) as part:
+            scene.render.filepath = str(part)
+            bpy.ops.render.render(animation=True, scene=scene.name)
+            if stops:
+                raise stops[0]
     finally:
         bpy.app.handlers.render_write.remove(report)
         scene.frame_step = 1
@@ -103,6 +113,7 @@ def _write(path: Path, pixels: np.ndarray) -> None:
     height, width, _ = pixels.shape
     image = bpy.data.images.new("Sheet", width, height)
     image.pixels.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
-    image.filepath_raw, image.file_format = str(path), "PNG"
-    image.save()
+    with whole_file(path) as part:
+        image.filepath_raw, image.file_format = str(part), "PNG"
+        image.save()
     bpy.data.images.remove(image)

@@ -17,6 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..core.checks import MOST_FRAMES, MOST_SEED, whole
 from ..core.errors import InputError
 from ..core.take import MODES
 from . import rig_properties
@@ -29,6 +30,11 @@ __all__ = [
 
 ADDON = (__package__ or "").removesuffix(".dafnet_addon.blender")
 """Name under which Blender knows the extension."""
+
+
+_MOST_TAKES = 64
+_LAST_FRAME = 1_048_574
+"""The last one that Blender knows; the first one is as far below zero."""
 
 
 def _is_armature(_settings: "CharacterSettings", candidate: bpy.types.Object) -> bool:
@@ -135,7 +141,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         description="Another number gives another take. It matters where the temperature is above zero",
     )
     take_count: IntProperty(
-        name="Takes", default=1, min=1, max=64, soft_max=16, options=set(),
+        name="Takes", default=1, min=1, max=_MOST_TAKES, soft_max=16, options=set(),
         description="How many takes to generate at once; each further one has the next seed, and temperature 1 where it is 0",
     )
     takes: CollectionProperty(type=TakeLink, options=set(), description="Takes of this character")
@@ -249,11 +255,18 @@ class Settings:
     def __post_init__(self) -> None:
         if self.mode is not None and self.mode not in MODES:
             raise InputError(f"The mode '{self.mode}' is unknown; choose {', '.join(MODES)}.")
+        for frame in (self.frame_start, self.frame_end):
+            whole(frame, "A frame of the range", -_LAST_FRAME, _LAST_FRAME)
         if self.frame_end < self.frame_start:
             raise InputError(
                 f"The frame range ends at {self.frame_end}, before its start at {self.frame_start}; "
                 "set the end after the start."
             )
+        whole(self.frame_end - self.frame_start + 1, "The length of the frame range", 1, MOST_FRAMES)
+        whole(self.take_count, "The number of takes", 1, _MOST_TAKES)
+        for seed in (self.seed, self.lower_seed or 0):
+            whole(seed, "The seed", 0, MOST_SEED)
+        whole(self.seed + self.take_count - 1, "The last take's seed", 0, MOST_SEED)
 
 
 def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides: Any) -> Settings:

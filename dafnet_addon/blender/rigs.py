@@ -17,6 +17,7 @@ from typing import Any
 import bpy
 
 from ..core.errors import InputError
+from ..core.files import save_text
 from ..core.skeleton import JOINTS
 
 __all__ = [
@@ -110,7 +111,7 @@ def save_map(rig_map: RigMap, name: str) -> Path:
     text = as_text(replace(rig_map, name=name.strip(), known_by=tuple(rig_map.joints.values())))
     try:
         file = user_folder(create=True) / f"{stem}.json"
-        file.write_text(text + "\n", encoding="utf-8")
+        save_text(file, text)
     except OSError as error:
         raise InputError(f"The preset cannot be written: {error.strerror}; check Blender's folder of user files.") from error
     return file

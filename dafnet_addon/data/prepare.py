@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.files import save_text
 from ..core.rotations import frame_from, normalised
 from ..core.skeleton import OFFSETS, PARENTS
 from .archive import read_arrays
@@ -235,7 +236,7 @@ def _shard(task: tuple[Path, int, int]) -> Path:
 def _written(file: Path, text: Callable[[], str]) -> None:
     """Write what ``text`` gives, unless the file is there already."""
     if not file.exists():
-        file.write_text(text() + "\n", encoding="utf-8")
+        save_text(file, text())
 
 
 def _read(folder: Path, out: Path) -> dict[str, Any]:
@@ -262,7 +263,7 @@ def _read(folder: Path, out: Path) -> dict[str, Any]:
             licences[licence_of[motion.source, motion.name]].add(motion.source)
     described["licences"] = {licence: sorted(sources) for licence, sources in sorted(licences.items())}
     text = summary(clips, [*left_out, *_unused(clips)])
-    (out / "summary.txt").write_text(text + "\n", encoding="utf-8")
+    save_text(out / "summary.txt", text)
     return described
 
 
@@ -309,9 +310,7 @@ def prepare(
     if not described:
         described = _read(folder, out)
     described |= {"windows": windows, "seed": seed, "shares": _SHARES, "composed": _COMPOSITION}
-    part = record.with_suffix(".part.json")
-    part.write_text(json.dumps(described, indent=1), encoding="utf-8")
-    part.replace(record)
+    save_text(record, json.dumps(described, indent=1))
 
     sizes = [min(_SHARD, windows - done) for done in range(0, windows, _SHARD)]
     train = [(out / f"pool-{i:04d}.npz", seed * _SHARDS + i, size) for i, size in enumerate(sizes)]

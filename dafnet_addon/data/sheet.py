@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..core.files import whole_file
 from ..core.root import root_from_joints
 from ..core.rotations import normalised, rotate, yaw_matrix
 from ..core.skeleton import PARENTS, joint
@@ -158,4 +159,5 @@ def sheet(
         _plan(ax, joints, yaw, boxes, frames, (columns * _WIDTH, bottom, _HEIGHT, _HEIGHT - 0.15))
         ax.text(0.05, bottom + _HEIGHT - 0.03, title, ha="left", va="top", fontsize=8, weight="bold")
         ax.plot([0, across], [bottom, bottom], color=_FAINT, lw=0.8)
-    figure.savefig(file)
+    with whole_file(file) as part:
+        figure.savefig(part, format=file.suffix[1:])

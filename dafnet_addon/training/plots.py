@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from ..core.files import whole_file
+
 __all__ = ["plot"]
 
 _PANELS = {
@@ -37,5 +39,6 @@ def plot(report: dict[str, Any], file: Path) -> None:
         ax.set_title(title)
     some = report["rows"]["ground_truth"]
     figure.suptitle(f"{some['clips']} captured clips of unseen bodies, {some['seat_episodes']} seat episodes")
-    figure.savefig(file, dpi=80)
+    with whole_file(file) as part:
+        figure.savefig(part, format="png", dpi=80)
     plt.close(figure)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..core.conditions import PREROLL, shot_steps
+from ..core.files import whole_file
 from ..core.metrics import (
     BAD_COLLISION_JOINTS,
     Seat,
@@ -458,7 +459,6 @@ def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) ->
         of_it = [clip for clip in clips if clip.unseen and _kind(clip) == kind]
         chosen += [of_it[i] for i in np.unique(np.linspace(0, len(of_it) - 1, min(count, len(of_it))).astype(int))]
     takes = in_processes(weights, _calm, chosen, lambda share: None)
-    folder.mkdir(parents=True, exist_ok=True)
     drawn: list[tuple[str, np.ndarray, np.ndarray | None]] = [
         (f"{clip.name}, {kind}", joints, clip.boxes)
         for clip, take in zip(chosen, takes, strict=True)
@@ -470,7 +470,8 @@ def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) ->
         sheet(files[-1], drawn[k : k + 2 * _A_SHEET])
         with Image.open(files[-1]) as picture:
             flat = picture.convert("RGB").quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-        flat.save(files[-1], optimize=True)
+        with whole_file(files[-1]) as part:
+            flat.save(part, format="PNG", optimize=True)
     return files
 
 

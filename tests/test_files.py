@@ -1,0 +1,169 @@
+"""Files of the user's are written whole or not at all, by however many at once."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dafnet_addon.core import files
+from dafnet_addon.core.errors import InputError
+from dafnet_addon.core.files import require_writable, save_text, whole_file
+from dafnet_addon.core.stopping import Stop
+
+ROOT = Path(__file__).parents[1]
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(each.name for each in folder.iterdir())
+
+
+def test_a_file_is_replaced_in_one_step(tmp_path: Path) -> None:
+    file = tmp_path / "out.txt"
+    file.write_bytes(b"old")
+    with whole_file(file) as part:
+        part.write_bytes(b"new")
+        assert part.parent == tmp_path and part.name.startswith(".") and part.suffix != ".txt"
+        assert file.read_bytes() == b"old"
+    assert file.read_bytes() == b"new" and names(tmp_path) == ["out.txt"]
+
+
+@pytest.mark.parametrize("failure", [RuntimeError, KeyboardInterrupt, InputError])
+def test_what_fails_leaves_the_old_file_and_nothing_else(tmp_path: Path, failure: type[BaseException]) -> None:
+    file = tmp_path / "out.txt"
+    file.write_bytes(b"old")
+    with pytest.raises(failure), whole_file(file) as part:
+        part.write_bytes(b"half")
+        part.with_name(part.name + "@").write_bytes(b"as Blender leaves it")
+        raise failure("it")
+    assert file.read_bytes() == b"old" and names(tmp_path) == ["out.txt"]
+
+
+def test_folders_are_made_for_what_is_written_and_go_where_nothing_was(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError), whole_file(tmp_path / "a" / "b" / "out.txt"):
+        raise RuntimeError
+    assert names(tmp_path) == []
+    save_text(tmp_path / "a" / "b" / "out.txt", "Ö")
+    assert (tmp_path / "a" / "b" / "out.txt").read_bytes() == "Ö\n".encode()
+
+
+def test_two_at_once_leave_one_or_the_other(tmp_path: Path) -> None:
+    file = tmp_path / "out.txt"
+    with whole_file(file) as first:
+        first.write_bytes(b"first")
+        with whole_file(file) as second:
+            second.write_bytes(b"second")
+        assert file.read_bytes() == b"second" and first != second
+    assert file.read_bytes() == b"first" and names(tmp_path) == ["out.txt"]
+
+
+def test_links_are_followed_and_permissions_are_the_users(tmp_path: Path) -> None:
+    target, link = tmp_path / "target.txt", tmp_path / "link.txt"
+    try:
+        link.symlink_to(target)
+    except OSError:
+        pytest.skip("no links on this system")
+    before = os.umask(0o027)
+    try:
+        save_text(link, "new")
+    finally:
+        os.umask(before)
+    assert link.is_symlink() and target.read_bytes() == b"new\n"
+    assert os.name == "nt" or target.stat().st_mode & 0o777 == 0o640
+
+
+def _left_by(process: int, host: str | None = None) -> str:
+    host = files._HOST if host is None else host
+    return f".dafnet-{host}-{process}-0123456789abcdef.part"
+
+
+def test_what_killed_runs_left_is_removed_and_no_more(tmp_path: Path) -> None:
+    """Killed while it writes: what it leaves is no output, and the next run removes it. What others write stays."""
+    code = (
+        "import os, signal, sys; from pathlib import Path; from dafnet_addon.core.files import whole_file\n"
+        "with whole_file(Path(sys.argv[1])) as part:\n"
+        "    part.write_bytes(b'half'); part.with_name(part.name + '@').write_bytes(b'half')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL if hasattr(signal, 'SIGKILL') else signal.SIGTERM)\n"
+    )
+    file = tmp_path / "out.blend"
+    killed = subprocess.run([sys.executable, "-c", code, str(file)], cwd=ROOT)
+    assert killed.returncode != 0 and len(names(tmp_path)) == 2 and not file.exists()
+    assert not [each for each in tmp_path.iterdir() if each.suffix == ".blend"]
+
+    running = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    stay = [_left_by(running.pid), _left_by(running.pid, "elsewhere"), _left_by(1 << 22, "elsewhere"), ".dafnet-mine.part"]
+    for name in stay:
+        (tmp_path / name).write_bytes(b"")
+    (tmp_path / _left_by(os.getpid())).write_bytes(b"of a process that had this one's number")
+    try:
+        save_text(file, "whole")
+    finally:
+        running.communicate(b"\n")
+    assert names(tmp_path) == sorted([*stay, "out.blend"])
+
+
+def test_a_disk_that_refuses_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "out.txt"
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    def open_elsewhere(*_: object) -> None:
+        raise PermissionError(13, "The process cannot access the file because it is being used by another process")
+
+    for refusal, words in ((full, "No space left"), (open_elsewhere, "close it in other programs")):
+        monkeypatch.setattr(os, "replace", refusal)
+        with pytest.raises(InputError, match=words), whole_file(file) as part:
+            part.write_bytes(b"new")
+        assert names(tmp_path) == []
+
+
+def test_outputs_are_looked_at_before_anything_is_computed(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    require_writable(tmp_path / "new" / "folder" / "out.txt")
+    with pytest.raises(InputError, match="is a folder"):
+        require_writable(tmp_path)
+    with pytest.raises(InputError, match="is no folder"):
+        require_writable(tmp_path / "file" / "out.txt")
+    if os.name != "nt" and os.geteuid():
+        tmp_path.chmod(0o500)
+        with pytest.raises(InputError, match="may not be written to"):
+            require_writable(tmp_path / "out.txt")
+    assert names(tmp_path) == ["file"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_waits_for_the_next_step(number: int) -> None:
+    before = signal.getsignal(number)
+    steps = 0
+    with pytest.raises(KeyboardInterrupt) as stopped, Stop() as stop:
+        stop.now()
+        signal.raise_signal(number)
+        steps += 1
+        stop.now()
+    assert (steps, stopped.value.args) == (1, (number,)) and signal.getsignal(number) == before
+
+
+def test_a_second_ctrl_c_does_not_wait() -> None:
+    with pytest.raises(KeyboardInterrupt), Stop():
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+        pytest.fail("it waited")
+
+
+def test_signals_that_are_ignored_stay_ignored() -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with Stop() as stop:
+            signal.raise_signal(signal.SIGINT)
+            stop.now()
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_the_hosts_name_is_part_of_what_is_left() -> None:
+    assert all(each.isalnum() for each in files._HOST) and (files._HOST or not socket.gethostname())
