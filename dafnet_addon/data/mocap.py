@@ -31,6 +31,7 @@ __all__ = ["Clip", "UNSTATED", "leaving_out", "read_clips"]
 UNSTATED = "unknown"
 """The licence of a clip of which nobody says under what licence it is."""
 
+_COMPACT = {"first_mm", "delta_mm"}  # arrays that the compact form is known by
 _RATES = (1.0, 1000.0)  # frames a second
 _LONGEST = 3600  # seconds of a clip
 _AMC_RATE = 120.0  # CMU's and HDM05's; .amc files seldom say
@@ -87,7 +88,7 @@ def read_clips(folder: Path, left_out: list[str] | None = None) -> Iterator[Clip
     for file in files:
         with leaving_out(left_out):
             arrays = set(names_in(file)) if file.suffix.lower() == ".npz" else set(AMASS)
-            if "delta_mm" in arrays:
+            if arrays & _COMPACT:
                 for clip in _compact(file, left_out):
                     found = True
                     yield clip
