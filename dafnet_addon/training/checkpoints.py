@@ -19,6 +19,7 @@ from torch import Tensor, nn
 
 from ..core.errors import InputError
 from ..core.files import whole_file
+from ..core.text import read_json
 
 __all__ = [
     "Checkpoint", "checkpoint_file", "generators", "of_training", "set_generators", "typed", "write_checkpoint",
@@ -43,6 +44,10 @@ def _pickled(file: Path) -> InputError:
         f"'{file}' was saved by an earlier version as a pickle, which could execute code and is not read; train in another "
         "folder, beginning with that run's weights (--from)."
     )
+
+
+def _refused(path: Path, what: str) -> InputError:
+    return InputError(f"The checkpoint '{path}' cannot be used ({what}); restore a backup or train anew.")
 
 
 def of_training(network: nn.Module, optimiser: torch.optim.Optimizer) -> dict[str, Tensor]:
@@ -78,17 +83,20 @@ class Checkpoint:
                 words = file.metadata() or {}
                 if words.get("format") != _FORMAT:
                     raise InputError(f"'{path}' is no checkpoint of this version; train anew in another folder.")
-                state = json.loads(words.get("state", ""))
                 tensors = {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
-        except (OSError, SafetensorError, ValueError, RecursionError) as error:
-            raise InputError(f"The checkpoint '{path}' cannot be read ({error}); restore a backup or train anew.") from None
+        except (OSError, SafetensorError) as error:
+            raise _refused(path, f"it cannot be read: {error}") from None
+        try:
+            state = read_json(words.get("state", ""))
+        except ValueError as error:
+            raise _refused(path, f"its state {error}") from None
         if not isinstance(state, dict):
-            raise InputError(f"The checkpoint '{path}' cannot be read (no state); restore a backup or train anew.")
+            raise _refused(path, "its state is no object")
         return Checkpoint(path, tensors, state)
 
     def refused(self, what: str) -> InputError:
         """The error for something in the file that is not as a trainer writes it."""
-        return InputError(f"The checkpoint '{self.path}' cannot be used ({what}); restore a backup or train anew.")
+        return _refused(self.path, what)
 
     def settings(self, kind: type[Settings], name: str) -> Settings:
         """The settings kept under ``name``. Raises InputError where one is unknown, missing, or of another type."""
