@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs the system libraries that `import bpy` and its renderer need, and Python's venv, where they are missing.
+# Installs the system libraries that `import bpy` and its renderer need, and Python's venv, where they are missing; says so where
+# the Python is another than the modules are built for.
 set -euo pipefail
 
 python=${1:-python3}
@@ -17,14 +18,20 @@ for library in "${!package[@]}"; do
 done
 command -v "$python" >/dev/null || missing+=(python3 python3-venv)
 "$python" -c "import ensurepip, venv" 2>/dev/null || missing+=(python3-venv)
-((${#missing[@]})) || exit 0
 
-if [[ $(id -u) == 0 ]] && command -v apt-get >/dev/null; then
+if ((${#missing[@]})); then
+    if [[ $(id -u) != 0 ]] || ! command -v apt-get >/dev/null; then
+        echo "Missing system packages; install them as root: apt-get install ${missing[*]}" >&2
+        exit 1
+    fi
     export DEBIAN_FRONTEND=noninteractive
     echo "Installing ${missing[*]}"
     apt-get update -qq
     apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
-else
-    echo "Missing system packages; install them as root: apt-get install ${missing[*]}" >&2
+fi
+
+version=$("$python" -c "import platform; print(platform.python_version())")
+if [[ $version != 3.11.* ]]; then
+    echo "'$python' is Python $version, and Blender's modules need 3.11: install it, or say make PYTHON=path/to/python3.11" >&2
     exit 1
 fi
