@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from dafnet_addon import Box, Controls, InputError, Mesh, Scene, Take, generate, generate_steps, load_weights
+from dafnet_addon.core.checks import MOST_SEED
 from dafnet_addon.core.generate import Draw, takes_steps
 from dafnet_addon.core.metrics import bone_length_variation, end_effector_distance
 from dafnet_addon.core.paths import Stop, route
 from dafnet_addon.core.progress import drained
 from dafnet_addon.core.root import RootPath
+from dafnet_addon.core.sampler import Sampler
 from dafnet_addon.core.skeleton import END_EFFECTORS, UPPER
 
 
@@ -178,6 +180,129 @@ def test_bad_controls_are_refused_in_one_sentence(weights, controls, words):
     with pytest.raises(InputError, match=words) as caught:
         generate(Scene(), controls(), weights)
     assert str(caught.value).endswith(".") and "\n" not in str(caught.value)
+
+
+EACH = {"root": np.tile(np.eye(4), (30, 1, 1))}
+TURNS = np.tile(np.eye(3), (30, 1, 1))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"fps": None}, "frame rate is None"), ({"fps": "30"}, "frame rate is 30"), ({"fps": np.nan}, "frame rate is nan"),
+        ({"fps": 1e-9}, "frame rate is 1e-09"), ({"fps": True}, "frame rate is True"), ({"fps": [30]}, "frame rate"),
+        ({"scale": float("inf")}, "scale is inf"), ({"scale": 1e-300}, "scale"),
+        ({"blend": np.nan}, "blend is nan"), ({"blend": np.inf}, "blend is inf"), ({"blend": None}, "blend is None"),
+        ({"blend": -1.0}, "blend is -1"), ({"pelvis_given": "no"}, "'pelvis_given' is no"),
+        ({"mode": None}, "mode is None"), ({"mode": 3}, "mode is 3"), ({"mode": ["EE", None] * 15}, "mode 'None'"),
+        ({"mode": "ee"}, "mode 'ee'"), ({"mode": np.array(["EE"] * 29)}, "29 modes"),
+        ({"root": None}, "root holds something other than numbers"), ({"root": [[1.0], [1.0, 2.0]]}, "root cannot be read"),
+        ({"root": np.eye(4)}, "root has the shape"), ({"root": 1j * EACH["root"]}, "root holds something other than numbers"),
+        ({"root": EACH["root"].astype(object)}, "root holds something other"),
+        ({"root": 1e200 * EACH["root"]}, "root .*too far"),
+        ({"fps": 1.0, "root": np.zeros((5000, 4, 4))}, "root has 5000 frames at 1 a second"),
+        ({"head": np.full((30, 3), np.inf)}, "'head' holds an infinite number"),
+        ({"head": "up"}, "'head' holds something other"),
+        ({"head": np.zeros(3)}, "'head' has the shape"), ({"hand_left": np.full((30, 3), 1e30)}, "'hand_left' .*too far"),
+        ({"head_rotation": TURNS[:-1]}, "'head_rotation' has the shape"), ({"head_rotation": np.eye(3)}, "'head_rotation'"),
+        ({"hand_right_rotation": 2 * TURNS}, "'hand_right_rotation' holds a matrix that is no rotation"),
+        ({"hand_right_rotation": -TURNS}, "'hand_right_rotation' holds a matrix that is no rotation"),
+        ({"hand_left_influence": np.ones(29)}, "'hand_left_influence' has the shape"),
+        ({"hand_left_influence": np.full(30, np.nan)}, "'hand_left_influence' holds what is not a number"),
+        ({"upper_body": np.zeros((30, 22, 3))}, "'upper_body' has the shape"),
+    ],
+)
+def test_controls_that_cannot_be_are_refused_where_they_are_made(given, words):
+    with pytest.raises(InputError, match=words) as caught:
+        Controls(**{"fps": 30.0, **EACH, **given})
+    said = str(caught.value)
+    assert said.endswith(".") and said.count(". ") == 0 and said.isprintable()
+
+
+CUBE = {"center": [0.0, 1.0, 0.2], "half_size": [0.2, 0.2, 0.2]}
+SHEET = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]}
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (lambda: Box(**CUBE | {"center": [np.nan, 0, 0]}), "center of the box 'box' holds what is not a number"),
+        (lambda: Box(**CUBE | {"center": [0, 0]}), "center of the box 'box' has the shape"),
+        (lambda: Box(**CUBE | {"half_size": [0.2, -0.2, 0.2]}), "half_size of the box 'box' is negative"),
+        (lambda: Box(**CUBE | {"half_size": None}), "half_size of the box 'box' holds something other"),
+        (lambda: Box(**CUBE, rotation=np.full((3, 3), np.nan), name="Sofa"), "rotation of the box 'Sofa'"),
+        (lambda: Box(**CUBE, rotation=np.diag([1, 1, 2])), "rotation of the box 'box' holds a matrix that is no rotation"),
+        (lambda: Box(**CUBE, rotation=np.diag([1, 1, -1])), "rotation of the box 'box' holds a matrix that is no rotation"),
+        (lambda: Box(**CUBE | {"center": np.zeros((4, 3))}, rotation=np.tile(np.eye(3), (5, 1, 1))), "4 and 5 frames"),
+        (lambda: Box(**CUBE | {"center": np.zeros((0, 3))}), "center .*0 and 1 frames"),
+        (lambda: Mesh(**SHEET | {"triangles": [[0, 1, -1]]}), "triangles of the mesh 'mesh' name missing vertices"),
+        (lambda: Mesh(**SHEET | {"triangles": [[0, 1, 3]]}), "triangles of the mesh 'mesh' name missing vertices"),
+        (lambda: Mesh(**SHEET | {"triangles": [[0, 1, 1.5]]}), "triangles of the mesh 'mesh' hold what is no whole number"),
+        (lambda: Mesh(**SHEET | {"triangles": [[0, 1, 2, 0]]}), "triangles of the mesh 'mesh' has the shape"),
+        (lambda: Mesh(**SHEET | {"vertices": [[0, 0, 0], [1, 0]]}), "vertices of the mesh 'mesh' cannot be read"),
+        (lambda: Mesh(**SHEET | {"vertices": "many"}), "vertices of the mesh 'mesh' holds something other"),
+        (lambda: Mesh(**SHEET, matrix=np.eye(3)), "matrix of the mesh 'mesh' has the shape"),
+        (lambda: Mesh(**SHEET, matrix=np.full((4, 4), np.inf)), "matrix of the mesh 'mesh' .*not a number"),
+        (lambda: Mesh(**SHEET, matrix=np.zeros((0, 4, 4))), "matrix of the mesh 'mesh' has no frames"),
+        (lambda: Mesh(**SHEET, matrix=np.ones((4, 4))), "matrix of the mesh 'mesh' .*last row"),
+        (lambda: Scene(None), "solids of a scene"), (lambda: Scene([SHEET]), "solids of a scene"),
+    ],
+)
+def test_solids_that_cannot_be_are_refused_where_they_are_made(made, words):
+    with pytest.raises(InputError, match=words) as caught:
+        made()
+    said = str(caught.value)
+    assert said.endswith(".") and said.count(". ") == 0 and said.isprintable()
+
+
+@pytest.mark.parametrize("frames", [2, 29, 31])
+def test_solids_that_move_for_longer_or_shorter_than_the_root_are_refused(weights, frames):
+    box = Box(**CUBE | {"center": np.zeros((frames, 3))}, name="Trolley")
+    mesh = Mesh(**SHEET, matrix=np.tile(np.eye(4), (frames, 1, 1)), name="Trolley")
+    for solid in (box, mesh):
+        with pytest.raises(InputError, match=f"'Trolley' has {frames} frames and the root 30; give it one matrix or"):
+            generate(Scene([solid]), Controls(24.0, EACH["root"]), weights)
+
+
+def test_what_is_neither_scene_nor_controls_is_refused(weights):
+    for scene, controls in ((None, _walk()), ([], _walk()), (Scene(), None), (Scene(), {"fps": 30})):
+        with pytest.raises(InputError, match="Scene and Controls"):
+            generate(scene, controls, weights)
+
+
+def test_lists_do_for_arrays(weights):
+    scene, controls = _seated(mode="EE")
+    hand = np.tile([0.3, 0.3, 1.0], (len(controls), 1))
+    turns, share = np.tile(np.eye(3), (len(controls), 1, 1)), np.ones(len(controls))
+    given = {"hand_left": hand, "hand_left_rotation": turns, "hand_left_influence": share}
+    mesh = Mesh(np.array(SHEET["vertices"], float), np.array(SHEET["triangles"]), np.eye(4))
+    arrays = generate(Scene((*scene.solids, mesh)), replace(controls, **given), weights)
+    lists = generate(
+        Scene([
+            Box(scene.solids[0].center.tolist(), scene.solids[0].half_size.tolist()), Mesh(**SHEET, matrix=np.eye(4).tolist()),
+        ]),
+        Controls(30, controls.root.tolist(), ["EE"] * len(controls), **{name: each.tolist() for name, each in given.items()}),
+        weights,
+    )
+    assert np.array_equal(arrays.joints, lists.joints)
+
+
+@pytest.mark.parametrize("seed", [-1, MOST_SEED + 1, 3_000_000_000, 1.0, 1.5, None, "7", True, float("nan"), 10**400, [1]])
+def test_seeds_that_cannot_be_are_refused(seed):
+    for given in ({"seed": seed}, {"lower_seed": seed}):
+        if given != {"lower_seed": None}:
+            with pytest.raises(InputError, match=f"The seed .*give a whole number from 0 to {MOST_SEED}"):
+                Draw(**given)
+
+
+def test_seeds_of_numpy_are_seeds(weights):
+    assert Draw(np.int64(7), np.uint8(3)) == Draw(7, 3) and type(Draw(np.int32(7)).seed) is int
+    sampler = Sampler(weights)
+    drawn = [sampler.noise(seed) for seed in (0, 1, MOST_SEED - 1, MOST_SEED)]
+    assert all(np.isfinite(each).all() for each in drawn) and len({each.tobytes() for each in drawn}) == 4
+    # As they have always been: NumPy's generator, seeded with the seed and the part's number.
+    upper = np.random.default_rng([1, 0]).standard_normal(42)
+    assert np.allclose(drawn[1][0, :42], (sampler._spread @ np.r_[upper, np.zeros(24)])[:42])
 
 
 def test_bad_temperature_and_bad_mesh_are_refused(weights):
