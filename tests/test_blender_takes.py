@@ -1,7 +1,9 @@
 """Takes in Blender: listed, judged, varied, gone on from, cleaned again, and found when the file is opened again."""
 
+from io import BytesIO
 from pathlib import Path
 from types import ModuleType
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pytest
@@ -293,3 +295,41 @@ def test_full_copies_the_upper_body_of_a_take(shot: Shot) -> None:
     shot.scene.frame_end, shot.scene.render.fps = 55, 24
     with pytest.raises(RuntimeError, match="30 frames a second, the scene 24"):
         shot.bpy.ops.dafnet.generate()
+
+
+def _of_zeros(data: bytes) -> bytes:
+    """A stored take whose joints unpack to 64 MB."""
+    out = BytesIO()
+    with ZipFile(BytesIO(data)) as file, ZipFile(out, "w", ZIP_DEFLATED) as other:
+        for name in file.namelist():
+            other.writestr(name, bytes(1 << 26) if name == "take.joints.npy" else file.read(name))
+    return out.getvalue()
+
+
+@pytest.mark.parametrize(("spoil", "words"), [
+    (lambda data: data[: len(data) // 2], "it is damaged"), (lambda data: b"", "it is damaged"),
+    (_of_zeros, "'take.joints' is larger than the take's frames ask for"),
+])
+def test_a_damaged_take_is_told_in_a_sentence_wherever_it_is_used(shot: Shot, spoil, words: str) -> None:
+    shot.bpy.ops.dafnet.generate()
+    own, take = shot.ann.dafnet, shot.listed()[0]
+    packed = shot.addon("dafnet_addon.blender.properties").PACKED
+    data = spoil(take[packed])
+    del take[packed]  # Blender writes over bytes that are there up to the first zero
+    take[packed] = data
+    before, curves = [a.name for a in shot.bpy.data.actions], shot.played()
+    shot.scene.frame_set(30)
+    shot.addon("dafnet_addon.blender.overlay_data").drawings(shot.bpy.context, ("reach", "ghosts"))
+    uses = [
+        shot.bpy.ops.dafnet.clean_again, lambda: shot.bpy.ops.dafnet.generate(task="LEGS"),
+        lambda: shot.bpy.ops.dafnet.generate(task="ONWARD"), shot.bpy.ops.dafnet.mark_frames,
+    ]
+    for use in uses:
+        with pytest.raises(RuntimeError) as caught:
+            use()
+        said = str(caught.value).strip().removeprefix("Error: ")
+        assert words in said and said.endswith("; generate it again.") and "\n" not in said and "Traceback" not in said
+    own.mode, own.upper_body_take = "FULL", take
+    with pytest.raises(RuntimeError, match="cannot be read"):
+        shot.bpy.ops.dafnet.generate()
+    assert [a.name for a in shot.bpy.data.actions] == before and np.array_equal(shot.played(), curves)

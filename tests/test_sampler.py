@@ -212,3 +212,30 @@ def test_numbers_that_cannot_be_inverted_are_refused(weights, name):
     spoilt = np.full_like(weights.tensors[name], 2000.0) if name.endswith("log_scale") else weights.tensors[name] * 0.0
     with pytest.raises(WeightsError, match="cannot be used"):
         Sampler(replace(weights, tensors={**weights.tensors, name: spoilt}))
+
+
+@pytest.mark.parametrize("offsets", ["here", None, [[0.0], [0.0, 1.0]], [[None] * 3] * 22, np.zeros((22, 3)).tolist()])
+def test_another_skeleton_is_refused_however_it_is_written(weights, offsets):
+    with pytest.raises(WeightsError, match="another skeleton or frame rate \\('offsets'\\)"):
+        Sampler(replace(weights, config={**weights.config, "offsets": offsets}))
+
+
+@pytest.mark.parametrize(("name", "value", "words"), [
+    ("upper.0.weight", 0.0, "'upper.0' cannot be inverted"), ("lower.1.log_scale", 50.0, "'lower.1' cannot be inverted"),
+    ("upper.0.weight", 1e-35, "'upper.0' cannot be inverted"), ("pose_std", 0.0, "'pose_std' is not positive"),
+    ("velocity_std", -1.0, "'velocity_std' is not positive"), ("lower.0.bias", 1e30, "'lower.0.bias' holds 1e\\+30"),
+])
+def test_tensors_that_no_training_gives_are_named(weights, name, value, words):
+    tensor = weights.tensors[name]
+    changed = np.eye(len(tensor), dtype=np.float32) * np.float32(value) if tensor.ndim == 2 else np.full_like(tensor, value)
+    with pytest.raises(WeightsError, match=words):
+        Sampler(replace(weights, tensors={**weights.tensors, name: changed}))
+
+
+def test_poses_that_are_no_bodys_are_refused_before_they_are_shown(weights):
+    far = replace(weights, tensors={**weights.tensors, "pose_mean": np.full(66, 1e5, np.float32)})
+    sampler, shown = Sampler(far), []
+    conditions = Conditions(np.zeros((3, 3)), np.zeros((3, 18)), np.zeros((3, 2640)), np.zeros((3, 66)), np.zeros((3, 22)))
+    with pytest.raises(WeightsError, match="their poses are no numbers, or farther than 100 metres"):
+        drained(sampler.run(conditions, np.zeros((1, 66)), None, lambda frame, pose: shown.append(pose)))
+    assert not shown
