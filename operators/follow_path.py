@@ -122,8 +122,5 @@ class DAFNET_OT_root_from_object(bpy.types.Operator):
         """Key what it does."""
         character, source = chosen(context, may_move)
         with reported(self):
-            made, warning = as_moved(context, character, source)
-            if warning:
-                self.report({"WARNING"}, warning)
-            return keyed(self, made)
+            return keyed(self, as_moved(context, character, source))
         return {"CANCELLED"}

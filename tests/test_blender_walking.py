@@ -362,3 +362,79 @@ def test_the_panel_offers_the_selected_seat(room: Room) -> None:
     room.bpy.ops.dafnet.add_character(name="Bob")
     room.select(room.chair)
     assert sent(room.bpy.context)[0] is None and not room.bpy.ops.dafnet.walk_to.poll()
+
+
+def _table(room: Room, near: float) -> None:
+    """A table before the chair, its nearest edge at y = ``near``, its far one 0.7 m from there, towards the character."""
+    room.box("Table", (-0.7, near - 0.7, 0.70), (0.7, near, 0.73))
+
+
+def test_a_chair_under_a_table_is_refused_before_anything_is_keyed(room: Room) -> None:
+    room.ann.location = room.root.location = (2.5, 2.0, 0.0)
+    for near in (3.3, 3.0, 2.9):
+        _table(room, near)
+        room.select(room.chair)
+        with pytest.raises(RuntimeError, match="'Table' stands where one comes to sit on 'Chair'; pull 'Chair' out"):
+            room.bpy.ops.dafnet.walk_to(goal="SEAT")
+        assert not room.root.animation_data and room.ann.dafnet.furniture is None and room.scene.frame_end == 40
+        room.bpy.data.objects.remove(room.bpy.data.objects["Table"])
+    _table(room, 2.5)
+    assert room.bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
+    walking = room.addon("dafnet_addon.blender.walking")
+    assert walking.walk(room.bpy.context, room.ann, None).warnings == ()
+
+
+def test_what_a_walk_leads_through_is_said(room: Room) -> None:
+    walking, sources = (room.addon(f"dafnet_addon.blender.{name}") for name in ("walking", "path_sources"))
+    room.ann.dafnet.furniture = room.furniture
+    _table(room, 2.0)
+    room.scene.cursor.location = (0.0, 1.7, 0.0)
+    (warning,) = walking.walk(room.bpy.context, room.ann, None).warnings
+    assert "leads through furniture, 'Table' from frame" in warning
+    room.root.animation_data_clear()
+    curve = room.bpy.data.curves.new("Line", "CURVE")
+    curve.dimensions = "3D"
+    points = curve.splines.new("POLY").points
+    points.add(1)
+    points[0].co, points[1].co = (0.0, 0.0, 0.0, 1.0), (0.0, 2.6, 0.0, 1.0)
+    line = room.bpy.data.objects.new("Line", curve)
+    room.scene.collection.objects.link(line)
+    (warning,) = sources.along_curve(room.bpy.context, room.ann, line).warnings
+    assert "'Table' from frame" in warning
+
+
+@pytest.mark.parametrize("kind", ["DESK", "WHITEBOARD", "SOFA", "BED"])
+def test_examples_lead_through_nothing(blender, addon, kind: str) -> None:
+    examples, job, reader = (addon(f"dafnet_addon.blender.{name}") for name in ("examples", "job", "scene_reader"))
+    conditions, progress = (addon(f"dafnet_addon.core.{name}") for name in ("conditions", "progress"))
+    armature = examples.add_example(blender.context, kind)
+    read = reader.read_scene(blender.context, job.settings_of(armature, blender.context.scene))
+    shot = progress.drained(conditions.shot_steps(read.scene, read.controls))
+    assert not [warning for warning in shot.warnings if "runs through" in warning]
+
+
+def test_the_demo_leads_through_nothing(blender, addon) -> None:
+    demo_room, job, reader = (addon(f"dafnet_addon.blender.{name}") for name in ("demo_room", "job", "scene_reader"))
+    conditions, progress = (addon(f"dafnet_addon.core.{name}") for name in ("conditions", "progress"))
+    room = demo_room.build_room(blender.context)
+    read = reader.read_scene(blender.context, job.settings_of(room.armature, blender.context.scene))
+    shot = progress.drained(conditions.shot_steps(read.scene, read.controls))
+    assert not [warning for warning in shot.warnings if "runs through" in warning]
+
+
+def test_scenes_of_the_wrong_unit_and_far_goals_are_refused_in_a_sentence(room: Room) -> None:
+    def refused(words: str, goal: str) -> None:
+        with pytest.raises(RuntimeError, match=words):
+            room.bpy.ops.dafnet.walk_to(goal=goal)
+        assert not room.root.animation_data
+
+    room.ann.dafnet.furniture = room.furniture
+    room.scene.cursor.location = (700.0, 700.0, 0.0)
+    room.select(room.ann)
+    refused("The goal is 990 m away: is the scene's unit right?", "CURSOR")
+    for scale, words in ((100.0, "'Chair' is 95 m across"), (0.01, "'Chair' is 0.0095 m across")):
+        room.chair.scale = (scale, scale, scale)
+        room.select(room.chair, room.ann)
+        refused(f"{words}: is its unit right?", "SEAT")
+    room.scene.cursor.location = (0.05, 0.0, 0.0)
+    refused("The scene is 0.0095 m across: is its unit right?", "CURSOR")

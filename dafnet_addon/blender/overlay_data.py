@@ -17,6 +17,7 @@ from ..core.cleanup import standing_still
 from ..core.distance import prepared, scaled
 from ..core.errors import DafnetError, InputError
 from ..core.metrics import BAD_COLLISION_JOINTS, bad_collisions, foot_sliding
+from ..core.nearby import REACH_OF_A_BODY, beside
 from ..core.occupancy import distance, occupancy
 from ..core.resampling import MODEL_FPS, frame_times, resample_nearest, resample_positions
 from ..core.root import RootPath, root_from_matrices, to_world
@@ -577,7 +578,8 @@ def faults_of(
             scenes[first, last] = read_scene(context, settings).scene
         floor = take.root[:, 2, 3] / take.scale
         joints = take.joints / take.scale
-        room = scaled(prepared(scenes[first, last], float(np.median(take.root[:, 2, 3])))[0], 1.0 / take.scale)
+        near = beside(scenes[first, last], take.root[:, :3, 3], REACH_OF_A_BODY, take.scale)
+        room = scaled(prepared(near, float(np.median(take.root[:, 2, 3])))[0], 1.0 / take.scale)
         apart = distance(room, joints[:, list(BAD_COLLISION_JOINTS)], floor)
         found[action.session_uid] = Faults(foot_sliding(joints, take.fps, floor), bad_collisions(apart))
     return found

@@ -9,12 +9,13 @@ import numpy as np
 
 from ..core.distance import scaled
 from ..core.errors import InputError
-from ..core.paths import Route, Stop, facing, route
+from ..core.passage import Passage, met_along
+from ..core.paths import AFTER_SEAT, Route, Stop, facing, route
 from ..core.solids import Scene
 from ..core.trails import FASTEST, followed, trail
 from ..director.seats import on_a_seat
 from ..director.surfaces import surface_points
-from ..director.walks import way_round
+from ..director.walks import around, way_round
 from .armature import character_scale, is_character, metres_per_unit, parts_of, sent
 from .compat import action_curves
 from .dependencies import Dependencies
@@ -22,12 +23,11 @@ from .furniture import furniture_now
 from .playback import frame_kept, in_order
 from .properties import settings_of
 from .root_keys import MOVES, keyable_root, keyed_along, last_key, unchanged_on_failure
-from .walking import Walk, extended_to, walk
+from .walking import Walk, extended_to, told_of, walk
 
 __all__ = ["along_curve", "as_moved", "chosen", "floor_points", "is_curve", "may_move", "places_of", "through_points"]
 
 _BEFORE = 0.2  # seconds of rest before the first step
-_AFTER_SEAT = 0.55  # metres straight in front of a seat, as ``director.walks`` goes
 _SPACING = 0.05  # metres between points on the furniture
 _THERE = 0.1  # metres between a root and the line's beginning that need no walk
 
@@ -70,12 +70,13 @@ def floor_points(context: bpy.types.Context) -> list[bpy.types.Object]:
 @dataclass(frozen=True)
 class _Directed:
     """The character's ``root`` in the scene, its ``place`` (3,) and ``yaw`` at frame ``first`` and the furniture then, in
-    canonical metres, of which a Blender unit is ``unit``.
+    canonical metres, of which a Blender unit is ``unit``; the character's ``size`` over the canonical one.
     """
 
     root: bpy.types.Object
     first: int
     unit: float
+    size: float
     fps: float
     place: np.ndarray
     yaw: float
@@ -105,11 +106,14 @@ def _directed(context: bpy.types.Context, armature: bpy.types.Object, first: int
         scene.frame_set(first)
         place, yaw = np.array(root.location, float) * unit, float(root.rotation_euler[2])
         meshes = [mesh for found in furniture_now(context, settings).values() for mesh in found]
-    return _Directed(root, first, unit, fps, place, yaw, scaled(Scene(tuple(meshes)), 1.0 / size))
+    return _Directed(root, first, unit, size, fps, place, yaw, scaled(Scene(tuple(meshes)), 1.0 / size))
 
 
-def _written(context: bpy.types.Context, armature: bpy.types.Object, directed: _Directed, walked: Route) -> Walk:
-    """Key a route over what the root has from its first frame on; before that it moves as it did."""
+def _written(
+    context: bpy.types.Context, armature: bpy.types.Object, directed: _Directed, walked: Route,
+    met: Sequence[Passage], *warnings: str,
+) -> Walk:
+    """Key a route over what the root has from its first frame on, and tell what is ``met``; before that it moves as it did."""
     root, first = directed.root, directed.first
     with unchanged_on_failure(root):
         kept = _cut(root, first)
@@ -120,7 +124,7 @@ def _written(context: bpy.types.Context, armature: bpy.types.Object, directed: _
                     curve.keyframe_points.insert(frame, value).interpolation = "LINEAR"
             curve.update()
     last_frame = first + len(walked.path) - 1
-    return Walk(first, last_frame, extended_to(context.scene, armature, last_frame))
+    return Walk(first, last_frame, extended_to(context.scene, armature, last_frame), (*told_of(met, first), *warnings))
 
 
 def _cut(root: bpy.types.Object, first: int) -> dict[tuple[str, int], list[tuple[int, float]]]:
@@ -206,16 +210,16 @@ def along_curve(
         points, start, speed=speed, fps=at.fps, floor=at.floor, yaw=at.yaw if keep_facing else None, seconds=seconds,
         name=f"curve '{curve.name}'",
     )
-    return _written(context, armature, at, walked)
+    return _written(context, armature, at, walked, met_along(at.solids, walked.path, at.fps, end=()))
 
 
 def _way(at: _Directed, start: Stop, goals: list[np.ndarray]) -> np.ndarray:
     """Corners (N, 2) of the way round the furniture from ``start`` through the places ``goals`` (2,), with these."""
-    points = surface_points(at.solids.solids, _SPACING) - np.array([0.0, 0.0, at.floor])
     forward = np.array([-np.sin(start.yaw), np.cos(start.yaw)])
-    here, corners = np.array(start.position) + (_AFTER_SEAT if start.seated else 0.0) * forward, []
+    here, corners = np.array(start.position) + (AFTER_SEAT if start.seated else 0.0) * forward, []
+    points = surface_points(at.solids.solids, _SPACING, around([here, *goals])) - np.array([0.0, 0.0, at.floor])
     for goal in goals:
-        corners += [*(np.array(corner) for corner in way_round(points, here, goal)), goal]
+        corners += [*(np.array(corner) for corner in way_round(points, here, goal, at.size)), goal]
         here = goal
     return np.array(corners)
 
@@ -230,11 +234,11 @@ def places_of(context: bpy.types.Context, source: bpy.types.Object, frames: Sequ
     return np.array([places[frame] for frame in frames], float)
 
 
-def as_moved(context: bpy.types.Context, armature: bpy.types.Object, source: bpy.types.Object) -> tuple[Walk, str]:
+def as_moved(context: bpy.types.Context, armature: bpy.types.Object, source: bpy.types.Object) -> Walk:
     """Let the root go where ``source`` goes over the floor, at the same frames: those of its keys, else of the scene's range.
 
-    The root's keys from there on are replaced. Also returns a warning, empty where there is none. ``InputError``: it hardly
-    moves, or the root cannot be keyed; nothing is changed then.
+    The root's keys from there on are replaced. ``InputError``: it hardly moves, or the root cannot be keyed; nothing is changed
+    then.
     """
     scene = context.scene
     keys = [p.co[0] for c in action_curves(source) if c.data_path == "location" for p in c.keyframe_points]
@@ -243,9 +247,9 @@ def as_moved(context: bpy.types.Context, armature: bpy.types.Object, source: bpy
     places = places_of(context, source, range(first, last + 1))[:, :2] * at.unit
     moved = followed(places, at.fps, at.yaw, at.floor)
     fastest = float(np.linalg.norm(np.diff(moved.path.position, axis=0), axis=1).max() * at.fps)
-    made = _written(context, armature, at, moved)
     hurried = f"'{source.name}' moves at up to {fastest:.1f} m/s, faster than this character can walk; slow it down."
-    return made, hurried if fastest > FASTEST else ""
+    met = met_along(at.solids, moved.path, at.fps)
+    return _written(context, armature, at, moved, met, *([hurried] if fastest > FASTEST else []))
 
 
 def through_points(
@@ -270,4 +274,5 @@ def through_points(
     last = way[-1] - (way[-2] if len(way) > 1 else np.array(start.position))
     via = [(float(x), float(y)) for x, y in way]
     goal = Stop(via.pop(), facing(last), seconds)
-    return _written(context, armature, at, route(start, *via, goal, speed=speed, fps=at.fps, floor=at.floor))
+    walked = route(start, *via, goal, speed=speed, fps=at.fps, floor=at.floor)
+    return _written(context, armature, at, walked, met_along(at.solids, walked.path, at.fps, end=()))

@@ -118,8 +118,8 @@ def _bodies(scene: bpy.types.Scene) -> set[bpy.types.Object]:
 
 def _distance(meshes: list[Mesh], path: np.ndarray, size: float) -> float:
     """Metres from the path (N, 3) over the floor to what of the meshes stands on it; infinite beyond what is near."""
-    points = surface_points(meshes, _SPACING * size)
     low, high = path.min(0) - _NEAR * size, path.max(0) + _NEAR * size
+    points = surface_points(meshes, _SPACING * size, (low[:2], high[:2]))
     points = points[((points > low) & (points < high))[:, :2].all(1)]
     points = np.unique(np.round(points / (0.5 * _SPACING * size)), axis=0) * (0.5 * _SPACING * size)
     over = points[:, None, 2] - path[None, :, 2]

@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .checks import in_frames
-from .distance import prepared_steps, rigid_split, scaled
+from .distance import BAND, prepared_steps, rigid_split, scaled
 from .errors import InputError
-from .occupancy import distance, occupancy_steps
+from .nearby import REACH_OF_A_BODY, beside
+from .occupancy import occupancy_steps
+from .passage import listed, passages, seats_along
 from .progress import within
 from .resampling import MODEL_FPS, covering_frames, frame_times, resample_nearest, resample_positions, resample_rigid
 from .root import RootPath, ahead, root_from_matrices, smoothed, to_root, velocities
@@ -28,7 +30,6 @@ _EFFECTORS = {name: MODEL_ORDER.index(j) for name, j in END_EFFECTORS.items()}
 _TILT, _SPRINT = np.radians(5.0), 10.5  # radians; metres a second
 _REACH_FROM, _REACH = np.array([0.0, 0.0, 1.0]), 1.25  # a sphere that holds every head and wrist of the training poses
 _STILL, _CROWDED = 0.02, 0.35
-_TRUNK = (0.95, 1.15, 1.35)
 _AROUND = 6  # spheres of the sensor's innermost ring
 _UNDER = (np.hypot(SPHERES[:, 0], SPHERES[:, 1]) < 0.2) & (SPHERES[:, 2] > 0.2) & (SPHERES[:, 2] < 0.9)
 _SOLID = 0.3
@@ -37,8 +38,8 @@ _SOLID = 0.3
 @dataclass(frozen=True)
 class Shot:
     """``conditions`` of ``PREROLL`` + N frames at 30 fps; ``path`` (N): R^τ, canonical metres; ``modes`` (N,) of MODES;
-    ``scene``: the furniture at these frames, canonical metres; ``share`` (``PREROLL`` + N, 22): how far what is given counts;
-    ``warnings``: sentences for the user.
+    ``scene``: the furniture within reach at these frames, canonical metres; ``share`` (``PREROLL`` + N, 22): how far what is
+    given counts; ``warnings``: sentences for the user.
     """
 
     conditions: Conditions
@@ -136,16 +137,10 @@ def _at_model_rate(scene: Scene, times: np.ndarray, target: np.ndarray) -> Scene
 
 
 def _look_around(scene: Scene, path: RootPath, occupied: np.ndarray, warnings: list[str]) -> None:
-    if not scene.solids:
-        warnings.append("There is no furniture; the character walks and stands on a bare floor.")
-        return
-    trunk = path.position[:, None] + np.array([[0.0, 0.0, z] for z in _TRUNK])
-    inside = distance(scene, trunk, path.position[:, 2]).min(axis=1) < -0.02
-    if inside.any():
-        warnings.append(
-            f"The root runs through furniture in {inside.sum() / MODEL_FPS:.1f} s of the shot, "
-            f"first {np.argmax(inside) / MODEL_FPS:.1f} s into it; move the path or the furniture."
-        )
+    met = passages(scene, path, MODEL_FPS, seats_along(scene, path, MODEL_FPS))
+    if met:
+        places = listed(met, lambda each: f"from {each.first / MODEL_FPS:.1f} to {each.last / MODEL_FPS:.1f} s")
+        warnings.append(f"The root runs through furniture in the shot, {places}; move the path or the furniture.")
     crowd = occupied.mean(axis=1)
     if crowd.max() > _CROWDED:
         warnings.append(
@@ -174,8 +169,14 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     modes = resample_nearest(modes, times, target)
     observation, share = _observed(controls, modes, times, target, path, warnings)
 
+    if not scene.solids:
+        warnings.append("There is no furniture; the character walks and stands on a bare floor.")
+    # Nothing farther away than the body, or the upper body that it is given, is felt or seen: it need not be measured.
+    reach = max(REACH_OF_A_BODY, float(np.linalg.norm(observation.reshape(-1, 3), axis=1).max()) + BAND)
+    places = path.position * controls.scale
+    near = beside(_at_model_rate(scene, times, target), places, reach, controls.scale)
     floor = float(np.median(path.position[:, 2])) * controls.scale
-    moved, said = yield from within(prepared_steps(_at_model_rate(scene, times, target), floor), 0.0, 0.5)
+    moved, said = yield from within(prepared_steps(near, floor), 0.0, 0.5)
     warnings += said
     scene = scaled(moved, 1.0 / controls.scale)
     occupied = yield from within(occupancy_steps(scene, path), 0.5, 1.0)

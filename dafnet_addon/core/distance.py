@@ -21,7 +21,8 @@ from .progress import drained, within
 from .solids import Box, Mesh, Scene
 
 __all__ = [
-    "BAND", "FLOOR", "DistanceGrid", "rigid_split", "build_grid", "grid_of", "prepared", "prepared_steps", "scaled",
+    "BAND", "FLOOR", "DistanceGrid", "rigid_frames", "rigid_split", "build_grid", "grid_of", "prepared",
+    "prepared_steps", "scaled",
 ]
 
 BAND = 0.15
@@ -105,6 +106,11 @@ def rigid_split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     rigid = m.copy()
     rigid[..., :3, :3] = u @ vt
     return rigid, np.swapaxes(rigid[..., :3, :3], -1, -2) @ m[..., :3, :3]
+
+
+def rigid_frames(solid: Box | Mesh) -> np.ndarray:
+    """The frames (4, 4) or (T, 4, 4) in which a solid's distances are measured."""
+    return solid.matrices() if isinstance(solid, Box) else rigid_split(solid.matrix)[0]
 
 
 def _welded(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

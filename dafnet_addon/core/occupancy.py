@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from .checks import in_frames
-from .distance import BAND, FLOOR, grid_of, rigid_split
+from .distance import BAND, FLOOR, grid_of, rigid_frames
 from .progress import drained
 from .root import RootPath
 from .rotations import rotate, transpose
@@ -44,7 +44,7 @@ class _Field:
 def _fields(scene: Scene, floor: np.ndarray, reach: float) -> Iterator[_Field]:
     frames = len(floor)
     for solid in scene.solids:
-        matrices = solid.matrices() if isinstance(solid, Box) else rigid_split(solid.matrix)[0]
+        matrices = rigid_frames(solid)
         in_frames(matrices, solid.name, frames)
         matrices = np.broadcast_to(matrices, (frames, 4, 4))
         rotation, position = matrices[:, :3, :3], matrices[:, :3, 3]

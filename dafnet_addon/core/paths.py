@@ -14,7 +14,10 @@ import numpy as np
 from .errors import InputError
 from .root import RootPath
 
-__all__ = ["Stop", "Rest", "Route", "facing", "route", "walked_along"]
+__all__ = ["AFTER_SEAT", "BEFORE_SEAT", "Rest", "Route", "Stop", "facing", "route", "walked_along"]
+
+BEFORE_SEAT, AFTER_SEAT = 0.55, 0.45
+"""Metres straight in front of a seat that one comes from and goes to, less the rounding."""
 
 Point = tuple[float, float]
 
@@ -23,7 +26,6 @@ _START, _HALT, _SIT, _RISE = 1.4, 1.2, 0.7, 0.9  # accelerations, m/s²
 _CORNER_RATE = np.radians(90.0)  # turning rate, a second, that slows a walker who looks along the path in a corner
 _SIDEWAYS = 2.0  # acceleration to the side that slows a walker who does not, m/s²
 _CORNER_CUT, _CORNER_SPEED = 0.45, 0.3  # metres of a straight that a rounded corner may use; slowest speed in a corner
-_BEFORE_SEAT, _AFTER_SEAT = 0.55, 0.45  # metres straight before and after a seat, less the rounding
 _SETTLED, _TURN_AWAY = 0.25, 0.20  # metres before a seat where the heading has settled, after it where it lets go
 
 
@@ -125,10 +127,10 @@ def _leg(origin: Stop, via: Sequence[Point], goal: Stop, cruise: float, fps: flo
     """From rest at ``origin`` to rest at ``goal``: from one frame after the one to the first frame at the other."""
     points: list[np.ndarray] = [np.asarray(origin.position, float)]
     if origin.seated:
-        points.append(points[0] + _AFTER_SEAT * _forward(origin.yaw))
+        points.append(points[0] + AFTER_SEAT * _forward(origin.yaw))
     points += [np.asarray(p, float) for p in via]
     if goal.seated:
-        points.append(np.asarray(goal.position, float) + _BEFORE_SEAT * _forward(goal.yaw))
+        points.append(np.asarray(goal.position, float) + BEFORE_SEAT * _forward(goal.yaw))
     points.append(np.asarray(goal.position, float))
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if not np.isfinite(gaps).all() or (gaps < 0.05).any():

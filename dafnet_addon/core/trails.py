@@ -7,7 +7,7 @@ kept, and only the shake and the too quick turns taken out. Yaw is as in ``core.
 import numpy as np
 
 from .errors import InputError
-from .paths import Rest, Route, Stop, facing, walked_along
+from .paths import AFTER_SEAT, Rest, Route, Stop, facing, walked_along
 from .root import RootPath, gaussian
 
 __all__ = ["FASTEST", "SHORTEST", "SLOWEST", "followed", "trail"]
@@ -19,7 +19,6 @@ SHORTEST = 0.5
 
 _STEP = 0.005  # metres between samples along a line
 _ROUNDING = 0.2  # metres, the smoothing's standard deviation: a right angle becomes an arc of about 0.3 m
-_AFTER_SEAT = 0.45  # metres straight ahead from a seat, as ``core.paths`` goes
 _MOVES, _STANDS = 0.15, 0.5  # metres a second under which something stands, where it does so for half a second
 _SHAKE, _SWAY = 0.15, 0.2  # seconds, standard deviations: smoothing of a recorded position, and of its heading
 _TURN_RATE = np.radians(160.0)  # a second: nobody walks and turns faster
@@ -54,12 +53,12 @@ def trail(
         raise InputError(f"The {name} is only {length:.2f} m long; it needs {SHORTEST} m to walk along.")
     if start is not None:
         origin = np.array(start.position)
-        ahead = origin + _AFTER_SEAT * np.array([-np.sin(start.yaw), np.cos(start.yaw)])
+        ahead = origin + AFTER_SEAT * np.array([-np.sin(start.yaw), np.cos(start.yaw)])
         points = np.concatenate([[origin, ahead] if start.seated else [origin], points])
     # Twice: the smoothing shortens corners, so its samples are no more evenly apart.
     curve, length = _even(points)
     curve, length = _even(gaussian(curve, _ROUNDING / (length / (len(curve) - 1))))
-    told = _AFTER_SEAT + _ROUNDING if start is not None and start.seated else 0.0, length
+    told = AFTER_SEAT + _ROUNDING if start is not None and start.seated else 0.0, length
     ends = [facing(curve[k] - curve[j]) if yaw is None else yaw for j, k in ((0, 1), (-2, -1))]
     begin = start or Stop((float(curve[0, 0]), float(curve[0, 1])), ends[0], 0.0)
     end = Stop((float(curve[-1, 0]), float(curve[-1, 1])), ends[1], seconds)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.nearby import extent
 from ..core.solids import Box, Mesh
 from .surfaces import HeightField, height_field, surface_points
 
@@ -19,6 +20,7 @@ _ONE_SIDED = 0.10  # metres between the middles of seat and of what stands up ar
 _BEFORE_BACK, _FROM_EDGE = 0.20, 0.22  # metres between the pelvis and the back; and the front edge, where there is no back
 _SNAP = np.radians(30.0)
 _UNDER = 0.08  # metres around a root, in which its seat is looked for
+_SMALLEST, _LARGEST = 0.15, 15.0  # metres across, of furniture
 _HALF_WIDTH = 0.28  # metres that a body needs to each side
 
 
@@ -81,20 +83,21 @@ def _largest(field: HeightField, floor: float) -> tuple[float, np.ndarray] | Non
 
 def on_a_seat(solids: Sequence[Box | Mesh], position: np.ndarray, floor: float = 0.0) -> bool:
     """Whether a root that rests at ``position`` (2,) has a seat under it: something between 22 and 85 cm over ``floor``."""
-    points = surface_points(solids, _CELL)
+    points = surface_points(solids, _CELL, (position - _UNDER, position + _UNDER))
     height = points[np.linalg.norm(points[:, :2] - position, axis=-1) < _UNDER, 2] - floor
     return bool(((height > _LOWEST) & (height < _HIGHEST)).any())
 
 
 def seat_of(
     solids: Sequence[Box | Mesh], towards: np.ndarray, floor: float = 0.0, name: str = "furniture",
-    near: np.ndarray | None = None,
+    near: np.ndarray | None = None, size: float = 1.0,
 ) -> SeatPlace:
     """Where one sits on one piece of furniture, made of ``solids``; world, metres, people of 1.75 m.
 
     With a back on one side one sits before it and looks away from it; without, one looks along the seat's shorter side, to
     where ``towards`` (2,) lies. On a wide seat one sits in the middle, or beside ``near`` (2,) where given. Raises InputError
-    where there is nothing to sit on: a level surface between 22 and 85 cm over ``floor``.
+    where there is nothing to sit on: a level surface between 22 and 85 cm over ``floor``. ``size``: of the character, over
+    1.75 m, for what is said of the scene.
     """
     points = surface_points(solids, 0.6 * _CELL)
     points = points[(points[:, 2] < floor + _OVERHEAD) & (points[:, 2] > floor + 0.02)]
@@ -103,6 +106,8 @@ def seat_of(
         field = height_field(points, points[:, :2].min(0), points[:, :2].max(0), _CELL)
         found = _largest(field, floor)
     if found is None:
+        if not _SMALLEST < (across := extent(solids)) < _LARGEST:
+            raise InputError(f"'{name}' is {across * size:.2g} m across: is its unit right? Scale it to the character's size.")
         raise InputError(f"'{name}' has no level surface between 22 and 85 cm over the floor to sit on; choose a seat.")
     level, cells = found
     places = field.middles(cells)
@@ -122,13 +127,13 @@ def seat_of(
     along = ways @ forward
     if not back or along.max() > np.cos(_SNAP):
         forward = ways[np.argmax(along)]
-    across = np.array([forward[1], -forward[0]])
-    depth, width = places @ forward, places @ across
+    sideways = np.array([forward[1], -forward[0]])
+    depth, width = places @ forward, places @ sideways
     low, high = float(depth.min()), float(depth.max())
     at = low + _BEFORE_BACK if back else max(0.5 * (low + high), high - _FROM_EDGE)
     aside = 0.5 * float(width.min() + width.max())
     room = 0.5 * float(np.ptp(width)) - _HALF_WIDTH
     if near is not None and room > 0.0:
-        aside = float(np.clip(near @ across, aside - room, aside + room))
-    position = min(at, high) * forward + aside * across
+        aside = float(np.clip(near @ sideways, aside - room, aside + room))
+    position = min(at, high) * forward + aside * sideways
     return SeatPlace(position, float(np.arctan2(-forward[0], forward[1])), floor + level, back)

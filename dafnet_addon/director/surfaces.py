@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.nearby import bounds
 from ..core.rotations import rotate
 from ..core.solids import Box, Mesh
 
@@ -29,9 +30,25 @@ def _corners(solid: Box | Mesh) -> np.ndarray:
     return np.asarray(world[triangles])
 
 
-def surface_points(solids: Sequence[Box | Mesh], spacing: float) -> np.ndarray:
-    """Points (N, 3) all over the surfaces, no two neighbours farther apart than about ``spacing`` metres."""
+def _reach_over(low: np.ndarray, high: np.ndarray, within: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Which boxes (N,) between corners (N, 3) reach over the floor between two corners (2,)."""
+    return np.asarray(((high[:, :2] >= within[0]) & (low[:, :2] <= within[1])).all(axis=1))
+
+
+def surface_points(
+    solids: Sequence[Box | Mesh], spacing: float, within: tuple[np.ndarray, np.ndarray] | None = None
+) -> np.ndarray:
+    """Points (N, 3) all over the surfaces, no two neighbours farther apart than about ``spacing`` metres.
+
+    ``within``: two corners (2,) of the floor; only of triangles that reach over what is between them, if they are given.
+    """
+    if within is not None:
+        solids = [solid for solid in solids if isinstance(solid, Box) or len(solid.triangles)]
+        boxes = [np.stack(bounds(solid)).reshape(2, -1, 3)[:, :1] for solid in solids]
+        solids = [solid for solid, (low, high) in zip(solids, boxes, strict=True) if _reach_over(low, high, within).any()]
     triangles = np.concatenate([np.zeros((0, 3, 3)), *(_corners(solid) for solid in solids)])
+    if within is not None:
+        triangles = triangles[_reach_over(triangles.min(axis=1), triangles.max(axis=1), within)]
     if not len(triangles):
         return np.zeros((0, 3))
     longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(1)
