@@ -1,5 +1,8 @@
 """``python -m dafnet_addon``: the command ``dafnet``."""
 
-from .cli import run
+from .core.stopping import Stop
 
-run()
+with Stop() as loading:  # a start of NumPy that is broken off looks like a damaged one
+    from .cli import run
+
+run(loading)

@@ -38,15 +38,20 @@ _Result = tuple[Any, str] | None
 """What a command found, for machines and for people."""
 _PACKAGES = {"PIL": "pillow"}
 """Names under which modules are installed, where they are others."""
-_SHOWN = 2000  # characters of each thing that ``info`` prints; --json gives all
+_SHOWN = 2000  # characters of each thing out of a file that is printed; --json gives all
 
 
-def main(argv: Sequence[str] | None = None, in_blender: bool = False) -> int:
-    """Run one command and return its exit code. ``in_blender``: the file that Blender has open is the scene."""
+def main(argv: Sequence[str] | None = None, in_blender: bool = False, loading: Stop | None = None) -> int:
+    """Run one command and return its exit code.
+
+    ``in_blender``: the file that Blender has open is the scene. ``loading``: remembers whether to stop was asked before.
+    """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a name that the terminal has no letters for is no reason to fail
     try:
+        if loading:
+            loading.now()
         options = _parser(in_blender).parse_args(argv)
         _require(options)
         with ExitStack() as stack:
@@ -71,10 +76,10 @@ def main(argv: Sequence[str] | None = None, in_blender: bool = False) -> int:
         return 128 + (stop.args[0] if stop.args else signal.SIGINT)
 
 
-def run() -> None:
-    """``main`` as a console script."""
+def run(loading: Stop | None = None) -> None:
+    """``main`` as a process."""
     _open_streams()
-    code = main()
+    code = main(loading=loading)
     sys.stdout.flush()
     sys.stderr.flush()
     if "bpy" in sys.modules:
@@ -184,7 +189,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
 
     train = command(
         "train", _train, "train a model, or go on with a run, and write its weights", part="training",
-        needs=lambda _: ("torch", "tensorboard"),
+        needs=lambda _: ("torch", "tensorboard", "safetensors"),
     )
     train.add_argument("config", type=Path, metavar="CONFIG.toml", help="sizes and budgets; see configs/")
     train.add_argument("dataset", type=Path, metavar="DATASET", help="made by 'prepare'")
@@ -195,7 +200,10 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
 
     evaluate = command(
         "evaluate", _evaluate, "measure weights on held-out clips, beside the clips themselves", part="training",
-        needs=lambda o: ("torch", *(("matplotlib",) if o.output or o.sheets else ()), *(("PIL",) if o.sheets else ())),
+        needs=lambda o: (
+            "torch", *(("safetensors",) if _is_samp(o.weights) else ()),
+            *(("matplotlib",) if o.output or o.sheets else ()), *(("PIL",) if o.sheets else ()),
+        ),
     )
     evaluate.add_argument("folder", type=Path, metavar="FOLDER", help="holds the motion files")
     evaluate.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
@@ -291,10 +299,10 @@ def _bake(options: argparse.Namespace, bar: "_Bar") -> _Result:
         "warnings": list(result.warnings),
         "seconds": {stage: round(spent, 4) for stage, spent in result.seconds.items()},
     }
-    lines = [f"Warning: {warning}" for warning in report["warnings"]]
+    lines = [f"Warning: {printable(warning, _SHOWN)}" for warning in report["warnings"]]
     for take in report["takes"]:
-        slides = take["metrics"]["foot_sliding_per_frame"]
-        lines.append(f"{take['action']}: {take['frames']} frames, seed {take['seed']}, {slides:.2f} feet slide a frame")
+        slides = f"{take['metrics']['foot_sliding_per_frame']:.2f} feet slide a frame"
+        lines.append(f"{printable(take['action'])}: {take['frames']} frames, seed {take['seed']}, {slides}")
     lines.append(", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in report["seconds"].items()))
     return report, "\n".join((*lines, f"Written to {output}"))
 
@@ -359,7 +367,7 @@ def _evaluate(options: argparse.Namespace, bar: "_Bar") -> _Result:
     for folder in filter(None, (options.output, options.sheets)):
         require_writable(folder / "evaluation.json")
     clips = held_out(options.folder)
-    if options.weights and options.weights.suffix in (".checkpoint", ".pt"):
+    if _is_samp(options.weights):
         return _evaluate_samp(options, clips, bar)
     weights = load_weights(options.weights)
     found = report(weights, clips, bar)
@@ -373,6 +381,10 @@ def _evaluate(options: argparse.Namespace, bar: "_Bar") -> _Result:
     if options.sheets:
         contact_sheets(weights, clips, options.sheets)
     return found, text(found)
+
+
+def _is_samp(weights: Path | None) -> bool:
+    return weights is not None and weights.suffix in (".checkpoint", ".pt")
 
 
 def _evaluate_samp(options: argparse.Namespace, clips: "list[HeldClip]", bar: "_Bar") -> _Result:

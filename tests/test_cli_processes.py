@@ -101,6 +101,24 @@ sys.meta_path.insert(0, Starting())
     assert names(tmp_path) == ["scene.blend"]
 
 
+def test_a_signal_while_numpy_loads_is_not_lost(scene: Path, tmp_path: Path) -> None:
+    code = """
+import runpy, signal, sys
+class Loading:
+    def find_spec(self, name, path=None, target=None):
+        if name == "numpy.linalg" and self in sys.meta_path:
+            sys.meta_path.remove(self)
+            signal.raise_signal(signal.SIGINT)
+sys.meta_path.insert(0, Loading())
+sys.argv[0] = "dafnet"
+runpy.run_module("dafnet_addon", run_name="__main__")
+"""
+    arguments = ["bake", str(scene), "-o", str(tmp_path / "out.blend")]
+    done = subprocess.run([sys.executable, "-c", code, *arguments], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "dafnet: stopped.\n")
+    assert names(tmp_path) == ["scene.blend"]
+
+
 def test_a_film_stops_at_a_frame(blender: ModuleType, addon: Addon, tmp_path: Path) -> None:
     blender.context.scene.frame_end = 40
     blender.context.scene.camera = blender.data.objects.new("Camera", blender.data.cameras.new("Camera"))
@@ -189,8 +207,9 @@ _BESIDES_NUMPY = {"torch", "matplotlib", "PIL", "scipy", "trimesh", "rtree", "sa
 @pytest.mark.parametrize(
     ("arguments", "lacks"),
     [
-        (["train", "config.toml", "data", "-o", "new"], "torch and tensorboard"),
+        (["train", "config.toml", "data", "-o", "new"], "torch and tensorboard and safetensors"),
         (["evaluate", "folder", "-o", "new"], "torch and matplotlib"), (["evaluate", "folder"], "torch"),
+        (["evaluate", "folder", "--weights", "samp.checkpoint"], "torch and safetensors"),
         (["evaluate", "folder", "--sheets", "new"], "torch and matplotlib and pillow"),
         (["prepare", "folder", "-o", "new"], "matplotlib"), (["bench", "speed"], "torch"), (["figures", "-o", "new"], "pillow"),
         (["bake", "a.blend", "-o", "new/b.blend"], "bpy"), (["demo", "-o", "new"], "bpy"),
