@@ -107,6 +107,24 @@ def test_what_cannot_be_walked_to_changes_nothing(room: Room) -> None:
     refused("has no root")
 
 
+def test_it_sits_on_a_chair_that_physics_has_dropped(room: Room) -> None:
+    bpy = room.bpy
+    floor = room.box("Floor", (-5.0, -1.0, -0.2), (5.0, 6.0, 0.0))
+    for each in (room.chair, *room.chair.children):
+        bpy.data.objects.remove(each)
+    stool = room.box("Stool", (-0.22, -0.22, -0.225), (0.22, 0.22, 0.225))
+    stool.location = (0.0, 3.2, 1.6)
+    bpy.ops.rigidbody.world_add()
+    for made, kind in ((floor, "PASSIVE"), (stool, "ACTIVE")):
+        room.select(made)
+        bpy.ops.rigidbody.object_add()
+        made.rigid_body.type, made.rigid_body.use_margin, made.rigid_body.collision_margin = kind, True, 0.0
+    room.select(stool, room.ann)
+    room.scene.frame_set(38)
+    assert bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
+    assert room.scene.frame_current == 38 and 2.9 < room.place(room.scene.frame_end)[1] < 3.5
+
+
 def keyed(room: Room, frames: tuple[int, ...] = (1, 6)) -> list:
     """Two keys of the root at its place; its curves."""
     for frame in frames:

@@ -16,9 +16,10 @@ from ..core.errors import InputError
 from ..core.solids import Mesh
 from .armature import metres_per_unit
 from .dependencies import Dependencies
+from .playback import in_order
 from .properties import Settings, find_collection, find_object, find_scene
 
-__all__ = ["Furniture", "array", "furniture_now", "furniture_of"]
+__all__ = ["Furniture", "array", "furniture_at", "furniture_now", "furniture_of"]
 
 _DRAWN_THROUGH = {"WIRE", "BOUNDS"}
 _CHANGED = 1e-3
@@ -65,6 +66,16 @@ def furniture_now(context: bpy.types.Context, settings: Settings) -> dict[str, l
     for solid in furniture.solids(metres_per_unit(scene)):
         found[solid.name].append(solid)
     return dict(found)
+
+
+def furniture_at(context: bpy.types.Context, settings: Settings, frame: int) -> dict[str, list[Mesh]]:
+    """``furniture_now`` in another frame, as it lies there when the scene is played; that frame stays set."""
+    dependencies = Dependencies(find_scene(settings))
+    furniture = furniture_of(settings, dependencies)
+    simulations = dependencies.simulations(furniture.members) if furniture else []
+    for each in in_order([frame], simulations):
+        context.scene.frame_set(each)
+    return furniture_now(context, settings)
 
 
 class Furniture:

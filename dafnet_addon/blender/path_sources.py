@@ -19,7 +19,7 @@ from ..director.walks import around, way_round
 from .armature import character_scale, is_character, metres_per_unit, parts_of, sent
 from .compat import action_curves
 from .dependencies import Dependencies
-from .furniture import furniture_now
+from .furniture import furniture_at
 from .playback import frame_kept, in_order
 from .properties import settings_of
 from .root_keys import MOVES, keyable_root, keyed_along, last_key, unchanged_on_failure
@@ -103,9 +103,8 @@ def _directed(context: bpy.types.Context, armature: bpy.types.Object, first: int
         keyed = last_key(root)
         first = scene.frame_current if keyed is None else keyed
     with frame_kept(scene):
-        scene.frame_set(first)
+        meshes = [mesh for found in furniture_at(context, settings, first).values() for mesh in found]
         place, yaw = np.array(root.location, float) * unit, float(root.rotation_euler[2])
-        meshes = [mesh for found in furniture_now(context, settings).values() for mesh in found]
     return _Directed(root, first, unit, size, fps, place, yaw, scaled(Scene(tuple(meshes)), 1.0 / size))
 
 

@@ -14,7 +14,7 @@ from ..core.solids import Mesh, Scene
 from ..director.seats import on_a_seat, seat_of
 from ..director.walks import walk_to
 from .armature import character_scale, metres_per_unit
-from .furniture import furniture_now
+from .furniture import furniture_at
 from .playback import frame_kept
 from .properties import settings_of
 from .root_keys import keyable_root, keyed_along, last_key, unchanged_on_failure
@@ -54,10 +54,9 @@ def walk(
     keyed = last_key(root)
     first = scene.frame_current if keyed is None else keyed
     with frame_kept(scene):
-        scene.frame_set(first)
         unit = metres_per_unit(scene)
         size = character_scale(armature, unit)
-        found = furniture_now(context, settings)
+        found = furniture_at(context, settings, first)
         place, yaw = np.array(root.location, float) * unit / size, float(root.rotation_euler[2])
         goal = np.array(scene.cursor.location, float) * unit / size
     fps = scene.render.fps / scene.render.fps_base
