@@ -343,12 +343,13 @@ def _train(options: argparse.Namespace, bar: "_Bar") -> _Result:
     model, config = read_config(options.config)
     if options.minutes is not None:
         config = replace(config, minutes_flow=options.minutes)
+    device = ranks.device_of(options.device)
     begin_with = load_weights(options.begin_with) if options.begin_with else None
     file = options.output / f"{model.system}.safetensors"
     require_writable(file)
     if ranks.rank() == 0:
-        precision.announce(config.mixed, options.device)
-    train(options.dataset, options.output, model, config, bar, options.device, begin_with)
+        precision.announce(config.mixed, device)
+    train(options.dataset, options.output, model, config, bar, device, begin_with)
     if ranks.rank():
         return None
     flow, predictor, statistics = trained(options.output)

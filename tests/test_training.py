@@ -4,7 +4,9 @@ import json
 import os
 import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
+from dafnet_addon import cli  # noqa: E402
 from dafnet_addon.baselines.flows import flow_of, parts_of  # noqa: E402
 from dafnet_addon.baselines.samplers import sampler_of  # noqa: E402
 from dafnet_addon.core.errors import InputError, WeightsError  # noqa: E402
@@ -24,6 +27,7 @@ from dafnet_addon.data import boxes as boxes_module  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.model.flow import Coupling, EnvironmentEncoder  # noqa: E402
 from dafnet_addon.training import precision  # noqa: E402
+from dafnet_addon.training import train as training  # noqa: E402
 from dafnet_addon.training.batches import Pool, Statistics, observation_for, occupancy_of, past_of  # noqa: E402
 from dafnet_addon.training.export import (  # noqa: E402
     adopt_predictor,
@@ -273,6 +277,26 @@ def test_configurations_are_read_and_bad_ones_refused(tmp_path):
         train_part("predictor", tmp_path, tmp_path / "run", TINY, _config(1))
     with pytest.raises(InputError, match="'lower' is unknown"):
         flow_of(replace(TINY, system="lower"))
+
+
+def test_what_a_run_cannot_be_trained_with_is_said(dataset, tmp_path, capsys):
+    _until("predictor", dataset, tmp_path / "run", steps=1)
+    with pytest.raises(InputError, match="width 16, not 17; code 8, not 9"):
+        train_part("predictor", dataset, tmp_path / "run", replace(TINY, width=17, code=9), _config(1))
+    config = Path(__file__).resolve().parents[1] / "configs" / "small.toml"
+    command = ["train", str(config), str(dataset), "-o", str(tmp_path / "two")]
+    for device in ("cuda:77", "gpu"):
+        assert cli.main([*command, "--device", device]) == 1
+        said = capsys.readouterr().err
+        assert f"'{device}' cannot be used" in said and said.strip().count("\n") == 0, said
+    assert not (tmp_path / "two").exists()
+
+
+def test_a_process_that_was_ended_from_outside_is_told(dataset, tmp_path, monkeypatch):
+    ended = partial(ProcessPoolExecutor, initializer=os._exit, initargs=(9,))
+    monkeypatch.setattr(training, "ProcessPoolExecutor", ended)
+    with pytest.raises(InputError, match="give the same command again"):
+        training.train(dataset, tmp_path, replace(TINY, system="moglow"), _config(1))
 
 
 def test_batches_are_noisy_by_three_millimetres(dataset):

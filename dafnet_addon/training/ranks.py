@@ -6,6 +6,8 @@ import torch
 import torch.distributed as dist
 from torch import Tensor, nn
 
+from ..core.errors import InputError
+
 __all__ = ["joined", "rank", "device_of", "average", "mean", "from_first"]
 
 
@@ -25,8 +27,17 @@ def rank() -> int:
 
 
 def device_of(device: str) -> str:
-    """The device of this rank: the one asked for, where that is 'cuda' the one that ``torchrun`` gave it."""
-    return f"cuda:{os.environ['LOCAL_RANK']}" if device == "cuda" and joined() else device
+    """The device of this rank: the one asked for, where that is 'cuda' the one that ``torchrun`` gave it.
+
+    Raises InputError where it is not there.
+    """
+    device = f"cuda:{os.environ['LOCAL_RANK']}" if device == "cuda" and joined() else device
+    try:
+        torch.zeros(1, device=device)
+    except (RuntimeError, AssertionError) as error:  # torch asserts that it was built for a device
+        reason = str(error).split("\n")[0].rstrip(".")
+        raise InputError(f"The device '{device}' cannot be used ({reason}); name another, 'cpu' for one.") from None
+    return device
 
 
 def average(values: list[Tensor]) -> None:

@@ -12,6 +12,7 @@ import time
 import tomllib
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -92,7 +93,7 @@ class TrainingConfig:
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
             least = 1 if name in ("batch", "warmup", "save_every") else 0
-            if value < least:
+            if not least <= value < math.inf:
                 raise ValueError(f"'{name}' must be {least} or more")
 
     def share(self, step: int, seconds: float) -> float:
@@ -323,7 +324,9 @@ def train_part(
     progress: Callable[[str, float, float], None] = lambda part, share, loss: None, device: str = "cpu",
     begin_with: Weights | None = None,
 ) -> Run:
-    """Train one part, or go on with it, until its budget is spent. Raises InputError without a dataset.
+    """Train one part, or go on with it, until its budget is spent.
+
+    Raises InputError without a dataset, for a device that is not there, and where a part of other sizes was begun there.
 
     A new run begins with what ``begin_with`` has learnt, where given: weights of the same sizes. A loss that is not a number
     stops the run with the last good checkpoint kept. Shards that 'prepare' is still writing are taken in as they come.
@@ -339,6 +342,10 @@ def train_part(
     predictor = None if part == "predictor" or not model.predicts else Run.load("predictor", folder, device=device)
     if checkpoint_file(folder, part).exists():
         run = Run.load(part, folder, config, device)
+        if run.model != model:
+            own = run.model.as_dict()
+            other = [f"{name} {own[name]}, not {value}" for name, value in model.as_dict().items() if own[name] != value]
+            raise InputError(f"The run '{folder}' was begun with other settings ({'; '.join(other)}); train in another folder.")
     else:
         # All parts are standardised alike, whatever shards there were when each began.
         statistics = predictor.statistics if predictor is not None else pool.statistics()
@@ -419,8 +426,14 @@ def train(
         while wait(parts, timeout=2.0).not_done:
             spent = 0.0 if config.steps_flow else (time.monotonic() - begin) / max(60.0 * config.minutes_flow, 1e-9)
             progress(first + (1.0 - first) * min(1.0, spent))
-        for done in parts:
-            done.result()
+        try:
+            for done in parts:
+                done.result()
+        except BrokenProcessPool:
+            raise InputError(
+                "A process of the training was ended from outside, for want of memory perhaps; give the same command again, "
+                "and it goes on from its last checkpoint."
+            ) from None
 
 
 def trained(folder: Path) -> tuple[BodyFlow, ActionPredictor | None, Statistics]:
