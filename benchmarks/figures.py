@@ -138,8 +138,8 @@ def _made(weights: Weights, pieces: Iterable[Piece], controls: Controls) -> Moti
 def _made_by(sampler: Sampler, pieces: Iterable[Piece], controls: Controls) -> Motion:
     """One take of any system, in one mode."""
     shot = drained(shot_steps(_scene(pieces), controls))
-    poses, action, _ = drained(sampler.run(shot.conditions, np.zeros((1, 66))))
-    return _motion(to_world(shot.path, poses[PREROLL:, 0].reshape(-1, 22, 3)), action[PREROLL:, 0])
+    made = drained(sampler.run(shot.conditions, np.zeros((1, 66))))
+    return _motion(to_world(shot.path, made.poses[PREROLL:, 0].reshape(-1, 22, 3)), made.actions[PREROLL:, 0])
 
 
 def _free(walked: Route) -> Controls:

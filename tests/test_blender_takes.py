@@ -152,6 +152,24 @@ def test_from_here_on_keeps_what_comes_before(shot: Shot) -> None:
         shot.bpy.ops.dafnet.generate(task="ONWARD")
 
 
+def test_from_here_on_counts_seconds_where_the_rate_has_changed(shot: Shot) -> None:
+    shot.bpy.ops.dafnet.generate()
+    first = shot.listed()[0]
+    before = shot.takes.stored(first)[0]
+    shot.ann.dafnet.seed, shot.ann.dafnet.temperature = 3, 1.5
+    shot.scene.render.fps *= 2
+    at = shot.ann.dafnet.frame_end if not shot.ann.dafnet.use_scene_range else shot.scene.frame_end
+    shot.scene.frame_set(at - 10)
+    shot.bpy.ops.dafnet.generate(task="ONWARD")
+    after = shot.takes.stored(shot.listed()[1])[0]
+    assert after.fps == 2 * before.fps
+    kept = (at - 10 - first.dafnet.frame_start) // 2
+    assert np.abs(after.poses[:70] - before.poses[:70]).max() < 1e-5
+    place = lambda take: take.path.position[:kept, None] + take.poses[70 : 70 + kept].reshape(kept, 22, 3)  # noqa: E731
+    assert kept > 10 and np.abs(place(after)[..., 2] - place(before)[..., 2]).max() < 1e-4, "the same poses for as long"
+    assert np.abs(after.poses[-2:] - before.poses[-2:]).max() > 0.01
+
+
 def test_cleaned_again_makes_a_new_take_and_leaves_the_old(shot: Shot) -> None:
     own = shot.ann.dafnet
     own.plant_feet = 0.0

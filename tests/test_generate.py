@@ -284,7 +284,7 @@ def test_lists_do_for_arrays(weights):
         Controls(30, controls.root.tolist(), ["EE"] * len(controls), **{name: each.tolist() for name, each in given.items()}),
         weights,
     )
-    assert np.array_equal(arrays.joints, lists.joints)
+    assert np.abs(arrays.joints - lists.joints).max() < 1e-9  # sums depend on where arrays lie in memory
 
 
 @pytest.mark.parametrize("seed", [-1, MOST_SEED + 1, 3_000_000_000, 1.0, 1.5, None, "7", True, float("nan"), 10**400, [1]])

@@ -4,15 +4,23 @@ import numpy as np
 import pytest
 
 from dafnet_addon.core.kinematics import (
-    blend_switches,
+    Bent,
+    Turn,
+    come_over,
     fit,
     forward_kinematics,
     global_from_local,
     local_from_global,
+    turned,
     two_bone,
 )
-from dafnet_addon.core.root import RootPath, to_root
-from dafnet_addon.core.rotations import matrix_from_quaternion, quaternion_from_matrix, rotate, yaw_matrix
+from dafnet_addon.core.rotations import (
+    matrix_from_quaternion,
+    quaternion_from_matrix,
+    rotate,
+    smoothstep,
+    yaw_matrix,
+)
 from dafnet_addon.core.skeleton import OFFSETS, PARENTS, REST
 
 FRAMES = 240
@@ -152,12 +160,33 @@ def test_head_and_hands_follow_their_rotation_where_given() -> None:
     asked[2:] = np.nan
     left = np.stack([np.array([0.0, 1, 0]), np.array([-1.0, 0, 0]), np.array([0.0, 0, 1])], axis=-1)
     right = np.stack([np.array([-1.0, 0, 0]), np.array([0.0, 1, 0]), np.array([0.0, 0, -1])], axis=-1)
-    _, frames = fit(joints, head_rotation=asked, hand_left_rotation=np.tile(left, (4, 1, 1)),
-                    hand_right_rotation=2.0 * np.tile(right, (4, 1, 1)))
+    known = np.array([1.0, 1.0, 0.0, 0.0])
+    fitted = fit(joints)[1]
+    frames = turned(fitted, {
+        "head": Turn(asked, known), "hand_left": Turn(np.tile(left, (4, 1, 1)), np.ones(4)),
+        "hand_right": Turn(2.0 * np.tile(right, (4, 1, 1)), np.ones(4)),
+    })
     assert np.allclose(frames[:2, 15], asked[:2]) and np.allclose(frames[2:, 15], frames[2:, 12])
     assert np.allclose(frames[:, 20], np.eye(3))
     assert np.allclose(rotate(frames[:, 21], np.array([1.0, 0, 0])), [0, 1, 0])  # right fingers: rest +x, asked +y
     assert np.allclose(rotate(frames[:, 21], np.array([0.0, 0, 1])), [0, 0, -1])  # back of the hand: down
+    before, after = (forward_kinematics(each, joints[:, 0]) for each in (fitted, frames))
+    assert np.allclose(before, after), "no joint moves"
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 0.5, 1.0])
+def test_a_rotation_that_counts_in_part_turns_in_part(share: float) -> None:
+    fitted = fit(np.tile(REST, (3, 1, 1)))[1]
+    asked = np.broadcast_to(yaw_matrix(np.radians(80.0)), (3, 3, 3))
+    frames = turned(fitted, {"head": Turn(asked, np.full(3, share))})
+
+    def yaw(frame: np.ndarray) -> np.ndarray:
+        return np.degrees(np.arctan2(frame[..., 1, 0], frame[..., 0, 0]))
+
+    neck = yaw(frames[:, 12] @ fitted[:, 12].transpose(0, 2, 1))
+    assert np.allclose(neck, 40.0 * share, rtol=0.1), "half of it is the neck's"
+    assert np.allclose(yaw(frames[:, 15]), neck + share * (80.0 - neck), atol=2.0)
+    assert (share > 0.0) or np.array_equal(frames, fitted)
 
 
 def test_two_bone_reaches_bends_and_clamps() -> None:
@@ -188,21 +217,41 @@ def test_two_bone_where_the_pole_says_nothing() -> None:
     assert np.isfinite(nowhere).all() and np.isclose(np.linalg.norm(nowhere), 0.41)
 
 
-def test_blend_eases_a_switch_and_leaves_the_rest() -> None:
-    path = RootPath(np.stack([np.linspace(0, 2, 60), np.zeros(60), np.zeros(60)], axis=1), np.linspace(0, 1.0, 60))
-    local = np.broadcast_to(np.eye(3), (60, 22, 3, 3)).copy()
-    local[30:, 16] = turn("z", np.full(30, 1.2))
-    local[:, 0] = path.rotation
-    quaternions = quaternion_from_matrix(local)
-    pelvis = path.position + np.array([0, 0, 0.9])
-    pelvis[30:, 2] -= 0.1
-    blended, eased = blend_switches(quaternions, pelvis, path, [30])
+def _turning(angle: np.ndarray, height: np.ndarray) -> Bent:
+    """A body that only turns its left arm, by angles (T,), its pelvis at heights (T,)."""
+    local = np.broadcast_to(np.eye(3), (len(angle), 22, 3, 3)).copy()
+    local[:, 16] = turn("z", angle)
+    return Bent(quaternion_from_matrix(local), height[:, None] * np.array([0.0, 0.0, 1.0]))
+
+
+def _arm(motion: Bent) -> np.ndarray:
+    return 2 * np.arctan2(motion.local[:, 16, 3], motion.local[:, 16, 0])
+
+
+def test_a_body_comes_over_from_what_would_have_been() -> None:
+    time = np.arange(60)
+    angle, height = np.where(time < 30, 0.0, 1.2), np.where(time < 30, 0.9, 0.8)
+    motion, other = _turning(angle, height), _turning(np.zeros(10), np.full(10, 0.9))
+    ease = smoothstep(np.arange(1, 11) / 11)
+    out = come_over(motion, [(30, ease, other)])
     untouched = np.r_[0:30, 40:60]
-    assert np.allclose(blended[untouched], quaternions[untouched]) and np.allclose(eased[untouched], pelvis[untouched])
-    assert np.allclose(to_root(path, eased)[:, :2], 0.0, atol=1e-12)
-    assert np.allclose(matrix_from_quaternion(blended[:, 0]), path.rotation)
-    angle = 2 * np.arccos(np.clip(np.abs(blended[:, 16, 0]), 0, 1))
-    x = np.arange(1, 11) / 11
-    assert np.allclose(angle[30:40], 1.2 * (3 * x**2 - 2 * x**3), atol=1e-7)
-    assert np.allclose(eased[30:40, 2], 0.9 - 0.1 * (3 * x**2 - 2 * x**3))
-    assert np.allclose(blend_switches(quaternions, pelvis, path, [0, 60])[0], quaternions)
+    assert all(np.array_equal(a[untouched], b[untouched]) for a, b in zip(out, motion, strict=True))
+    assert np.allclose(_arm(out)[30:40], 1.2 * ease, atol=1e-7)
+    assert np.allclose(out.pelvis[30:40, 2], 0.9 - 0.1 * ease)
+
+
+def test_where_a_change_changes_nothing_the_stride_goes_on() -> None:
+    stride = np.sin(np.arange(60) / 5.0)
+    motion = _turning(stride, 0.9 + 0.02 * stride)
+    other = Bent(motion.local[30:40], motion.pelvis[30:40])
+    out = come_over(motion, [(30, smoothstep(np.arange(1, 11) / 11), other)])
+    assert np.allclose(_arm(out), stride) and np.allclose(out.pelvis, motion.pelvis)
+
+
+def test_changes_that_follow_at_once_do_not_pop() -> None:
+    time, ease = np.arange(60), smoothstep(np.arange(1, 11) / 11)
+    angle = np.select([time < 30, time < 34], [0.0, 1.2], -0.8)
+    changes = [(30, ease, _turning(np.zeros(10), np.ones(10))), (34, ease, _turning(np.full(10, 1.2), np.ones(10)))]
+    out = _arm(come_over(_turning(angle, np.ones(60)), changes))
+    assert np.abs(np.diff(out)).max() < 0.35 and np.allclose(out[44:], -0.8)
+    assert np.allclose(out[30:34], 1.2 * ease[:4])

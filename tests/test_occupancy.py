@@ -3,13 +3,16 @@
 import numpy as np
 import pytest
 
+from dafnet_addon.core.conditions import PREROLL, shot_steps
 from dafnet_addon.core.distance import BAND, prepared, scaled
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.occupancy import distance, occupancy, tops_under
+from dafnet_addon.core.progress import drained
 from dafnet_addon.core.root import RootPath, to_world
 from dafnet_addon.core.rotations import rotate, transpose, yaw_matrix
 from dafnet_addon.core.sensor import SPHERES, occupancy_of_distance
 from dafnet_addon.core.solids import Box, Mesh, Scene, box_distance
+from dafnet_addon.core.take import Controls
 
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 QUADS = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
@@ -110,6 +113,40 @@ def test_scaling_scene_and_path_scales_what_is_seen():
         found = occupancy(scaled(tall_world, 1 / 1.2), path)
         assert np.abs(found - occupancy(scene, path)).max() < GRID_ERROR
         assert np.abs(occupancy(tall_world, large) - found).max() > 0.5
+
+
+@pytest.mark.parametrize("scale", [0.2, 0.5, 1.0, 2.05, 2.2, 3.0, 5.0, 10.0])
+def test_a_character_of_any_size_sees_what_the_exact_boxes_are(scale):
+    """The whole world grows with the character, so that all are told the same."""
+    path, boxes = walk(), furniture()
+    root = path.matrices()
+    root[:, :3, 3] *= scale
+    for make, tolerance in ((lambda box: box, 1e-4), (as_mesh, GRID_ERROR)):
+        scene = scaled(Scene([make(box) for box in boxes]), scale)
+        shot = drained(shot_steps(scene, Controls(30.0, root, scale=scale)))
+        exact = expected(boxes, shot.path)
+        found = shot.conditions.occupancy[PREROLL:]
+        assert np.abs(found - exact).max() < tolerance and found.max() == 1.0
+        assert np.abs(found - exact)[exact > 0].mean() < 0.03
+        points = np.random.default_rng(0).uniform([-1.5, -1.2, 0], [1.7, 1.2, 1.2], (40, 500, 3))
+        apart = np.min([box_distance((points - b.center) @ b.rotation, b.half_size) for b in boxes], axis=0)
+        for measured in (shot.scene, shot.own_scene):
+            near = np.maximum(distance(measured, points, 0.0), -BAND)  # grids say no more of what is deeper inside
+            np.testing.assert_allclose(near, np.clip(apart, -BAND, BAND), atol=0.013)
+
+
+@pytest.mark.parametrize("scale", [0.2, 1.0, 4.0])
+@pytest.mark.parametrize("make", [lambda box: box, as_mesh], ids=["box", "mesh"])
+def test_the_own_scene_lies_where_furniture_is_at_the_own_frames(make, scale):
+    fps, frames = 60.0, 81
+    way = np.linspace(0.0, 1.0, frames)[:, None]
+    moving = Box(scale * (np.array([0.6, -0.8, 0.4]) + way * (0.0, 1.6, 0.0)), scale * np.full(3, 0.3), np.eye(3), "trolley")
+    shot = drained(shot_steps(Scene([make(moving)]), Controls(fps, np.tile(np.eye(4), (frames, 1, 1)), scale=scale)))
+    assert len(shot.own_path) == frames and len(shot.path) == 41
+    points = np.array([0.6, 0.2, 0.4]) + np.zeros((frames, 1, 3))
+    inside = np.where(distance(shot.own_scene, points, 0.0)[:, 0] < 0.0)[0]
+    exact = np.where(box_distance(points[:, 0] - moving.center / scale, np.full(3, 0.3)) < 0.0)[0]
+    assert abs(inside[0] - exact[0]) <= 1 and abs(inside[-1] - exact[-1]) <= 1
 
 
 def test_frames_must_match():

@@ -53,7 +53,7 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     description = {"model": config.as_dict(), "fps": 30, "offsets": OFFSETS.tolist()}
     weights = Weights(tensors, description, {"format": FORMAT}, tmp_path)
     conditions, z = _conditions(30), rng.normal(size=(2, 66))
-    made, actions, density = drained(Sampler(weights, dtype="float64").run(conditions, z))
+    made, actions, density, _ = drained(Sampler(weights, dtype="float64").run(conditions, z))
 
     # The same, by the model's own forward: poses must go back to the noise that they were made from.
     poses = torch.from_numpy((model_order(made).transpose(1, 0, 2) - tensors["pose_mean"]) / tensors["pose_std"])
@@ -113,7 +113,7 @@ def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: 
     sampler = {"ap-p": WholeBodySampler, "moglow": MoGlowSampler, "lower-first": LowerFirstSampler}[system](
         Weights(tensors, description, {"format": FORMAT}, tmp_path), dtype="float64"
     )
-    made, actions, density = drained(sampler.run(conditions, z))
+    made, actions, density, _ = drained(sampler.run(conditions, z))
     assert actions.shape == (30, 2, 0 if system == "moglow" else 10)
 
     # The same, by the model's own forward: poses must go back to the noise that they were made from.

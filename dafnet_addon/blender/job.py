@@ -103,7 +103,8 @@ def steps(
         resume, at = stored(action)[0], settings.kept_until - settings.frame_start
         if action.dafnet.frame_start != settings.frame_start:
             raise InputError(f"The take '{action.name}' begins at another frame than the range; set the range's start to its.")
-        if not 0 < at < len(resume):
+        render = find_scene(settings).render
+        if not 0.0 < at * render.fps_base / render.fps < len(resume) / resume.fps:
             raise InputError(f"Frame {settings.kept_until} is not inside the take '{action.name}'; go to a frame in it.")
     try:
         read = yield from within(read_steps(context, settings), 0.0, _READ)

@@ -347,7 +347,7 @@ class _Piece:
     def measured(self, floor: float, size: float) -> Mesh | Box:
         """The mesh with its distance field, canonical metres."""
         if self.ready is None:
-            self.ready = scaled(prepared(Scene((self.mesh,)), floor)[0], 1.0 / size).solids[0]
+            self.ready = prepared(scaled(Scene((self.mesh,)), 1.0 / size), floor / size)[0].solids[0]
         return self.ready
 
 
@@ -579,7 +579,7 @@ def faults_of(
         floor = take.root[:, 2, 3] / take.scale
         joints = take.joints / take.scale
         near = beside(scenes[first, last], take.root[:, :3, 3], REACH_OF_A_BODY, take.scale)
-        room = scaled(prepared(near, float(np.median(take.root[:, 2, 3])))[0], 1.0 / take.scale)
+        room, _ = prepared(scaled(near, 1.0 / take.scale), float(np.median(floor)))
         apart = distance(room, joints[:, list(BAD_COLLISION_JOINTS)], floor)
         found[action.session_uid] = Faults(foot_sliding(joints, take.fps, floor), bad_collisions(apart))
     return found

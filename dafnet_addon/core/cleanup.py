@@ -16,7 +16,7 @@ from .errors import InputError
 from .kinematics import on_bones, two_bone
 from .progress import drained
 from .root import gaussian
-from .rotations import matrix_from_vector
+from .rotations import matrix_from_vector, smoothstep
 from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, TOE_HEIGHT, joint
 
 __all__ = ["CleanUp", "cleaned", "cleaning_steps", "cleared", "planted", "seated", "smoothed_out", "standing_still", "reaching"]
@@ -34,7 +34,7 @@ _UPPER_ARM, _FOREARM = (float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n
 _LOW, _SLOW = 0.035, 0.45  # metres over a planted toe base; metres a second that a foot slides and is still meant to stand
 _PLANTS, _MENDS = 4, 3  # frames: the shortest stand; the longest gap in one
 _SLIPS = 0.12  # metres from its place at which a foot is let go
-_FADE = 10  # frames in which what is added dies away
+_FADE = 1 / 3  # seconds in which what is added dies away
 _SITS_OVER, _SINKS = 0.08, 0.15  # metres of a pelvis over a hard seat, at least; the most that it is lifted by
 _SMOOTHING = 2.5  # frames; deviation of the Gaussian at full strength
 _SKIN, _DEEPEST = 0.03, 0.20  # metres between a wrist or ankle and the surface that it must not sink into; the most it is moved
@@ -92,21 +92,17 @@ def _runs(flags: np.ndarray) -> np.ndarray:
     return np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]]))).reshape(-1, 2)
 
 
-def _ease(x: np.ndarray) -> np.ndarray:
-    x = np.clip(x, 0.0, 1.0)
-    return x * x * (3.0 - 2.0 * x)
-
-
-def _between(offset: np.ndarray, asked: np.ndarray) -> np.ndarray:
+def _between(offset: np.ndarray, asked: np.ndarray, fps: float = 30.0) -> np.ndarray:
     """Offsets (T, 3) where they are ``asked`` (T,), led over to the next ones or faded out elsewhere."""
+    longest = max(1, round(_FADE * fps))
     out = np.where(asked[:, None], offset, 0.0)
     for start, end in _runs(~asked):
         before = out[start - 1] if start else np.zeros(3)
         after = out[end] if end < len(out) else np.zeros(3)
         t = np.arange(1, end - start + 1, dtype=float)
         rest = end - start + 1
-        fade = min(_FADE, rest)
-        out[start:end] = (1 - _ease(t / fade))[:, None] * before + _ease((t - rest + fade) / fade)[:, None] * after
+        fade = min(longest, rest)
+        out[start:end] = (1 - smoothstep(t / fade))[:, None] * before + smoothstep((t - rest + fade) / fade)[:, None] * after
     return out
 
 
@@ -250,7 +246,9 @@ def _softly_limited(vectors: np.ndarray, most: float) -> np.ndarray:
     return vectors * (np.where(over > 0.0, most - bend * np.exp(-over / bend), length) / np.maximum(length, 1e-9))
 
 
-def _wished(joints: np.ndarray, targets: dict[str, np.ndarray], strength: float) -> dict[str, np.ndarray]:
+def _wished(
+    joints: np.ndarray, targets: dict[str, np.ndarray], strength: float, fps: float,
+) -> dict[str, np.ndarray]:
     """Where each effector with targets should be in all frames (T, 3): on them, and softly led to and from them."""
     out = {}
     for name, target in targets.items():
@@ -258,17 +256,19 @@ def _wished(joints: np.ndarray, targets: dict[str, np.ndarray], strength: float)
         if asked.any():
             place = joints[:, END_EFFECTORS[name]]
             offset = np.where(asked[:, None], target - place, 0.0)
-            out[name] = place + strength * _between(offset, asked)
+            out[name] = place + strength * _between(offset, asked, fps)
     return out
 
 
-def reaching(joints: np.ndarray, targets: dict[str, np.ndarray], strength: float = 1.0) -> np.ndarray:
+def reaching(
+    joints: np.ndarray, targets: dict[str, np.ndarray], strength: float = 1.0, fps: float = 30.0,
+) -> np.ndarray:
     """Joints (T, 22, 3) whose head and wrists are at their ``targets``: (T, 3) by the names of ``END_EFFECTORS``, NaN if free.
 
     Damped least squares over spine, neck, collars and arms: a straight arm is shortened by the trunk rather than by a sudden
     elbow. A target that is out of reach is approached as near as arms and a modest lean allow.
     """
-    wished = _wished(joints, targets, strength)
+    wished = _wished(joints, targets, strength, fps)
     if not wished:
         return joints
     out, goals = joints.copy(), {}

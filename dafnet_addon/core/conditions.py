@@ -8,20 +8,29 @@ import numpy as np
 from .checks import in_frames
 from .distance import BAND, prepared_steps, rigid_split, scaled
 from .errors import InputError
+from .kinematics import Turn
 from .nearby import REACH_OF_A_BODY, beside
 from .occupancy import occupancy_steps
 from .passage import listed, passages, seats_along
 from .progress import within
-from .resampling import MODEL_FPS, covering_frames, frame_times, resample_nearest, resample_positions, resample_rigid
-from .root import RootPath, ahead, root_from_matrices, smoothed, to_root, velocities
-from .rotations import normalised
+from .resampling import (
+    MODEL_FPS,
+    covering_frames,
+    frame_times,
+    resample_nearest,
+    resample_path,
+    resample_positions,
+    resample_rigid,
+)
+from .root import RootPath, ahead, root_from_matrices, smoothed, to_root, to_world, velocities
+from .rotations import normalised, smoothstep
 from .sampler import Conditions
 from .sensor import SPHERES
 from .skeleton import END_EFFECTORS, MODEL_ORDER, UPPER
 from .solids import Box, Mesh, Scene
 from .take import Controls
 
-__all__ = ["Shot", "over_a_seat", "shot_steps", "PREROLL"]
+__all__ = ["Change", "Shot", "Told", "over_a_seat", "rolled", "shot_steps", "targets_of", "turns_of", "PREROLL"]
 
 PREROLL = 70
 """Frames for which the root stands still before the first one, so that the model's memory has settled."""
@@ -36,17 +45,50 @@ _SOLID = 0.3
 
 
 @dataclass(frozen=True)
+class Change:
+    """A change of mode at the frame ``start``; ``ease`` (M,): how far the new mode counts at that frame and those after it.
+
+    ``observation`` (M, 66), ``share`` (M, 22): what would be told at these frames if the mode stayed as it was before.
+    """
+
+    start: int
+    ease: np.ndarray
+    observation: np.ndarray
+    share: np.ndarray
+
+    @property
+    def frames(self) -> slice:
+        """Those over which the body comes over."""
+        return slice(self.start, self.start + len(self.ease))
+
+
+@dataclass(frozen=True)
+class Told:
+    """What is asked of the body at N frames of a root's path, in its frames, canonical metres.
+
+    ``observation`` (N, 66): c_ob, model order; ``share`` (N, 22): how far each joint in it counts, 0 where it is not given;
+    ``changes``: those changes of mode that make a difference to either.
+    """
+
+    observation: np.ndarray
+    share: np.ndarray
+    changes: tuple[Change, ...]
+
+
+@dataclass(frozen=True)
 class Shot:
-    """``conditions`` of ``PREROLL`` + N frames at 30 fps; ``path`` (N): R^τ, canonical metres; ``modes`` (N,) of MODES;
-    ``scene``: the furniture within reach at these frames, canonical metres; ``share`` (``PREROLL`` + N, 22): how far what is
-    given counts; ``warnings``: sentences for the user.
+    """``conditions`` of ``PREROLL`` + N frames at 30 fps; ``path`` (N): R^τ, canonical metres; ``told``: what is asked at its
+    frames; ``scene``: the furniture within reach at these frames, canonical metres. ``own_path``, ``own_told``, ``own_scene``:
+    the same at the controls' own frames. ``warnings``: sentences for the user.
     """
 
     conditions: Conditions
     path: RootPath
-    modes: np.ndarray
+    told: Told
     scene: Scene
-    share: np.ndarray
+    own_path: RootPath
+    own_told: Told
+    own_scene: Scene
     warnings: tuple[str, ...]
 
 
@@ -76,6 +118,18 @@ def _targets(controls: Controls, name: str, times: np.ndarray, target: np.ndarra
     if value is None:
         return None
     return to_root(path, resample_positions(np.asarray(value, float) / controls.scale, times, target))
+
+
+def _body(controls: Controls, times: np.ndarray, target: np.ndarray, path: RootPath) -> np.ndarray:
+    """The upper body to follow (N, 14, 3), root frame; between a frame that has one and one that has none, the nearest's."""
+    if controls.upper_body is None:
+        raise InputError("The mode is FULL but there is no upper body to follow; choose a source, or use FREE or EE.")
+    body = np.asarray(controls.upper_body, float) / controls.scale
+    full = _modes(controls) == "FULL"
+    if not np.isfinite(body[full]).all():
+        raise InputError("The upper body to follow has a joint that is not a number; fix its animation.")
+    between = resample_positions(body, times, target)
+    return to_root(path, np.where(np.isfinite(between), between, resample_nearest(body, times, target)))
 
 
 def _influence(controls: Controls, name: str, times: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -108,14 +162,102 @@ def _observed(
         observation[used, slot], share[used, slot] = place[used], influence[used]
     full = modes == "FULL"
     if full.any():
-        body = _targets(controls, "upper_body", times, target, path)
-        if body is None:
-            raise InputError("The mode is FULL but there is no upper body to follow; choose a source, or use FREE or EE.")
-        if not np.isfinite(body[full]).all():
-            raise InputError("The upper body to follow has a joint that is not a number; fix its animation.")
+        body = _body(controls, times, target, path)
+        full &= np.isfinite(body).all(axis=(1, 2))
         observation[full, : len(UPPER)], share[full, : len(UPPER)] = body[full], 1.0
         share[full, MODEL_ORDER.index(0)] = float(controls.pelvis_given)
     return observation.reshape(frames, -1), share
+
+
+def _told(controls: Controls, path: RootPath, fps: float, warnings: list[str]) -> Told:
+    """What is asked at the frames of ``path``, ``fps`` of them a second."""
+    times, target = frame_times(len(controls), controls.fps), frame_times(len(path), fps)
+    modes = resample_nearest(_modes(controls), times, target)
+    observation, share = _observed(controls, modes, times, target, path, warnings)
+    changes = []
+    for start, ease in _starts(modes, controls.blend * fps):
+        frames = slice(start, start + len(ease))
+        there = RootPath(path.position[frames], path.yaw[frames])
+        stayed = np.repeat(modes[start - 1], len(ease))
+        change = Change(start, ease, *_observed(controls, stayed, times, target[frames], there, []))
+        _hold(change, observation[start - 1], share[start - 1])
+        if _altered(change, observation, share).any():
+            changes.append(change)
+    return Told(observation, share, tuple(changes))
+
+
+def _modes(controls: Controls) -> np.ndarray:
+    """That of each frame (T,)."""
+    return np.array([controls.mode] * len(controls) if isinstance(controls.mode, str) else controls.mode)
+
+
+def _starts(modes: np.ndarray, length: float) -> list[tuple[int, np.ndarray]]:
+    """The frames at which another mode begins, and how far it counts there and after it (M,), ``length`` frames long.
+
+    No more than two are under way at once: of modes that change sooner the first has come over when the third begins.
+    """
+    most = round(length)
+    starts = (np.flatnonzero(modes[1:] != modes[:-1]) + 1).tolist() if most else []
+    out = []
+    for start, third in zip(starts, [*starts[2:], *2 * [len(modes) + most]], strict=False):
+        longest = min(most, third - start)
+        out.append((start, smoothstep((np.arange(min(longest, len(modes) - start)) + 1.0) / (longest + 1.0))))
+    return out
+
+
+def _hold(change: Change, observation: np.ndarray, share: np.ndarray) -> None:
+    """What a mode that has ended tells no more stays, beside the root, as it was: targets may end with it.
+
+    ``observation`` (66,), ``share`` (22,): of the frame before the change.
+    """
+    for t, told in enumerate(change.observation.reshape(-1, 22, 3)):
+        gone = (change.share[t] == 0.0) & (share > 0.0)
+        change.share[t, gone] = share[gone]
+        told[gone] = observation.reshape(22, 3)[gone]
+        observation, share = told, change.share[t]
+
+
+def _altered(change: Change, observation: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Of which joints (M, 22) a change of mode tells something else, at each of its frames."""
+    now, then = (each.reshape(-1, 22, 3) for each in (observation[change.frames], change.observation))
+    counts = share[change.frames]
+    return (counts != change.share) | ((counts > 0.0) & (now != then).any(-1))
+
+
+def targets_of(path: RootPath, told: Told) -> dict[str, np.ndarray]:
+    """Where head and wrists have to be: world positions (N, 3), canonical metres, NaN where they are free, even in part, or on
+    their way from what another mode asked.
+    """
+    places = to_world(path, told.observation.reshape(-1, 22, 3))
+    given = told.share >= 1.0
+    for change in told.changes:
+        given[change.frames] &= ~_altered(change, told.observation, told.share)
+    return {name: np.where(given[:, slot, None], places[:, slot], np.nan) for name, slot in _EFFECTORS.items()}
+
+
+def turns_of(controls: Controls, path: RootPath) -> dict[str, Turn]:
+    """How head and hands have to be turned, at the controls' own frames, those of ``path``: by name, where anything is asked.
+
+    As positions do, a rotation counts in the mode EE, by its influence, and more and more after a change of mode.
+    """
+    modes, times = _modes(controls), frame_times(len(controls), controls.fps)
+    out = {}
+    for name in END_EFFECTORS:
+        asked = getattr(controls, f"{name}_rotation")
+        if asked is None:
+            continue
+        asked = np.array(asked, float)
+        known = np.isfinite(asked).all(axis=(1, 2))
+        counts = np.where((modes == "EE") & known, _influence(controls, name, times, times), 0.0)
+        share = counts.copy()
+        for start, ease in _starts(modes, controls.blend * controls.fps):
+            frames = slice(start, start + len(ease))
+            share[frames] = (1.0 - ease) * share[start - 1] + ease * counts[frames]
+            for t in np.flatnonzero(~known[frames]) + start:  # as it was, beside the root
+                asked[t] = path.rotation[t] @ path.rotation[t - 1].T @ asked[t - 1]
+        if (share > 0.0).any():
+            out[name] = Turn(asked, share)
+    return out
 
 
 def _at_model_rate(scene: Scene, times: np.ndarray, target: np.ndarray) -> Scene:
@@ -162,34 +304,56 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     for solid in scene.solids:
         in_frames(solid.matrices() if isinstance(solid, Box) else solid.matrix, solid.name, len(controls))
     warnings: list[str] = []
-    modes = np.array([controls.mode] * len(controls) if isinstance(controls.mode, str) else controls.mode)
     frames = covering_frames(len(controls), controls.fps)
     times, target = frame_times(len(controls), controls.fps), frame_times(frames, MODEL_FPS)
     path = _path_of(controls, times, target, warnings)
-    modes = resample_nearest(modes, times, target)
-    observation, share = _observed(controls, modes, times, target, path, warnings)
+    told = _told(controls, path, MODEL_FPS, warnings)
 
     if not scene.solids:
         warnings.append("There is no furniture; the character walks and stands on a bare floor.")
     # Nothing farther away than the body, or the upper body that it is given, is felt or seen: it need not be measured.
-    reach = max(REACH_OF_A_BODY, float(np.linalg.norm(observation.reshape(-1, 3), axis=1).max()) + BAND)
+    farthest = float(np.linalg.norm(told.observation.reshape(-1, 3), axis=1).max())
     places = path.position * controls.scale
-    near = beside(_at_model_rate(scene, times, target), places, reach, controls.scale)
-    floor = float(np.median(path.position[:, 2])) * controls.scale
-    moved, said = yield from within(prepared_steps(near, floor), 0.0, 0.5)
+    moved = _at_model_rate(scene, times, target)
+    near = beside(moved, places, max(REACH_OF_A_BODY, farthest + BAND), controls.scale)
+    # Measured in the body's own metres: a giant's grids reach as far for its size as a child's, and are as fine.
+    own_scene = scaled(_those(scene, moved, near), 1.0 / controls.scale)
+    floor = float(np.median(path.position[:, 2]))
+    scene, said = yield from within(prepared_steps(scaled(near, 1.0 / controls.scale), floor, controls.scale), 0.0, 0.5)
     warnings += said
-    scene = scaled(moved, 1.0 / controls.scale)
     occupied = yield from within(occupancy_steps(scene, path), 0.5, 1.0)
     _look_around(scene, path, occupied, warnings)
 
-    def rolled(values: np.ndarray, before: np.ndarray) -> np.ndarray:
-        return np.concatenate([np.repeat(before, PREROLL, axis=0), values])
-
     # Before the first frame nothing but a seat under the root is there, so that who starts beside furniture starts standing.
     before = occupied[:1] if over_a_seat(occupied[0]) else np.zeros_like(occupied[:1])
-    whole = RootPath(rolled(path.position, path.position[:1]), rolled(path.yaw, path.yaw[:1]))
+    whole = RootPath(rolled(path.position), rolled(path.yaw))
     conditions = Conditions(
-        velocities(whole), ahead(whole), rolled(occupied, before),
-        rolled(observation, observation[:1]), rolled(share > 0.0, share[:1] > 0.0).astype(float),
+        velocities(whole), ahead(whole), np.concatenate([np.repeat(before, PREROLL, axis=0), occupied]),
+        rolled(told.observation), rolled(told.share > 0.0).astype(float),
     )
-    return Shot(conditions, path, modes, scene, rolled(share, share[:1]), tuple(warnings))
+    own_path = resample_path(path, MODEL_FPS, controls.fps, len(controls))
+    return Shot(
+        conditions, path, told, scene, own_path, _told(controls, own_path, controls.fps, []),
+        _with_grids(own_scene, scene), tuple(warnings),
+    )
+
+
+def rolled(values: np.ndarray) -> np.ndarray:
+    """Values (N, …) of a shot with the first one held for ``PREROLL`` frames before it."""
+    return np.concatenate([np.repeat(values[:1], PREROLL, axis=0), values])
+
+
+def _those(scene: Scene, moved: Scene, near: Scene) -> Scene:
+    """The solids of a scene whose counterparts in the same scene, ``moved``, are ``near``."""
+    found = {id(solid) for solid in near.solids}
+    return Scene(tuple(a for a, b in zip(scene.solids, moved.solids, strict=True) if id(b) in found))
+
+
+def _with_grids(scene: Scene, ready: Scene) -> Scene:
+    """A scene with the grids that the meshes of another one, the same at other frames, have."""
+    solids: list[Box | Mesh] = []
+    for solid, other in zip(scene.solids, ready.solids, strict=True):
+        if isinstance(solid, Mesh) and isinstance(other, Mesh):
+            solid = replace(solid, grid=other.grid)
+        solids.append(solid)
+    return Scene(tuple(solids))

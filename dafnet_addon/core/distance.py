@@ -401,8 +401,13 @@ def prepared(scene: Scene, floor: float) -> tuple[Scene, tuple[str, ...]]:
     return drained(prepared_steps(scene, floor))
 
 
-def prepared_steps(scene: Scene, floor: float) -> Generator[float, None, tuple[Scene, tuple[str, ...]]]:
-    """The scene with every mesh's grid filled, and warnings for the user, one sentence each; yields progress."""
+def prepared_steps(
+    scene: Scene, floor: float, size: float = 1.0,
+) -> Generator[float, None, tuple[Scene, tuple[str, ...]]]:
+    """The scene with every mesh's grid filled, and warnings for the user, one sentence each; yields progress.
+
+    ``size``: that of the character for which the scene was ``scaled``.
+    """
     solids: list[Box | Mesh] = []
     warnings = []
     for solid in scene.solids:
@@ -415,7 +420,7 @@ def prepared_steps(scene: Scene, floor: float) -> Generator[float, None, tuple[S
                 warnings.append(f"The scale of '{solid.name}' is animated; its size on the first frame is used.")
             if solid.grid is not None and solid.grid.spacing > _COARSE:
                 warnings.append(
-                    f"'{solid.name}' is so large that it is seen only every {100 * solid.grid.spacing:.0f} cm; "
+                    f"'{solid.name}' is so large that it is seen only every {100 * size * solid.grid.spacing:.0f} cm; "
                     "separate the furniture from it, or split it into parts."
                 )
         solids.append(solid)

@@ -8,10 +8,10 @@ from time import perf_counter
 import numpy as np
 
 from .checks import MOST_SEED, number, whole
-from .cleanup import CleanUp, cleaning_steps
-from .conditions import PREROLL, Shot, shot_steps
+from .cleanup import CleanUp, cleaning_steps, reaching
+from .conditions import PREROLL, Change, Shot, rolled, shot_steps, targets_of, turns_of
 from .errors import InputError
-from .kinematics import blend_switches, fit, forward_kinematics, global_from_local, local_from_global
+from .kinematics import Bent, come_over, fit, forward_kinematics, global_from_local, local_from_global, turned
 from .metrics import summary
 from .occupancy import distance, tops_under
 from .progress import drained, within
@@ -19,23 +19,23 @@ from .resampling import (
     MODEL_FPS,
     covering_frames,
     frame_times,
-    resample_path,
     resample_positions,
     resample_rotations,
 )
 from .root import RootPath, to_root, to_world
 from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix
-from .sampler import Conditions, Sampler, model_order
-from .skeleton import END_EFFECTORS, MODEL_ORDER
+from .sampler import Sampler, Unchanged, model_order
 from .solids import Scene
 from .take import Controls, Take
 from .weights import Weights
 
-__all__ = ["RAW", "Draw", "clean_again_steps", "cleaned_up", "generate", "generate_steps", "takes_steps", "targets_of"]
+__all__ = ["RAW", "Draw", "clean_again_steps", "cleaned_up", "generate", "generate_steps", "takes_steps"]
 
 RAW = CleanUp()
 """The model's own motion."""
 _HOTTEST = 10.0
+_HAIR = 1e-3  # metres, radians, fractions: what comes back from single precision is the same
+_LEAD = 30  # frames before a change of mode that tell how straight limbs were twisted
 _CONDITIONED, _SAMPLED = 0.15, 0.85
 """Progress when the conditions are known and when the poses are made."""
 
@@ -62,33 +62,19 @@ class Draw:
             hold("lower_temperature", number(self.lower_temperature, "The temperature of the legs", 0.0, _HOTTEST))
 
 
-def _kept(resume: Take, frame: int, path: RootPath) -> np.ndarray:
-    """The resumed take's poses (PREROLL + N, 66) before a frame of the shot, in the new path's frames."""
-    count = min(covering_frames(frame, resume.fps), len(resume.path), len(path))
-    old = RootPath(resume.path.position[:count], resume.path.yaw[:count])
+def _kept(resume: Take, frame: int, controls: Controls, path: RootPath) -> np.ndarray:
+    """The resumed take's poses (PREROLL + N, 66) before a frame of the controls, in the new path's frames.
+
+    The two may have other rates, and the body another size: it keeps its place in the world beside the take's root.
+    """
+    seconds = len(resume) / resume.fps
+    if not 0 < frame / controls.fps <= seconds * (1.0 + _HAIR):
+        raise InputError(f"Frame {frame} is not inside the take, which lasts {seconds:.2f} s; go on from a frame in it.")
+    count = min(covering_frames(frame, controls.fps), len(resume.path), len(path))
+    old = RootPath(resume.path.position[:count] * (resume.scale / controls.scale), resume.path.yaw[:count])
     new = RootPath(path.position[:count], path.yaw[:count])
     shot = resume.poses[PREROLL : PREROLL + count].reshape(count, 22, 3)
     return np.concatenate([resume.poses[:PREROLL], to_root(new, to_world(old, shot)).reshape(count, 66)])
-
-
-def _rotation(controls: Controls, name: str, target: np.ndarray) -> np.ndarray | None:
-    """A head's or hand's rotations (N, 3, 3) at the model's frames, NaN where free."""
-    value = getattr(controls, name)
-    if value is None:
-        return None
-    times = frame_times(len(controls), controls.fps)
-    free = ~np.isfinite(value).all(axis=(1, 2))
-    quaternions = quaternion_from_matrix(np.where(free[:, None, None], np.eye(3), value))
-    quaternions[free] = np.nan
-    return matrix_from_quaternion(resample_rotations(quaternions, times, target))
-
-
-def targets_of(shot: Shot) -> dict[str, np.ndarray]:
-    """Where head and wrists have to be: world positions (N, 3), canonical metres, NaN where they are free, even in part."""
-    places = to_world(shot.path, shot.conditions.observation[PREROLL:].reshape(-1, 22, 3))
-    given = (shot.conditions.given[PREROLL:] > 0) & (shot.share[PREROLL:] >= 1.0)
-    slots = {name: MODEL_ORDER.index(j) for name, j in END_EFFECTORS.items()}
-    return {name: np.where(given[:, slot, None], places[:, slot], np.nan) for name, slot in slots.items()}
 
 
 def cleaned_up(joints: np.ndarray, shot: Shot, settings: CleanUp) -> np.ndarray:
@@ -102,59 +88,98 @@ def _clean_up_steps(joints: np.ndarray, shot: Shot, settings: CleanUp) -> Genera
     floor = shot.path.position[:, 2]
     reach = partial(distance, shot.scene, floor=floor) if shot.scene.solids else None
     yield 0.2
-    return (yield from within(cleaning_steps(joints, targets_of(shot), settings, floor, tops, reach), 0.2, 1.0))
+    targets = targets_of(shot.path, shot.told)
+    return (yield from within(cleaning_steps(joints, targets, settings, floor, tops, reach), 0.2, 1.0))
 
 
-def _led_over(conditions: Conditions, share: np.ndarray, free: np.ndarray) -> Conditions:
-    """The conditions with targets that count in part moved towards where the joints are when they are ``free`` (T, 66)."""
+def _led_over(observation: np.ndarray, share: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """An observation (T, 66) whose targets, which count by their ``share`` (T, 22), are led from where joints are ``free``."""
     way = np.repeat(share, 3, axis=-1)
-    return replace(conditions, observation=(1.0 - way) * free + way * conditions.observation)
+    return (1.0 - way) * free + way * observation
 
 
-def _joints(rotations: np.ndarray, pelvis: np.ndarray) -> np.ndarray:
-    return forward_kinematics(global_from_local(matrix_from_quaternion(rotations)), pelvis)
+def _bent(joints: np.ndarray, fps: float = MODEL_FPS) -> Bent:
+    """The motion of the body whose bones fit joints (T, 22, 3) best."""
+    pelvis, frames = fit(joints, fps=fps)
+    return Bent(continuous_signs(quaternion_from_matrix(local_from_global(frames))), pelvis)
+
+
+def _joints(motion: Bent) -> np.ndarray:
+    return forward_kinematics(global_from_local(matrix_from_quaternion(motion.local)), motion.pelvis)
+
+
+def _model_joints(poses: np.ndarray, path: RootPath) -> np.ndarray:
+    """World joints (N, 22, 3) of the model's poses (PREROLL + N, 66)."""
+    return to_world(path, poses[PREROLL:].reshape(-1, 22, 3))
+
+
+def _as_unchanged(poses: np.ndarray, unchanged: np.ndarray, change: Change, path: RootPath) -> Bent:
+    """The motion (M, …) over a change of mode as it would have gone on: M poses ``unchanged`` (M, 66) after the take's."""
+    begin, frames = max(0, change.start - _LEAD), change.frames
+    after = RootPath(path.position[begin : frames.stop], path.yaw[begin : frames.stop])
+    whole = np.concatenate([poses[begin : PREROLL + change.start], unchanged])
+    local, pelvis = _bent(_model_joints(whole, after))
+    return Bent(local[change.start - begin :], pelvis[change.start - begin :])
+
+
+def _eased(motion: Bent, poses: np.ndarray, unchanged: np.ndarray, shot: Shot) -> Bent:
+    """The model's motion, coming over at changes of mode from the poses ``unchanged`` (M, 66) to its own (PREROLL + N, 66)."""
+    changes, used = [], 0
+    for change in shot.told.changes:
+        own = unchanged[used : used + len(change.ease)]
+        changes.append((change.start, change.ease, _as_unchanged(poses, own, change, shot.path)))
+        used += len(change.ease)
+    return come_over(motion, changes)
 
 
 def _finished_steps(
-    poses: np.ndarray, action: np.ndarray, shot: Shot, controls: Controls, clean_up: CleanUp, log_likelihood: float
+    poses: np.ndarray, unchanged: np.ndarray, action: np.ndarray, shot: Shot, controls: Controls, clean_up: CleanUp,
+    log_likelihood: float,
 ) -> Generator[float, None, Take]:
-    """The take of the model's poses (PREROLL + N, 66), with ``action`` (T, K) at the controls' rate; yields progress."""
+    """The take of the model's poses (PREROLL + N, 66), with ``action`` (T, K) at the controls' rate; yields progress.
+
+    Changes of mode are eased first, so that feet are planted afterwards; what concerns the furniture and the floor is cleaned
+    up at the model's rate; targets are reached at the controls' own frames, where they are given.
+    """
     started = perf_counter()
     source, target = frame_times(len(shot.path), MODEL_FPS), frame_times(len(controls), controls.fps)
-    turned = [_rotation(controls, name, source) for name in ("head_rotation", "hand_left_rotation", "hand_right_rotation")]
-    switches = np.flatnonzero(shot.modes[1:] != shot.modes[:-1]) + 1
-    length = round(controls.blend * MODEL_FPS)
-    floor = shot.path.position[:, 2]
-    reach = partial(distance, shot.scene, floor=floor) if shot.scene.solids else None
-    judged = partial(summary, fps=MODEL_FPS, floor=floor, targets=targets_of(shot), distance=reach)
+    same = len(source) == len(target) and np.allclose(source, target)
+    floor = shot.own_path.position[:, 2]
+    reach = partial(distance, shot.own_scene, floor=floor) if shot.own_scene.solids else None
+    targets = targets_of(shot.own_path, shot.own_told)
+    judged = partial(summary, fps=controls.fps, floor=floor, targets=targets, distance=reach)
 
-    def eased(pelvis: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Local quaternions and pelvis, eased over mode switches."""
-        local = continuous_signs(quaternion_from_matrix(local_from_global(frames)))
-        return blend_switches(local, pelvis, shot.path, switches, length) if len(switches) and length else (local, pelvis)
+    def at_own_rate(motion: Bent) -> Bent:
+        """A motion at the controls' frames."""
+        if same:
+            return motion
+        return Bent(resample_rotations(motion.local, source, target), resample_positions(motion.pelvis, source, target))
 
-    pelvis, frames = fit(to_world(shot.path, poses[PREROLL:].reshape(-1, 22, 3)), 1.0, *turned)
+    joints = _model_joints(poses, shot.path)
+    motion = _eased(_bent(joints), poses, unchanged, shot)
     yield 0.2
-    joints = forward_kinematics(frames, pelvis)
-    local, pelvis = eased(pelvis, frames)
-    metrics = raw = judged(_joints(local, pelvis))
+    own = at_own_rate(motion)
+    metrics = raw = judged(_joints(own))
     yield 0.4
     if clean_up.asked:
-        joints = yield from within(_clean_up_steps(joints, shot, clean_up), 0.4, 0.6)
+        joints = yield from within(_clean_up_steps(_joints(motion), shot, replace(clean_up, reach=0.0)), 0.4, 0.6)
         yield 0.6
-        local, pelvis = eased(*fit(joints, 1.0, *turned))
+        if not same:
+            joints = _joints(at_own_rate(_bent(joints)))
+        if clean_up.reach > 0.0:
+            joints = reaching(joints, targets, clean_up.reach, controls.fps)
+        own = _bent(joints, controls.fps)
         yield 0.8
-        metrics = judged(_joints(local, pelvis))
+        metrics = judged(_joints(own))
     yield 1.0
 
-    # From 30 frames a second to the controls' own rate, and to the character's own size.
-    rotations = resample_rotations(local, source, target)
-    pelvis = resample_positions(pelvis, source, target)
-    root = resample_path(shot.path, MODEL_FPS, controls.fps, len(controls))
+    if turns := turns_of(controls, shot.own_path):
+        frames = turned(global_from_local(matrix_from_quaternion(own.local)), turns)
+        own = own._replace(local=continuous_signs(quaternion_from_matrix(local_from_global(frames))))
+    root = RootPath(shot.own_path.position * controls.scale, shot.own_path.yaw)
     return Take(
-        controls.fps, _joints(rotations, pelvis) * controls.scale, rotations,
-        RootPath(root.position * controls.scale, root.yaw).matrices(), action, controls.scale, poses, shot.path,
-        log_likelihood, raw, metrics, {"fitting": perf_counter() - started}, shot.warnings,
+        controls.fps, _joints(own) * controls.scale, own.local, root.matrices(), action, controls.scale, poses, shot.path,
+        unchanged, log_likelihood, raw, metrics, {"fitting": perf_counter() - started}, shot.warnings,
     )
 
 
@@ -177,22 +202,28 @@ def takes_steps(
     sampler = Sampler(weights, device)
     z = np.concatenate([sampler.noise(d.seed, d.lower_seed, d.temperature, d.lower_temperature) for d in draws])
     kept = None
-    if resume is not None and resume_frame > 0:
-        kept = np.repeat(_kept(resume, resume_frame, shot.path)[:, None], len(draws), axis=1)
+    if resume is not None and resume_frame != 0:
+        kept = np.repeat(_kept(resume, resume_frame, controls, shot.path)[:, None], len(draws), axis=1)
 
     def shown(frame: int, pose: np.ndarray) -> None:
         if watch is not None and frame >= PREROLL:
             at = RootPath(shot.path.position[frame - PREROLL, None], shot.path.yaw[frame - PREROLL, None])
             watch(frame - PREROLL, to_world(at, pose.reshape(1, 22, 3))[0] * controls.scale)
 
-    conditions, sampling = shot.conditions, _CONDITIONED
-    if ((shot.share > 0.0) & (shot.share < 1.0)).any():
+    conditions, share, sampling = shot.conditions, rolled(shot.told.share), _CONDITIONED
+    changes = shot.told.changes
+    if any(((each > 0.0) & (each < 1.0)).any() for each in (share, *(change.share for change in changes))):
         # Where a target counts in part, the calm take tells where the joint would be without it.
-        without = replace(conditions, given=(shot.share >= 1.0).astype(float))
+        without = replace(conditions, given=(share >= 1.0).astype(float))
         sampling = (_CONDITIONED + _SAMPLED) / 2
         calm = yield from within(sampler.run(without, np.zeros((1, 66))), _CONDITIONED, sampling)
-        conditions = _led_over(conditions, shot.share, model_order(calm.poses[:, 0]))
-    made = yield from within(sampler.run(conditions, z, kept, shown), sampling, _SAMPLED)
+        free = model_order(calm.poses[:, 0])
+        conditions = replace(conditions, observation=_led_over(conditions.observation, share, free))
+        changes = tuple(
+            replace(each, observation=_led_over(each.observation, each.share, free[PREROLL:][each.frames])) for each in changes
+        )
+    unchanged = [Unchanged(PREROLL + each.start, each.observation, (each.share > 0.0).astype(float)) for each in changes]
+    made = yield from within(sampler.run(conditions, z, kept, shown, unchanged), sampling, _SAMPLED)
     seconds = {"conditions": conditioned - started, "sampling": perf_counter() - conditioned}
 
     source, target = frame_times(len(shot.path), MODEL_FPS), frame_times(len(controls), controls.fps)
@@ -201,7 +232,7 @@ def takes_steps(
         action = resample_positions(made.actions[PREROLL:, b], source, target)
         density = float(made.log_likelihood[PREROLL:, b].mean())
         take = yield from within(
-            _finished_steps(made.poses[:, b], action, shot, controls, clean_up, density),
+            _finished_steps(made.poses[:, b], made.unchanged[:, b], action, shot, controls, clean_up, density),
             _SAMPLED + (1.0 - _SAMPLED) * b / len(draws), _SAMPLED + (1.0 - _SAMPLED) * (b + 1) / len(draws),
         )
         takes.append(replace(take, seconds=seconds | take.seconds))
@@ -211,10 +242,16 @@ def takes_steps(
 def clean_again_steps(scene: Scene, controls: Controls, take: Take, clean_up: CleanUp) -> Generator[float, None, Take]:
     """The take with another clean-up, without sampling again; ``scene`` and ``controls`` as it was generated with."""
     shot = yield from within(shot_steps(scene, controls), 0.0, 0.5)
-    if len(shot.path) != len(take.path):
+    if len(controls) != len(take) or len(shot.path) != len(take.path) or not np.isclose(controls.fps, take.fps, rtol=1e-5):
         raise InputError("The take has other frames than the controls; generate it again.")
+    close = partial(np.allclose, rtol=1e-5, atol=_HAIR)
+    same_path = close(shot.path.position, take.path.position) and close(shot.path.yaw, take.path.yaw)
+    if not same_path or not np.isclose(controls.scale, take.scale, rtol=_HAIR):
+        raise InputError("The take was made for another root or size than the controls'; generate it again.")
+    if len(take.unchanged) != sum(len(change.ease) for change in shot.told.changes):
+        raise InputError("The take was made for other modes or targets than the controls'; generate it again.")
     return (yield from within(
-        _finished_steps(take.poses, take.action, shot, controls, clean_up, take.log_likelihood), 0.5, 1.0,
+        _finished_steps(take.poses, take.unchanged, take.action, shot, controls, clean_up, take.log_likelihood), 0.5, 1.0,
     ))
 
 

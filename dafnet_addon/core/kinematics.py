@@ -4,9 +4,11 @@ A joint's frame places its children: ``child = joint + frame @ OFFSETS[child] * 
 frame is the rest pose, a T-pose that looks along +y.
 """
 
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
 import numpy as np
 
-from .root import RootPath, to_root, to_world
 from .rotations import (
     frame_from,
     matrix_from_quaternion,
@@ -17,9 +19,12 @@ from .rotations import (
     slerp,
     transpose,
 )
-from .skeleton import OFFSETS, PARENTS, UPPER, joint
+from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, joint
 
-__all__ = ["forward_kinematics", "global_from_local", "local_from_global", "two_bone", "fit", "on_bones", "blend_switches"]
+__all__ = [
+    "Bent", "Turn", "forward_kinematics", "global_from_local", "local_from_global", "two_bone", "fit", "on_bones", "turned",
+    "come_over",
+]
 
 # Limbs in one order: left and right arm, left and right leg. The rest pose is straight along _AXIS, and the middle
 # joint leaves that line along _BEND: elbows go backward, knees forward.
@@ -27,15 +32,23 @@ _PARENT, _FIRST, _MIDDLE, _END = [13, 14, 0, 0], [16, 17, 1, 2], [18, 19, 4, 5],
 _AXIS = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 0, -1], [0, 0, -1]])
 _BEND = np.array([[0.0, -1, 0], [0, -1, 0], [0, 1, 0], [0, 1, 0]])
 
-_ABOVE = list(UPPER[1:])
-_SETTLES = 4  # frames
 _CLEAR_BEND = 0.25  # a limb bent by this (radians) shows its plane about as clearly as its neighbours in time tell it
 _CARRY, _PULL = 4.0, 0.05  # weights of the neighbouring frames and of the parent's reference, against 1 at a clear bend
 
-_HAND_REST = {  # columns: x, the fingers' direction, the back of the hand; as they lie in the rest pose
-    "left_wrist": np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]),
-    "right_wrist": np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
+_AXES_REST = {  # columns: x, where the face looks or the fingers point, crown or back of the hand; as they lie in the rest pose
+    "head": np.eye(3),
+    "hand_left": np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+    "hand_right": np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
 }
+
+
+class Turn(NamedTuple):
+    """How a head or hand has to be turned: world ``axes`` (T, 3, 3), y where the face looks or the fingers point, z the
+    crown or the back of the hand; ``share`` (T,): how far they count; where that is 0 they may be NaN.
+    """
+
+    axes: np.ndarray
+    share: np.ndarray
 
 
 def forward_kinematics(rotations: np.ndarray, pelvis: np.ndarray, scale: float = 1.0) -> np.ndarray:
@@ -106,20 +119,14 @@ def _last_clear(values: np.ndarray, clear: np.ndarray) -> np.ndarray:
     return np.take_along_axis(values, np.broadcast_to(last, values.shape), axis=0)
 
 
-def fit(
-    joints: np.ndarray, scale: float = 1.0, head_rotation: np.ndarray | None = None,
-    hand_left_rotation: np.ndarray | None = None, hand_right_rotation: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
+def fit(joints: np.ndarray, scale: float = 1.0, fps: float = 30.0) -> tuple[np.ndarray, np.ndarray]:
     """Pelvis (T, 3) and global joint frames (T, 22, 3, 3) of the body whose bones fit world joints (T, 22, 3) best.
 
     Bone lengths are those of the canonical body times ``scale``. The pelvis is exact, and so are ankles and wrists
     wherever the limbs reach them. Pelvis from hips and spine1, chest from collars and neck, limbs twisted by the planes
     of elbows and knees; a limb too straight to show its plane takes it from its neighbours in time and from its parent.
-    Elbows and knees are hinges. Frames follow one another without a pop as long as the joints do.
-
-    ``head_rotation`` (T, 3, 3): world axes, y where the face looks, z the crown. ``hand_…_rotation`` (T, 3, 3): y where
-    the fingers point, z the back of the hand. Head and hands follow their parents where the argument is missing or NaN;
-    toes always follow the foot.
+    Elbows and knees are hinges. Frames follow one another without a pop as long as the joints do; ``fps``: how many of them
+    there are a second. Head and hands follow their parents (else: ``turned``), toes the foot.
     """
     joints = np.asarray(joints, float)
     position = joints.copy()
@@ -143,18 +150,15 @@ def fit(
     frame[:, 9] = chest
     for child in (12, 13, 14):
         place(child)
-    head = chest if head_rotation is None else _where_given(head_rotation, np.eye(3), chest)
-    aim(12, 15, _between(chest, head, 1 / 2))  # the neck takes its half of the head's twist
-    frame[:, 15] = frame[:, 12] if head_rotation is None else _where_given(head_rotation, np.eye(3), frame[:, 12])
+    aim(12, 15, chest)
+    frame[:, 15] = frame[:, 12]
     aim(13, 16, chest)
     aim(14, 17, chest)
 
     frame[:, _FIRST], frame[:, _MIDDLE], position[:, _END] = _limbs(
-        frame[:, _PARENT], position[:, _FIRST], joints[:, _MIDDLE], joints[:, _END], scale)
-    for name, given in (("left_wrist", hand_left_rotation), ("right_wrist", hand_right_rotation)):
-        wrist = joint(name)
-        forearm = frame[:, PARENTS[wrist]]
-        frame[:, wrist] = forearm if given is None else _where_given(given, _HAND_REST[name], forearm)
+        frame[:, _PARENT], position[:, _FIRST], joints[:, _MIDDLE], joints[:, _END], scale, fps)
+    for wrist in (20, 21):
+        frame[:, wrist] = frame[:, PARENTS[wrist]]
     for ankle, toe in ((7, 10), (8, 11)):
         aim(ankle, toe, frame[:, PARENTS[ankle]])
         frame[:, toe] = frame[:, ankle]
@@ -174,34 +178,48 @@ def _aligned(joints: np.ndarray, center: int, children: list[int]) -> np.ndarray
     return u @ vt
 
 
-def _between(a: np.ndarray, b: np.ndarray, t: float) -> np.ndarray:
+def _between(a: np.ndarray, b: np.ndarray, t: float | np.ndarray) -> np.ndarray:
     """Rotation matrices on the shortest way from ``a`` to ``b``."""
     return matrix_from_quaternion(slerp(quaternion_from_matrix(a), quaternion_from_matrix(b), np.asarray(t)))
 
 
-def _where_given(axes: np.ndarray, rest: np.ndarray, fallback: np.ndarray) -> np.ndarray:
-    """Global frames of a joint whose asked axes lie as ``rest`` in the rest pose; ``fallback`` where NaN."""
-    free = ~np.isfinite(axes).all(axis=(1, 2))[:, None, None]
-    asked = np.where(free, np.eye(3), axes)
-    return np.where(free, fallback, frame_from(asked[..., 1], asked[..., 2], "yz") @ rest.T)
+def turned(frames: np.ndarray, turns: Mapping[str, Turn]) -> np.ndarray:
+    """Global joint frames (T, 22, 3, 3) with head and hands turned as ``turns`` ask, by the names of ``END_EFFECTORS``.
+
+    The neck takes its half of the head's twist. No joint moves.
+    """
+    out = frames.copy()
+    for name, (axes, share) in turns.items():
+        at, given = END_EFFECTORS[name], (share > 0.0)[:, None, None]
+        axes = np.where(given, axes, np.eye(3))
+        asked = frame_from(axes[..., 1], axes[..., 2], "yz") @ _AXES_REST[name].T
+        if name == "head":
+            neck, chest = PARENTS[at], frames[:, joint("spine3")]
+            half = _between(chest, asked, share / 2.0)
+            bone = rotation_between(half @ OFFSETS[at], frames[:, neck] @ OFFSETS[at])
+            out[:, neck] = np.where(given, bone @ half, frames[:, neck])
+        parent = out[:, PARENTS[at]]
+        part = np.where(given, _between(parent, asked, share), parent)
+        out[:, at] = np.where((share >= 1.0)[:, None, None], asked, part)
+    return out
 
 
 def _limbs(
-    parent: np.ndarray, first: np.ndarray, middle: np.ndarray, end: np.ndarray, scale: float,
+    parent: np.ndarray, first: np.ndarray, middle: np.ndarray, end: np.ndarray, scale: float, fps: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Frames of the first and of the middle joint (T, 4, 3, 3) of the limbs, and their reached ends (T, 4, 3)."""
     length1 = scale * np.linalg.norm(OFFSETS[_MIDDLE], axis=-1)
     length2 = scale * np.linalg.norm(OFFSETS[_END], axis=-1)
     along = normalised(end - first, rotate(parent, _AXIS))
     reference = rotate(rotation_between(rotate(parent, _AXIS), along) @ parent, _BEND)
-    bend = _bend_direction(_across(middle - first, along) / np.minimum(length1, length2)[:, None], along, reference)
+    bend = _bend_direction(_across(middle - first, along) / np.minimum(length1, length2)[:, None], along, reference, fps)
     middle, end = two_bone(first, end, first + bend, length1, length2)
     hinge = np.cross(bend, along)
     rest = transpose(frame_from(_AXIS, np.cross(_BEND, _AXIS), "xy"))
     return frame_from(middle - first, hinge, "xy") @ rest, frame_from(end - middle, hinge, "xy") @ rest, end
 
 
-def _bend_direction(offset: np.ndarray, along: np.ndarray, reference: np.ndarray) -> np.ndarray:
+def _bend_direction(offset: np.ndarray, along: np.ndarray, reference: np.ndarray, fps: float) -> np.ndarray:
     """Unit directions (T, L, 3) in which the middle joints leave their limbs' lines, steady in time.
 
     ``offset`` (T, L, 3): the middle joint off the line, over the bone length. Its direction, as a point on the unit
@@ -213,57 +231,57 @@ def _bend_direction(offset: np.ndarray, along: np.ndarray, reference: np.ndarray
     seen = (offset * reference).sum(-1) + 1j * (offset * np.cross(along, reference)).sum(-1)
     seen = seen / np.maximum(size, 1e-9)
     weight = (2.0 * size / _CLEAR_BEND) ** 4 * (1.0 + seen.real) / 2.0
-    turn = _smoothed_circle(seen, weight)[..., None]
+    turn = _smoothed_circle(seen, weight, _CARRY * (fps / 30.0) ** 2)[..., None]
     return normalised(turn.real * reference + turn.imag * np.cross(along, reference), reference)
 
 
-def _smoothed_circle(seen: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _smoothed_circle(seen: np.ndarray, weight: np.ndarray, carry: float) -> np.ndarray:
     """Solve for z (T, L): weight |z - seen|^2 + carry |z - neighbours|^2 + pull |z - 1|^2 least (Thomas algorithm)."""
     n = len(seen)
     neighbours = np.full((n, 1), 2.0)
     neighbours[0] -= 1.0
     neighbours[-1] -= 1.0
-    diagonal = weight + _PULL + _CARRY * neighbours
+    diagonal = weight + _PULL + carry * neighbours
     z = weight * seen + _PULL
     for t in range(1, n):
-        ratio = _CARRY / diagonal[t - 1]
-        diagonal[t] -= ratio * _CARRY
+        ratio = carry / diagonal[t - 1]
+        diagonal[t] -= ratio * carry
         z[t] += ratio * z[t - 1]
     z[-1] /= diagonal[-1]
     for t in range(n - 2, -1, -1):
-        z[t] = (z[t] + _CARRY * z[t + 1]) / diagonal[t]
+        z[t] = (z[t] + carry * z[t + 1]) / diagonal[t]
     return z
 
 
-def blend_switches(
-    rotations: np.ndarray, pelvis: np.ndarray, path: RootPath, switches: np.ndarray | list[int], length: int = 10,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Ease the jump where the mode changes: local quaternions (T, 22, 4) and pelvis (T, 3), both again.
+class Bent(NamedTuple):
+    """A body's motion: ``local`` quaternions (T, 22, 4), the pelvis' in the world, and the pelvis' positions (T, 3), world."""
 
-    At a switch frame s the pose before it (s - 1) and the new one differ by one rotation a bone; the new motion starts
-    with that difference added to it, which then fades by slerp over ``length`` frames with smoothstep((k + 1) / (length
-    + 1)) at frame s + k. So the body keeps moving through the switch, where blending from a frozen pose would halt its
-    stride. The pelvis' rotation and offset are eased in the frames of the root ``path``, which itself stays as it is.
+    local: np.ndarray
+    pelvis: np.ndarray
 
-    The model takes some frames to follow new targets: in them the upper body already has the pose that it comes to, so that
-    all of the difference is eased.
+
+def come_over(motion: Bent, changes: Sequence[tuple[int, np.ndarray, Bent]]) -> Bent:
+    """A motion that comes over where something changes, from what would have been to what is.
+
+    ``changes``, in order: the first frame; how far the ``motion`` counts at it and those after it (M,); how the body would
+    move in these frames (M, …) if nothing had changed there. Bones turn from one to the other by slerp, so nothing is added
+    where both agree: a planted foot stands, a stride goes on. What would have been after an earlier change comes over by
+    that first.
     """
-    local = matrix_from_quaternion(rotations)
-    local[:, 0] = transpose(path.rotation) @ local[:, 0]
-    offset = to_root(path, pelvis)
-    for s in sorted({int(s) for s in switches if 0 < s < len(local)}):
-        settled = min(s + _SETTLES, len(local) - 1)
-        local[s:settled, _ABOVE] = local[settled, _ABOVE]
-        stop = min(s + length, len(local))
-        x = (np.arange(stop - s) + 1.0) / (length + 1.0)
-        ease = x * x * (3.0 - 2.0 * x)
-        difference = quaternion_from_matrix(local[s - 1] @ transpose(local[s]))
-        identity = np.array([1.0, 0.0, 0.0, 0.0])
-        rest = matrix_from_quaternion(slerp(difference, identity, ease[:, None]))
-        shift = offset[s - 1] - offset[s]
-        local[s:stop] = rest @ local[s:stop]
-        offset[s:stop] += (1.0 - ease)[:, None] * shift
-    local[:, 0] = path.rotation @ local[:, 0]
-    blended = quaternion_from_matrix(local)
-    blended = np.where((blended * rotations).sum(-1, keepdims=True) < 0, -blended, blended)
-    return blended, to_world(path, offset)
+    local, pelvis = motion.local.copy(), motion.pelvis.copy()
+    before: tuple[int, np.ndarray, Bent] | None = None
+    for start, ease, other in changes:
+        frames = slice(start, start + len(ease))
+        if before is not None and (rest := before[0] + len(before[1]) - start) > 0:
+            tail = Bent(before[2].local[-rest:], before[2].pelvis[-rest:])
+            led = _mixed(tail, Bent(other.local[:rest], other.pelvis[:rest]), before[1][-rest:])
+            other = Bent(*(np.concatenate([a, b[rest:]]) for a, b in zip(led, other, strict=True)))
+        local[frames], pelvis[frames] = _mixed(other, Bent(motion.local[frames], motion.pelvis[frames]), ease)
+        before = start, ease, other
+    return Bent(local, pelvis)
+
+
+def _mixed(first: Bent, second: Bent, share: np.ndarray) -> Bent:
+    """From the first motion to the second, by ``share`` (T,)."""
+    way = share[:, None]
+    return Bent(slerp(first.local, second.local, way), (1.0 - way) * first.pelvis + way * second.pelvis)

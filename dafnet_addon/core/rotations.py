@@ -5,6 +5,7 @@ import numpy as np
 __all__ = [
     "normalised", "frame_from", "rotation_between", "rotate", "transpose", "yaw_matrix", "quaternion_from_matrix",
     "matrix_from_quaternion", "matrix_from_vector", "continuous_signs", "slerp",
+    "smoothstep",
 ]
 
 
@@ -113,3 +114,9 @@ def slerp(a: np.ndarray, b: np.ndarray, t: np.ndarray) -> np.ndarray:
     wa = np.where(near, 1 - t, np.sin((1 - t) * angle) / sine)
     wb = np.where(near, t, np.sin(t * angle) / sine)
     return normalised(wa * a + wb * b)
+
+
+def smoothstep(x: np.ndarray) -> np.ndarray:
+    """From 0 to 1 as ``x`` goes there, beginning and ending softly."""
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * (3.0 - 2.0 * x)

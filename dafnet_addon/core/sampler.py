@@ -4,8 +4,9 @@ Everything that is known in advance (occupancy, velocity, observation) goes thro
 frames at once; only the recurrent part and the action predictor, which looks at the poses just made, are left per frame.
 """
 
-from collections.abc import Callable, Generator, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass, fields, replace
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -20,7 +21,7 @@ from .text import printable
 from .threads import one_thread
 from .weights import Weights
 
-__all__ = ["MOST_ACTIONS", "Conditions", "Made", "Sampler", "model_order", "smpl_order", "velocities_up_to"]
+__all__ = ["MOST_ACTIONS", "Conditions", "Made", "Sampler", "Unchanged", "model_order", "smpl_order", "velocities_up_to"]
 
 Array = Any  # numpy.ndarray or torch.Tensor
 
@@ -77,15 +78,31 @@ class Conditions:
     def __len__(self) -> int:
         return len(self.velocity)
 
+    def between(self, start: int, stop: int) -> "Conditions":
+        """Those of the frames from ``start`` to ``stop`` (exclusive), as copies."""
+        return Conditions(*(getattr(self, each.name)[start:stop].copy() for each in fields(self)))
+
+
+class Unchanged(NamedTuple):
+    """How a shot's conditions would go on at a few frames from ``start`` on if the mode had not changed there: ``observation``
+    (M, 66) and what of it is ``given`` (M, 22).
+    """
+
+    start: int
+    observation: np.ndarray
+    given: np.ndarray
+
 
 class Made(NamedTuple):
     """What a run makes of B takes: ``poses`` (T, B, 66) in SMPL order, metres; ``actions`` (T, B, K): probabilities;
-    ``log_likelihood`` (T, B): log p of each standardised pose after those before it, nats.
+    ``log_likelihood`` (T, B): log p of each standardised pose after those before it, nats; ``unchanged`` (M, B, 66): the poses
+    of the frames of each ``Unchanged``, one after another.
     """
 
     poses: np.ndarray
     actions: np.ndarray
     log_likelihood: np.ndarray
+    unchanged: np.ndarray
 
 
 def _unusable(weights: Weights, what: str) -> WeightsError:
@@ -434,21 +451,29 @@ class Sampler:
 
     def run(
         self, conditions: Conditions, z: np.ndarray, kept: np.ndarray | None = None,
-        watch: Callable[[int, np.ndarray], None] | None = None,
+        watch: Callable[[int, np.ndarray], None] | None = None, unchanged: Sequence[Unchanged] = (),
     ) -> Generator[float, None, Made]:
         """Make every frame of B takes; yields progress in [0, 1].
 
         ``z`` (B, 66): one noise vector a take, upper part first, held constant. ``kept`` (N, B, 66), SMPL order, metres: the
         first N frames as they are to stay; the model goes on from them, its noise passing over ten frames from the one that
         the last kept pose is made of to ``z``, so that nothing jumps. ``watch`` is shown each frame of the first take as it
-        is made: its index and pose (66,) as above. Raises WeightsError where the poses are no body's.
+        is made: its index and pose (66,) as above. ``unchanged``: stretches to be made besides, as the run would go on. Raises
+        WeightsError where the poses are no body's.
         """
         noise = self._to(z)
         yield from within(self.start_steps(conditions, takes=len(z)), 0.0, 0.0)
         known = self._to(np.zeros((0, *z.shape)) if kept is None else self.standardised(kept))
         first, last = len(known), noise
-        poses, actions, densities = [], [], []
+        poses, actions, densities, aside = [], [], [], []
         for t in range(len(conditions)):
+            share = min(1.0, max(0, t - first + 1) / _PASSING)
+            now = last + (noise - last) * (share * share * (3.0 - 2.0 * share))
+            for stretch in unchanged:
+                if stretch.start == t:
+                    for pose in self._aside(conditions, stretch, now):
+                        aside.append(pose)
+                        yield t / len(conditions)
             # Frame by frame: whoever drains this generator has the threads back in between. Poses are judged below.
             with one_thread(), np.errstate(over="ignore", invalid="ignore"):
                 if t < first:
@@ -456,8 +481,6 @@ class Sampler:
                     now, told, log_det = self.absorb(t, pose)
                     last = now
                 else:
-                    share = min(1.0, (t - first + 1) / _PASSING)
-                    now = last + (noise - last) * (share * share * (3.0 - 2.0 * share))
                     pose, told, log_det = self.frame(t, now)
                 densities.append(log_det - 0.5 * (now * now).sum(-1) - 0.5 * _POSE_SIZE * _LOG_TURN)
             poses.append(pose)
@@ -466,7 +489,27 @@ class Sampler:
                 watch(t, self._judged(self._metres(self._from(pose[:1])))[0])
             yield (t + 1) / len(conditions)
         stacked, told, density = (self._from(self.xp.stack(each)).astype(np.float64) for each in (poses, actions, densities))
-        return Made(self._judged(self._metres(stacked)), told, density)
+        others = self._from(self.xp.stack(aside)).astype(np.float64) if aside else np.zeros((0, *z.shape))
+        return Made(self._judged(self._metres(stacked)), told, density, self._judged(self._metres(others)))
+
+    def _aside(self, conditions: Conditions, stretch: Unchanged, noise: Array) -> Iterator[Array]:
+        """Standardised poses (B, 66) of the stretch, from the memory as it is now, which stays so."""
+        other = copy(self)
+        other._parts = [
+            replace(part, steps=[replace(step, coupling=copy(step.coupling)) for step in part.steps]) for part in self._parts
+        ]
+        begin, stop = max(0, stretch.start - self.history), stretch.start + len(stretch.given)
+        there = conditions.between(begin, stop)
+        there.observation[stretch.start - begin :], there.given[stretch.start - begin :] = stretch.observation, stretch.given
+        other.start(there, takes=len(noise))
+        other._past = self._past
+        for part, own in zip(self._parts, other._parts, strict=True):
+            for step, mine in zip(part.steps, own.steps, strict=True):
+                mine.coupling.state = list(step.coupling.state)
+        for t in range(stretch.start, stop):
+            with one_thread(), np.errstate(over="ignore", invalid="ignore"):
+                pose = other.frame(t - begin, noise)[0]
+            yield pose
 
     def _judged(self, poses: np.ndarray) -> np.ndarray:
         """Poses in metres. Raises WeightsError where they are no body's."""

@@ -39,6 +39,8 @@ _ROWS: dict[str, tuple[int, ...]] = {
 }
 """The arrays that have a row for each frame of the controls, and the shape of a row."""
 _FREE = {name for name in _ROWS if name.startswith("controls.") and name != "controls.root"}
+_LATER = {"take.unchanged"}
+"""What takes that were packed before it was needed lack."""
 _MOST_HEADER = 256  # bytes
 _HEADER = re.compile(
     rb"\x93NUMPY\x01\0..\{'descr': '([^']{1,20})', 'fortran_order': (True|False), 'shape': \(([\d, ]{0,80})\), \} *\n",
@@ -136,12 +138,13 @@ def _arrays(file: zipfile.ZipFile, fps: float) -> dict[str, np.ndarray]:
     made = whole(covering_frames(frames, fps), "the number of frames in 'take.poses'", 1, MOST_FRAMES)
     wanted: dict[str, tuple[int, ...]] = {name: (frames, *row) for name, row in _ROWS.items()} | {
         "take.action": (frames, -1), "take.poses": (PREROLL + made, 66),
-        "take.path.position": (made, 3), "take.path.yaw": (made,),
+        "take.path.position": (made, 3), "take.path.yaw": (made,), "take.unchanged": (-1, 66),
     }
+    longest = {"take.action": MOST_ACTIONS, "take.unchanged": 2 * made}
     arrays = {}
     for name, shape in wanted.items():
-        if name not in _FREE or f"{name}.npy" in there:
-            most = math.prod(MOST_ACTIONS if size == -1 else size for size in shape)
+        if name not in _FREE | _LATER or f"{name}.npy" in there:
+            most = math.prod(longest[name] if size == -1 else size for size in shape)
             found = shaped(_array(file, name, "<f4", most), f"'{name}'", shape)
             arrays[name] = inside(found, f"'{name}'", FARTHEST, free=name in _FREE).astype(float)
     return arrays
@@ -172,6 +175,7 @@ def _take(said: dict[str, Any], arrays: dict[str, np.ndarray], fps: float) -> Ta
         action=arrays["take.action"], scale=number(said.get("take.scale"), "'take.scale'", 1e-3, 1e3),
         poses=arrays["take.poses"],
         path=RootPath(arrays["take.path.position"], arrays["take.path.yaw"]),
+        unchanged=arrays.get("take.unchanged", np.zeros((0, 66))),
         log_likelihood=math.nan if likelihood is None else number(likelihood, "'take.log_likelihood'", -_MOST, _MOST),
         raw_metrics=figures("take.raw_metrics"), metrics=figures("take.metrics"), seconds=seconds,
         warnings=tuple(printable(each, 1000) for each in warnings),

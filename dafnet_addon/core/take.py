@@ -114,9 +114,10 @@ class Take:
     frame in its parent's, the pelvis' in the world; the identity everywhere is the rest pose (a T-pose that looks along +y);
     signs are continuous in time. ``root`` (T, 4, 4): the smoothed root. ``action`` (T, 10): action probabilities.
     ``scale``: the character's size. ``poses`` (70 + N, 66) and ``path`` (N): the model's own poses at 30 fps, canonical size,
-    in the frames of ``path``, after 70 of standing in its first one: what resuming and cleaning again need.
+    in the frames of ``path``, after 70 of standing in its first one; ``unchanged`` (M, 66): those that it would have gone on
+    with over each change of mode, one after another, if there had been none: what resuming and cleaning again need.
     ``log_likelihood``: of a standardised pose after those before it, mean over the frames, nats. ``raw_metrics``, ``metrics``:
-    ``metrics.summary`` of the model's own motion and of this one after the clean-up, at 30 fps and canonical size.
+    ``metrics.summary`` of the model's own motion and of this one after the clean-up, at these frames and canonical size.
     ``seconds``: time spent by stage. ``warnings``: sentences for the user.
     """
 
@@ -128,6 +129,7 @@ class Take:
     scale: float
     poses: np.ndarray
     path: RootPath
+    unchanged: np.ndarray = field(default_factory=lambda: np.zeros((0, 66)))
     log_likelihood: float = float("nan")
     raw_metrics: dict[str, float | None] = field(default_factory=dict)
     metrics: dict[str, float | None] = field(default_factory=dict)

@@ -161,11 +161,10 @@ def beside(
     """
     shots = {"EE": shot_of(clip, "EE")}
     known = shots["EE"].conditions
-    nothing = replace(known, observation=np.zeros_like(known.observation), given=np.zeros_like(known.given))
-    shots["FREE"] = replace(shots["EE"], conditions=nothing)
-    if "FULL" in modes:
-        full = shot_of(clip, "FULL", Scene()).conditions
-        shots["FULL"] = replace(shots["EE"], conditions=replace(full, occupancy=known.occupancy))
+    for mode in set(modes) - {"EE"}:
+        other = shot_of(clip, mode, Scene())
+        conditions = replace(other.conditions, occupancy=known.occupancy)
+        shots[mode] = replace(shots["EE"], conditions=conditions, told=other.told)
     runs = {"ground_truth": figures(clip, clip.joints[None])}
     for mode in modes:
         noise, takes_of = _noise(sampler, seed, seeds, mode)
