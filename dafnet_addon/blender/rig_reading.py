@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.retargeting import Body, Motion, canonical_body, laid, onto
+from ..core.retargeting import Body, Motion, canonical_body, laid, limb_errors, onto
 from ..core.rotations import normalised, rotate, rotation_between, transpose
 from ..core.skeleton import JOINTS, PARENTS
 from .mannequin import FACING
@@ -123,8 +123,10 @@ def motion_of(shape: Shape, bodies: np.ndarray, poses: np.ndarray) -> Motion:
 
 def joints_of(
     armature: bpy.types.Object, rig_map: RigMap, bodies: np.ndarray, poses: np.ndarray, size: float,
-) -> np.ndarray:
+) -> tuple[np.ndarray, dict[str, float]]:
     """Joints (T, 22, 3) of a DAFNet body of this size (world lengths) that moves as any mapped rig does; world.
+
+    And by how many degrees its limbs and trunk lie otherwise than the rig's, in the mean (``limb_errors``).
 
     ``bodies`` (T, 4, 4): the rig's object; ``poses`` (T, 22, 4, 4): the bones ``rig_map.place`` of the joints, in its space,
     NaN where there is none.
@@ -137,4 +139,5 @@ def joints_of(
     shape = shape_of(armature, rig_map, matrices, scale)
     motion = motion_of(shape, bodies, poses)
     floor = motion.joints[:, 0] * (1.0, 1.0, 0.0) + (0.0, 0.0, bodies[0, 2, 3])
-    return onto(motion, shape.body, canonical_body(size), floor, landing=False).motion.joints
+    joints = onto(motion, shape.body, canonical_body(size), floor, landing=False).motion.joints
+    return joints, {limb: float(off.mean()) for limb, off in limb_errors(joints, motion.joints).items()}

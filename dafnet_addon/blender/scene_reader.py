@@ -34,6 +34,7 @@ from .takes import stored
 __all__ = ["ReadScene", "read_steps", "read_scene"]
 
 _TURNED = np.radians(0.1)
+_OFF = 8.0  # degrees, mean, by which a copied upper body may lie otherwise than its source without a word
 _TARGETS = {"head": "head target", "hand_left": "left hand target", "hand_right": "right hand target"}
 
 
@@ -122,7 +123,9 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
         if dependencies.follows(source, armature):
             raise InputError(f"The upper body's source '{source.name}' follows the character itself; mute what ties it to it.")
         bones, bodies = np.array(tracks.bones), np.array(tracks.bodies)
-        given["upper_body"] = _carried(source, source_map, bones, bodies, unit, root_matrices, size, fps)
+        given["upper_body"], off = _carried(source, source_map, bones, bodies, unit, root_matrices, size, fps)
+        if off:
+            warnings += (f"'{source.name}' is followed, but {off}; see whether its bones are the right ones in Your Rig.",)
     elif settings.upper_body_take and "FULL" in modes:
         given["upper_body"] = _of_take(settings, np.array([mode == "FULL" for mode in modes]), root_matrices, size, fps)
     elif "FULL" in modes:
@@ -276,8 +279,8 @@ def _onto(root: np.ndarray, fps: float, local: np.ndarray) -> np.ndarray:
 def _carried(
     source: bpy.types.Object, rig_map: RigMap | None, bones: np.ndarray, bodies: np.ndarray,
     unit: float, root: np.ndarray, size: float, fps: float,
-) -> np.ndarray:
-    """Upper body (T, 14, 3), world metres, on this character's ``root`` (T, 4, 4) and of its ``size``.
+) -> tuple[np.ndarray, str]:
+    """Upper body (T, 14, 3), world metres, on this character's ``root`` (T, 4, 4) and of its ``size``; and what of it is off.
 
     ``bones`` (T, 22, 4, 4): the source's bones in its own space; ``bodies`` (T, 4, 4): its object's matrices; both in
     Blender units.
@@ -286,10 +289,12 @@ def _carried(
     there = np.array([rig_map is None or rig_map.place(name) is not None for name in JOINTS])
     if not np.isfinite(bones[:, there]).all() or not np.isfinite(bodies).all():
         raise InputError(f"The {what} has a transform that is not a number; clear its transform or fix what drives it.")
+    off: dict[str, float] = {}
     if rig_map is None:
         joints = unit * (bodies[:, None] @ bones)[..., :3, 3]
     else:
-        joints = unit * joints_of(source, rig_map, bodies, bones, size / unit)
+        joints, off = joints_of(source, rig_map, bodies, bones, size / unit)
+        joints = unit * joints
     if rig_map is None and source.dafnet.root:
         frames = _rigid(bodies, unit, what)
         frames[:, :3, :3] = frames[:, :3, :3] @ FACING
@@ -300,4 +305,5 @@ def _carried(
     upper = [j - 1 for j in UPPER[1:]]
     lengths = np.linalg.norm(offsets[:, upper], axis=-1).mean(axis=0).sum()
     ratio = size * np.linalg.norm(OFFSETS[1:][upper], axis=-1).sum() / lengths
-    return _onto(root, fps, ratio * to_root(path, joints[:, list(UPPER)]))
+    told = ", ".join(f"the {limb} by {degrees:.0f} degrees" for limb, degrees in off.items() if degrees > _OFF)
+    return _onto(root, fps, ratio * to_root(path, joints[:, list(UPPER)])), f"{told} off" if told else ""

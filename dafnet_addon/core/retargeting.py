@@ -256,10 +256,11 @@ def onto(source: Motion, source_body: Body, body: Body, root: np.ndarray, landin
     Where the sizes differ (``size_ratio``), the source's joints are scaled about the root, except that steps keep their
     length, since the root's path keeps its own and feet would slide otherwise. The head is put over the hips by the size of the
     trunk where that differs, since it would be stretched or bent all the time otherwise. The middle of the hip joints comes to
-    lie where the source's lies, lower where legs would not reach; the trunk turns as the source's and bends by some degrees
-    more to bring the head to its place; limbs reach wrists and ankles in the planes of the source's; collars turn a little to
-    leave elbows as bent as they were, more where an arm is short. An ankle that lies higher over its toes than the source's is
-    held higher by that, so that soles stay on the floor, and lifts the body that stands on it.
+    lie where the source's lies, lower where legs would not reach, and feet stand as far apart as the hips do; the trunk turns as
+    the source's and bends by some degrees more to bring the head to its place; limbs reach wrists and ankles in the planes of
+    the source's; collars turn a little to leave elbows as bent as they were, more where an arm is short. An ankle that lies
+    higher over its toes than the source's is held higher by that, so that soles stay on the floor, and lifts the body that
+    stands on it.
     """
     ratio = size_ratio(source_body, body)
     targets = _targets(source, source_body, body, root, landing)
@@ -369,6 +370,11 @@ def _targets(source: Motion, source_body: Body, body: Body, root: np.ndarray, la
     ratio, feet = size_ratio(source_body, body), [7, 8, 10, 11]
     targets = root[:, None] + ratio * (source.joints - root[:, None])
     targets[:, feet, :2] = source.joints[:, feet, :2]
+    # Feet stand apart as the hips do; sideways of the foot itself, since a planted one does not turn.
+    wider = 0.5 * (np.ptp(body.rest[[1, 2], 0]) - np.ptp(source_body.rest[[1, 2], 0]))
+    for ankle, side in ((7, -1.0), (8, 1.0)):
+        out = source.frames[:, ankle, :, 0] * (1.0, 1.0, 0.0)
+        targets[:, [ankle, ankle + 3]] += (side * wider * normalised(out))[:, None]
     trunk = body.trunk() / source_body.trunk()
     if not landing or ratio != 1.0 or abs(trunk - 1.0) > _SAME_SIZE:
         upper = [15] if landing else [15, 16, 17, 20, 21]
