@@ -256,7 +256,7 @@ def onto(source: Motion, source_body: Body, body: Body, root: np.ndarray, landin
     Where the sizes differ (``size_ratio``), the source's joints are scaled about the root, except that steps keep their
     length, since the root's path keeps its own and feet would slide otherwise. The head is put over the hips by the size of the
     trunk where that differs, since it would be stretched or bent all the time otherwise. The middle of the hip joints comes to
-    lie where the source's lies, lower where legs would not reach, and feet stand as far apart as the hips do; the trunk turns as
+    lie where the source's lies, lower where legs would not reach, and feet stand as far apart as hips do; the trunk turns as
     the source's and bends by some degrees more to bring the head to its place; limbs reach wrists and ankles in the planes of
     the source's; collars turn a little to leave elbows as bent as they were, more where an arm is short. An ankle that lies
     higher over its toes than the source's is held higher by that, so that soles stay on the floor, and lifts the body that
