@@ -150,7 +150,7 @@ def fit(joints: np.ndarray, scale: float = 1.0, fps: float = 30.0) -> tuple[np.n
     frame[:, 9] = chest
     for child in (12, 13, 14):
         place(child)
-    aim(12, 15, chest)
+    aim(12, 15, _between(chest, chest, 1 / 2))  # the chest's, rounded as when the head is turned: figures hold to the last bit
     frame[:, 15] = frame[:, 12]
     aim(13, 16, chest)
     aim(14, 17, chest)
