@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -378,3 +380,19 @@ def test_sofa_is_solid_where_the_bvh_tree_says_so():
     clear = np.abs(found) > BETWEEN_NODES
     assert inside.any() and (~inside).any()
     assert ((found[clear] < 0) == inside[clear]).mean() > 0.98
+
+
+@pytest.mark.parametrize("side", [100.0, 4000.0])
+def test_a_huge_slab_is_measured_coarsely_and_within_memory(side: float) -> None:
+    corners = np.array([(x, y, z) for x in (0.0, side) for y in (0.0, side) for z in (0.0, 0.5)])
+    sides = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4),
+             (1, 5, 7), (1, 7, 3)]
+    tracemalloc.start()
+    try:
+        grid = build_grid(corners, np.array(sides))
+        assert tracemalloc.get_traced_memory()[1] < 200e6
+    finally:
+        tracemalloc.stop()
+    middle = np.array([side / 2, side / 2, 0.25])
+    assert grid.sample(middle + [0.0, 0.0, 2 * grid.spacing])[()] == pytest.approx(BAND, abs=1e-6)
+    assert grid.values.size < 7_000_000 and np.isfinite(grid.values).all()

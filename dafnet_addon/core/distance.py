@@ -37,7 +37,7 @@ _MAX_BAND_NODES = 2_000_000
 _ROOM = (1.4, 1.9)
 _FLAT = np.cos(np.radians(15.0))
 _CHUNK = 8192
-_SEEDS = 1 << 15
+_SEEDS, _STREWN = 1 << 15, 1 << 17
 _CACHED_GRIDS = 64
 
 
@@ -211,14 +211,19 @@ def _unsigned(
     apex, b, c = np.moveaxis(np.take_along_axis(corners, turn[..., None], axis=1), 1, 0)
     rows = np.ceil(sides.max(axis=1) / spacing).astype(int) + 1
     columns = np.ceil(sides.min(axis=1) / spacing).astype(int) + 1
-    triangle, place = _ragged(rows * columns)
-    i, j = np.divmod(place, columns[triangle])
-    s = (i / np.maximum(rows - 1, 1)[triangle])[:, None]
-    t = (j / np.maximum(columns - 1, 1)[triangle])[:, None]
-    points = apex[triangle] * (1 - s) + s * (b[triangle] * (1 - t) + t * c[triangle])
-    x, y, z = np.floor((points - origin) / spacing).astype(np.int64).T
-    pairs = np.unique((triangle * len(distance)) + (x * ny + y) * nz + z)
-    triangle, node = np.divmod(pairs, len(distance))
+    ends = np.cumsum(rows * columns)
+    pairs = []
+    for k in range(0, int(ends[-1]), _STREWN):
+        item = np.arange(k, min(k + _STREWN, ends[-1]))
+        triangle = np.searchsorted(ends, item, side="right")
+        i, j = np.divmod(item - (ends - rows * columns)[triangle], columns[triangle])
+        s = (i / np.maximum(rows - 1, 1)[triangle])[:, None]
+        t = (j / np.maximum(columns - 1, 1)[triangle])[:, None]
+        points = apex[triangle] * (1 - s) + s * (b[triangle] * (1 - t) + t * c[triangle])
+        x, y, z = np.floor((points - origin) / spacing).astype(np.int64).T
+        pairs.append(np.unique((triangle * len(distance)) + (x * ny + y) * nz + z))
+        yield 0.0
+    triangle, node = np.divmod(np.unique(np.concatenate(pairs)), len(distance))
     corner = np.array([(dx * ny + dy) * nz + dz for dx in (0, 1) for dy in (0, 1) for dz in (0, 1)])
     for k in range(0, len(node), _SEEDS // 8):
         part = slice(k, k + _SEEDS // 8)
@@ -348,7 +353,10 @@ def _grid_steps(
     first, last = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     size = last - first + 2 * (BAND + _FINEST)
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
-    spacing = max(_FINEST, (2 * BAND * area / _MAX_BAND_NODES) ** (1 / 3), (size.prod() / _MAX_NODES) ** (1 / 3))
+    spacing = max(
+        _FINEST, (2 * BAND * area / _MAX_BAND_NODES) ** (1 / 3), (3 * area / _MAX_BAND_NODES) ** (1 / 2),
+        (size.prod() / _MAX_NODES) ** (1 / 3),
+    )
     origin = first - (BAND + spacing)
     nx, ny, nz = (np.ceil((last + BAND + spacing - origin) / spacing).astype(int) + 1).tolist()
     values = yield from _unsigned(corners, origin, spacing, (nx, ny, nz))
