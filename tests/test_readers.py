@@ -1,6 +1,7 @@
 """Readers of motion capture: what is written with a known answer is read back; what is damaged is refused in one sentence."""
 
 import json
+import os
 import sys
 import tracemalloc
 from io import BytesIO
@@ -444,7 +445,7 @@ def test_a_folders_name_and_accents_do_not_lose_a_licence(tmp_path):
     angles, way = walk(3, "y")
     for folder, name in ("take [2]", "geh.bvh"), ("s1", "Ru\u0308cken.bvh"):  # decomposed, as a Mac names files
         (tmp_path / folder).mkdir()
-        write_bvh(tmp_path / folder / name, angles, way)
+        write_bvh(tmp_path / folder / os.fsdecode(name.encode()), angles, way)
     stated = {"take [2]/*": {"licence": "CC0"}, "s1\\R\u00fccken.bvh": {"licence": "MIT"}, "s3/*": {"licence": "CC BY"}}
     (tmp_path / "clips.json").write_text(json.dumps(stated), encoding="utf-8")
     left_out: list[str] = []

@@ -7,6 +7,7 @@ Names are file names relative to the folder, in which ``*`` stands for any chara
 
 import csv
 import json
+import os
 import re
 from io import StringIO
 from pathlib import Path, PurePath
@@ -24,6 +25,14 @@ _FORMS = {"split": "|train|test", "up": "|y|z", "fps": r"|[1-9]\d*(\.\d+)?"}  # 
 def _form(name: str) -> str:
     """A name or pattern as any system writes it."""
     return normalize("NFC", name).replace("\\", "/")
+
+
+def _name(path: PurePath) -> str:
+    """A file's name in that form; names on disks are UTF-8, whatever the locale that Python reads them in."""
+    try:
+        return _form(os.fsencode(path.as_posix()).decode("utf-8"))
+    except UnicodeError:
+        return _form(path.as_posix())
 
 
 def _pattern(name: str) -> re.Pattern[str]:
@@ -80,7 +89,7 @@ class Stated:
 
     def of(self, path: PurePath) -> dict[str, str]:
         """What is stated of a file, by its path in the folder."""
-        name = _form(path.as_posix())
+        name = _name(path)
         fields: dict[str, str] = {}
         for _, pattern, given in self.rows:
             if pattern.fullmatch(name):
@@ -89,7 +98,7 @@ class Stated:
 
     def unmet(self, paths: list[PurePath]) -> list[str]:
         """A sentence for each line that is of none of the files."""
-        names = [_form(path.as_posix()) for path in paths]
+        names = [_name(path) for path in paths]
         return [
             f"The file '{self.file}' states '{name}', which no motion file is called; only * and ? stand for other characters."
             for name, pattern, _ in self.rows if not any(map(pattern.fullmatch, names))
