@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from dafnet_addon import Box, CleanUp, Controls, DafnetError, Mesh, Scene, Take, generate, load_weights
-from dafnet_addon.core import storage
+from dafnet_addon.core import distance, storage
 from dafnet_addon.core.generate import Draw, clean_again_steps, takes_steps
 from dafnet_addon.core.progress import drained
 from dafnet_addon.core.sampler import Sampler
@@ -244,6 +244,7 @@ def test_meshes() -> None:
         def use() -> None:
             mesh = Mesh(**good | odd)
             tally.past += 1
+            distance._cache.clear()  # so that every grid is made, and weighed
             sound(generate(Scene([mesh]), Controls(30, root()), SMALL, clean_up=ALL))
 
         tally.attempt(use, {*odd, "frames"} if "matrix" in odd else {*odd, "triangles"})
