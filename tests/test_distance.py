@@ -2,10 +2,12 @@
 
 import tracemalloc
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 import pytest
 
+from dafnet_addon.core import distance
 from dafnet_addon.core.distance import BAND, build_grid, grid_of, prepared, rigid_split, scaled
 from dafnet_addon.core.rotations import matrix_from_quaternion, yaw_matrix
 from dafnet_addon.core.solids import Box, Mesh, Scene, box_distance
@@ -256,6 +258,17 @@ def test_grids_are_made_once_for_each_geometry_scale_and_floor():
     assert grid_of(Mesh(vertices, triangles, grid=own), 0.0) is own
 
 
+def test_what_lies_higher_than_the_floor_shares_one_grid_at_any_height():
+    half, places = np.array([0.1, 0.2, 0.15]), [(0, 0, 0.9), (1, 2, 1.3), (4, 0, 2.0)]
+    matrices = np.tile(np.eye(4), (3, 1, 1))
+    matrices[:, :3, 3] = places
+    matrices[2, :3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
+    grids = [grid_of(Mesh(*box_mesh(half), matrix=matrix), 0.0) for matrix in matrices]
+    assert grids[0] is grids[1] is grids[2]
+    alone = build_grid(*box_mesh(half), np.array([0.0, 0.0, 1.0, 0.9]))
+    assert np.array_equal(grids[0].values, alone.values) and np.array_equal(grids[0].origin, alone.origin)
+
+
 def test_floor_is_measured_in_the_world():
     slab = Mesh(*box_mesh([1, 0.1, 1]), matrix=np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 4.9], [0, 0, 0, 1.0]]))
     assert (grid_of(slab, 5.0).values == np.float32(BAND)).all()
@@ -395,3 +408,52 @@ def test_a_huge_slab_is_measured_coarsely_and_within_memory(side: float) -> None
     over = np.array([side / 2, side / 2, 0.5 + BAND + 2 * grid.spacing])
     assert grid.sample(over) == pytest.approx(BAND, abs=1e-6)
     assert grid.values.size < 7_000_000 and np.isfinite(grid.values).all()
+
+
+def _soup(count, across, spread):
+    """Triangles anywhere, corners ``spread`` metres apart."""
+    rng = np.random.default_rng(0)
+    corners = rng.uniform(0, across, (count, 1, 3)) + rng.uniform(0, spread, (count, 3, 3))
+    return corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3)
+
+
+def _collinear():
+    return np.c_[np.linspace(0, 1, 300), np.zeros((300, 2))], np.random.default_rng(0).integers(0, 300, (2000, 3))
+
+
+def _needles():
+    ends = np.random.default_rng(0).normal(size=(3, 2000, 3)) + np.array([0.0, 0.0, 1e4])[:, None, None] * (1, 0, 0)
+    return ends.reshape(-1, 3), np.arange(6000).reshape(3, 2000).T
+
+
+@pytest.mark.parametrize("mesh", [
+    _collinear(), _needles(), _soup(20_000, 0.0, 100.0), _soup(200, 1e8, 1.0), _soup(50_000, 0.0, 3.0),
+    (np.array([[0, 0, 0], [1e8, 0, 0], [1e8, 1e8, 0], [0, 1e8, 0]]), np.array([[0, 1, 2], [0, 2, 3]])),
+    (np.array([[0, 0, 0], [1e8, 0, 0], [1e8, 1e-3, 0]]), np.array([[0, 1, 2]])), (np.zeros((5, 3)), np.array([[0, 1, 2]] * 9)),
+    (box_mesh([0.3, 0.3, 0.3])[0] + 1e8, box_mesh([0.3, 0.3, 0.3])[1]),
+], ids=["collinear", "needles", "soup", "far apart", "dense", "sheet", "needle", "points", "far away"])
+def test_no_mesh_takes_long_or_much_memory(mesh):
+    tracemalloc.start()
+    started = process_time()
+    grid = build_grid(*mesh)
+    seconds, (_, peak) = process_time() - started, tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert np.isfinite(grid.values).all() and grid.values.size <= 12_000_000
+    assert peak < 200e6
+    assert seconds < 20, "of the processor; a tenth of it where nothing else runs"
+
+
+def test_of_a_vast_mesh_the_unit_is_asked_for():
+    plane = np.array([[-500, -500, 0.3], [500, -500, 0.3], [500, 500, 0.3], [-500, 500, 0.3]]), np.array([[0, 1, 2], [0, 2, 3]])
+    _, (warning,) = prepared(Scene([Mesh(*plane, name="Ground")]), 0.0)
+    assert warning.startswith("'Ground' is 1,0") and "is its unit right?" in warning
+
+
+def test_grids_are_kept_up_to_half_a_gigabyte(monkeypatch):
+    monkeypatch.setattr(distance, "_cache", type(distance._cache)())
+    meshes = [Mesh(*box_mesh([0.2, 0.2, 0.1 + 0.001 * k])) for k in range(80)]
+    grids = [grid_of(mesh, -1.0) for mesh in meshes]
+    assert all(grid_of(mesh, -1.0) is grid for mesh, grid in zip(meshes, grids, strict=True))
+    monkeypatch.setattr(distance, "_CACHED_BYTES", 3 * grids[-1].values.nbytes)
+    grid_of(Mesh(*box_mesh([0.1, 0.1, 0.1])), -1.0)
+    assert 1 <= len(distance._cache) <= 4

@@ -32,13 +32,15 @@ FLOOR = 0.05
 
 _FINEST = 0.02
 _COARSE = 0.06
+_VAST = 200.0
 _MAX_NODES = 6_000_000
 _MAX_BAND_NODES = 2_000_000
+_MAX_SEEDS = 2_000_000
 _ROOM = (1.4, 1.9)
 _FLAT = np.cos(np.radians(15.0))
 _CHUNK = 8192
 _SEEDS, _STREWN = 1 << 15, 1 << 17
-_CACHED_GRIDS = 64
+_CACHED_BYTES = 1 << 29
 
 
 @dataclass(frozen=True)
@@ -209,8 +211,7 @@ def _unsigned(
     sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
     turn = (np.argmin(sides, axis=1)[:, None] + np.array([2, 0, 1])) % 3
     apex, b, c = np.moveaxis(np.take_along_axis(corners, turn[..., None], axis=1), 1, 0)
-    rows = np.ceil(sides.max(axis=1) / spacing).astype(int) + 1
-    columns = np.ceil(sides.min(axis=1) / spacing).astype(int) + 1
+    rows, columns = _rows_and_columns(corners, spacing)
     ends = np.cumsum(rows * columns)
     pairs = []
     for k in range(0, int(ends[-1]), _STREWN):
@@ -242,6 +243,13 @@ def _unsigned(
             yield 0.5
         active = np.unique(np.concatenate(better))
     return distance.reshape(shape)
+
+
+def _rows_and_columns(corners: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """Of the points (F,), (F,) that are strewn over each triangle, along its longest and its shortest side."""
+    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+    rows, columns = np.ceil(sides.max(axis=1) / spacing), np.ceil(sides.min(axis=1) / spacing)
+    return rows.astype(np.int64) + 1, columns.astype(np.int64) + 1
 
 
 def _inside(
@@ -357,11 +365,20 @@ def _grid_steps(
         _FINEST, (2 * BAND * area / _MAX_BAND_NODES) ** (1 / 3), (3 * area / _MAX_BAND_NODES) ** (1 / 2),
         (size.prod() / _MAX_NODES) ** (1 / 3),
     )
+    while _too_many(corners, last - first, spacing):
+        spacing *= 1.25
     origin = first - (BAND + spacing)
     nx, ny, nz = (np.ceil((last + BAND + spacing - origin) / spacing).astype(int) + 1).tolist()
     values = yield from _unsigned(corners, origin, spacing, (nx, ny, nz))
     inside = yield from _inside(corners[solid], part[solid], origin, spacing, (nx, ny, nz))
     return DistanceGrid(origin, float(spacing), np.where(inside, -values, values))
+
+
+def _too_many(corners: np.ndarray, size: np.ndarray, spacing: float) -> bool:
+    """Whether a grid over ``size`` (3,) had too many nodes, or its triangles too many points: of huge sheets and needles."""
+    rows, columns = _rows_and_columns(corners, spacing)
+    nodes = (np.ceil((size + 2 * (BAND + spacing)) / spacing) + 1).prod()
+    return bool(nodes > 2 * _MAX_NODES or (rows * columns).sum() - 4 * len(corners) > _MAX_SEEDS)
 
 
 _cache: OrderedDict[bytes, DistanceGrid] = OrderedDict()
@@ -385,13 +402,15 @@ def _grid_of_steps(mesh: Mesh, floor: float) -> Generator[float, None, DistanceG
     """The mesh's distance grid: its own, one made before for the same geometry, or a new one.
 
     ``floor``: height of the root's plane in the world (metres). The scale of the first frame counts. Grids are kept in
-    memory by geometry, scale and floor, the last 64 of them.
+    memory by geometry, scale and floor, the last half gigabyte of them.
     """
     if mesh.grid is not None:
         return mesh.grid
     rigid, linear = rigid_split(mesh.matrix)
     vertices = np.asarray(mesh.vertices, float) @ linear.reshape(-1, 3, 3)[0].T
     plane = _floor_plane(rigid, floor)
+    if plane is not None and len(vertices) and (vertices @ plane[:3] + plane[3]).min() > FLOOR:
+        plane = None  # nothing of it can be floor: one grid for a row of books, whatever the shelf
     key = hashlib.blake2b(np.rint(vertices * 1e5).astype(np.int64).tobytes(), digest_size=16)
     key.update(np.asarray(mesh.triangles, np.int64).tobytes())
     key.update(b"" if plane is None else np.rint(plane * 1e4).astype(np.int64).tobytes())
@@ -399,7 +418,7 @@ def _grid_of_steps(mesh: Mesh, floor: float) -> Generator[float, None, DistanceG
     if name not in _cache:
         _cache[name] = yield from _grid_steps(vertices, np.asarray(mesh.triangles), plane)
     _cache.move_to_end(name)
-    while len(_cache) > _CACHED_GRIDS:
+    while len(_cache) > 1 and sum(grid.values.nbytes for grid in _cache.values()) > _CACHED_BYTES:
         _cache.popitem(last=False)
     return _cache[name]
 
@@ -423,12 +442,15 @@ def prepared_steps(
             done, one = len(solids) / len(scene.solids), 1 / len(scene.solids)
             grid = yield from within(_grid_of_steps(solid, floor), done, done + one)
             solid = replace(solid, grid=grid)
+            across = max(grid.values.shape) * grid.spacing
             linear = rigid_split(solid.matrix)[1].reshape(-1, 3, 3)
             if np.abs(linear - linear[0]).max() > 0.01 * max(np.abs(linear[0]).max(), 1e-6):
                 warnings.append(f"The scale of '{solid.name}' is animated; its size on the first frame is used.")
-            if solid.grid is not None and solid.grid.spacing > _COARSE:
+            if grid.spacing > _COARSE and across > _VAST:
+                warnings.append(f"'{solid.name}' is {across * size:,.0f} m across, so it is hardly seen: is its unit right?")
+            elif grid.spacing > _COARSE:
                 warnings.append(
-                    f"'{solid.name}' is so large that it is seen only every {100 * size * solid.grid.spacing:.0f} cm; "
+                    f"'{solid.name}' is so large that it is seen only every {100 * size * grid.spacing:.0f} cm; "
                     "separate the furniture from it, or split it into parts."
                 )
         solids.append(solid)
