@@ -2,11 +2,13 @@
 
 from itertools import pairwise
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 import pytest
 
 from dafnet_addon import Box, Controls, InputError, Mesh, Scene, generate, load_weights
+from dafnet_addon.core.passage import met_along
 from dafnet_addon.core.paths import Stop
 from dafnet_addon.core.rotations import rotate, yaw_matrix
 from dafnet_addon.core.skeleton import SEAT_TO_PELVIS
@@ -117,6 +119,43 @@ def test_ways_go_round_furniture():
         way_round(surface_points(ring, 0.05), np.zeros(2), np.array([5.0, 0.0]))
     with pytest.raises(InputError, match="already"):
         walk_to([], Stop((0.0, 0.0), 0.0), Stop((0.1, 0.0), 0.0))
+
+
+def test_points_are_only_made_where_they_are_asked_for():
+    chair, wall = _turned(_chair(), 0.4, (1.0, 0.5)), [_box((-400.0, 3.0, 0.0), (400.0, 3.1, 3.0))]
+    low, high = np.array([0.5, 0.0]), np.array([1.5, 1.0])
+    far = _turned(_chair(), 0.0, (9.0, 9.0))
+    found = surface_points([*chair, *wall, *far], 0.05, (low, high))
+    assert len(found) and np.array_equal(found, surface_points(chair, 0.05))
+    assert surface_points([*wall, Mesh(np.zeros((0, 3)), np.zeros((0, 3), int))], 0.05, (low, high)).shape == (0, 3)
+
+
+def test_far_ways_are_found_or_refused_in_seconds():
+    start, goal = np.zeros(2), np.array([90.0, 60.0])
+    started = process_time()
+    assert len(way_round(np.zeros((0, 3)), start, goal)) <= 8
+    ring = [_box((89, y, 0), (91.1, y + 0.1, 1)) for y in (59.0, 61.0)]
+    ring += [_box((x, 59, 0), (x + 0.1, 61, 1)) for x in (89.0, 91.0)]
+    for here, there in ((start, goal), (goal, start)):
+        with pytest.raises(InputError, match="no way between the furniture"):
+            way_round(surface_points(ring, 0.05), here, there)
+    with pytest.raises(InputError, match="1,000 m away: is the scene's unit right"):
+        walk_to(ring, Stop((0.0, 0.0), 0.0), Stop((1000.0, 0.0), 0.0))
+    assert process_time() - started < 20.0, "of the processor; a tenth of it where nothing else runs"
+    room = [_box((-0.02, -0.02, 0.0), (0.02, 0.02, 0.01))]
+    with pytest.raises(InputError, match=r"The scene is 0\.04 m across: is its unit right"):
+        walk_to(room, Stop((0.0, 0.0), 0.0), Stop((0.03, 0.0), 0.0))
+
+
+def test_who_starts_inside_furniture_is_led_out_of_it():
+    solid = [_box((-0.6, -0.6, 0.0), (0.6, 0.6, 1.0))]
+    walked = walk_to(solid, Stop((0.0, 0.0), 0.0), Stop((3.0, 0.0), 0.0))
+    (met,) = met_along(Scene(solid), walked.path, 30.0, end=())
+    outside = np.flatnonzero(np.abs(walked.path.position[:, :2]).max(axis=1) > 0.65)
+    assert met.first == 0 and abs(met.last - outside[0]) < 8 and (np.diff(outside) == 1).all()
+    sea = surface_points([_box((-9.0, -9.0, 0.0), (9.0, 9.0, 0.5))], 0.05)
+    with pytest.raises(InputError, match="no way"):
+        way_round(sea, np.zeros(2), np.array([1.0, 1.0]))
 
 
 def test_who_is_sent_to_a_chair_behind_a_table_sits_on_it():
