@@ -36,7 +36,8 @@ def _told(struct: Any) -> dict[str, object]:
 @cache
 def _names(kind: type) -> list[str]:
     known = kind.bl_rna.properties  # type: ignore[attr-defined]
-    return [each.identifier for each in known if each.type not in ("COLLECTION", "POINTER")]
+    kinds = {each.identifier: each.type for each in known}
+    return [name for name, kind in kinds.items() if kind not in ("COLLECTION", "POINTER") and name != "use_nodes"]
 
 
 def everything(bpy: ModuleType, addon: Addon, armature: Any) -> dict[str, object]:
