@@ -384,7 +384,7 @@ def test_weights(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def stored() -> bytes:
     """A take of the weights that ship, as a file keeps it."""
-    controls = Controls(**asked())
+    controls = Controls(**asked() | {"mode": ["EE"] * 3 + ["FREE"] * (FRAMES - 3)})
     return packed(generate(Scene([SEAT]), controls, load_weights(), clean_up=ALL), controls)
 
 
@@ -412,6 +412,13 @@ BOMB = put_together({"controls.root": np.zeros((2_000_000, 4, 4), np.float32)}, 
 """128 MB of zeros in a few kilobytes."""
 
 
+ALSO = {
+    "take.path.position": {"root"}, "take.path.yaw": {"root"}, "take.unchanged": {"mode"}, "controls.mode": {"mode"},
+    "controls.blend": {"mode"}, "controls.scale": {"size"}, "take.scale": {"size"},
+}
+"""What a sentence may name instead, where two fields do not belong together."""
+
+
 @st.composite
 def other_takes(draw: Any, data: bytes) -> tuple[bytes, set[str]]:
     """A stored take that is mutated, and the fields that were changed."""
@@ -419,6 +426,7 @@ def other_takes(draw: Any, data: bytes) -> tuple[bytes, set[str]]:
     ways = ["array", "array", "array", "plain", "plain", "plain", "text", "bytes", "header", "missing", "bomb"]
     way = draw(st.sampled_from(ways))
     name, key = draw(st.sampled_from(sorted(found))), draw(st.sampled_from([*sorted(plain), "take.path", "controls.head"]))
+    also = ALSO.get(key if way == "plain" else name, set())
     if way == "bytes":
         return draw(scratches())(data), {"damaged", "plain", *found}
     if way == "array":
@@ -427,25 +435,25 @@ def other_takes(draw: Any, data: bytes) -> tuple[bytes, set[str]]:
         with np.errstate(over="ignore"):
             found[name] = value.astype(np.float32) if single else value
         # The number of frames is that of the root, so that all others may be wrong then.
-        return put_together(found, plain), {name, name.split(".")[1], *(found if name == "controls.root" else ())}
+        return put_together(found, plain), {name, name.split(".")[1], *(found if name == "controls.root" else ()), *also}
     if way == "header":
         raw = BytesIO()
         np.save(raw, found[name])
         found[name] = draw(scratches())(raw.getvalue()[:128]) + raw.getvalue()[128:]
-        return put_together(found, plain), {name, *(found if name == "controls.root" else ())}
+        return put_together(found, plain), {name, *(found if name == "controls.root" else ()), *also}
     if way == "plain":
         odd = [*JSON_VALUES, *WORDS_OF_FILES[:3], ["\x1b[1m"], {"jerk": "a"}]
         plain[key] = draw(st.one_of(st.sampled_from(odd), st.floats()))
         names = {key, WORDS.get(key.split(".")[-1], key.split(".")[-1]), "plain"}
         # The rate says how many frames the model made.
         rate = {*found, "number of frames", "take.fps", "take.scale"} if "fps" in key or "scale" in key else set()
-        return put_together(found, plain), names | rate
+        return put_together(found, plain), names | rate | also
     if way == "text":
         text = draw(st.sampled_from([*WORDS_OF_FILES[:-1], "[]", "3", "null"]))
         return put_together(found, text.encode()), {"plain", "version", "fps"}
     if way == "missing":
         del found[name]
-        return put_together(found, plain), {name}
+        return put_together(found, plain), {name, *also}
     with ZipFile(BytesIO(BOMB)) as bomb:
         found[name] = bomb.read("controls.root.npy")
     return put_together(found, plain), {name, *found}
