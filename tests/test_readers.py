@@ -17,6 +17,7 @@ from dafnet_addon.core.skeleton import JOINTS, PARENTS, REST, TOE_HEIGHT, joint
 from dafnet_addon.data.acclaim import read_amc, read_asf
 from dafnet_addon.data.amass import read_amass
 from dafnet_addon.data.boxes import box
+from dafnet_addon.data.flesh import Furnishing
 from dafnet_addon.data.bvh import read_bvh
 from dafnet_addon.data.canonical import calibrate
 from dafnet_addon.data.cuts import bad_frames, cuts
@@ -607,7 +608,7 @@ def test_a_sheet_is_drawn_for_any_length(tmp_path):
     touching = np.ones((30, 5), dtype=bool)
     plain, full = tmp_path / "plain.png", tmp_path / "full.png"
     sheet(plain, [("a pose", REST[None], None), ("a motion", _standing(30), None)], columns=3)
-    sheet(full, [("a pose", REST[None], None), ("a motion", _standing(30), seat)], columns=3, contacts=[None, touching])
+    sheet(full, [("a pose", REST[None], None), ("a motion", _standing(30), Furnishing(seat))], columns=3, contacts=[None, touching])
     assert 5_000 < plain.stat().st_size < full.stat().st_size, "furniture and contacts are drawn too"
 
 

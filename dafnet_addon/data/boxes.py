@@ -12,7 +12,7 @@ from ..core.sensor import RADIUS, REACH, SPHERES, occupancy_of_distance
 __all__ = ["NO_BOXES", "MOST", "ABSENT", "box", "placed", "distances", "near", "occupancy"]
 
 NO_BOXES = np.zeros((0, 7))
-MOST = 48
+MOST = 64
 """Boxes that a training window holds at most."""
 ABSENT = np.array([0.0, 0.0, -9.0, 0.0, 0.0, 0.0, 0.0])
 """A box that no sensor sees: fills up the rows of a window."""

@@ -5,9 +5,11 @@ from collections import Counter
 import numpy as np
 
 from ..core.root import root_from_joints
-from .furniture import fitted, probes
+from .flesh import NO_BANK, probes
+from .furniture import fitted
 from .motions import Draws
 from .retarget import at_seat_height
+from .shapes import ShapeBank
 from .windows import Motion
 
 __all__ = ["fit_report"]
@@ -17,7 +19,9 @@ _BEFORE, _AFTER = 80, 60  # frames about a moment: what a training window and it
 _PELVIS = 0.42, 0.82  # resting heights that every other seat is moved to
 
 
-def fit_report(motions: list[Motion], draws: Draws, rng: np.random.Generator, count: int = 200) -> str:
+def fit_report(
+    motions: list[Motion], draws: Draws, rng: np.random.Generator, count: int = 200, bank: ShapeBank = NO_BANK
+) -> str:
     """A table of ``count`` moments of every kind in ``draws``: pieces fitted of pieces tried, and moments not used, with why.
 
     A moment cannot be used where a seat or bed fits nowhere ("no seat", "no bed"), or where the motion is cut off half-way down
@@ -33,11 +37,11 @@ def fit_report(motions: list[Motion], draws: Draws, rng: np.random.Generator, co
             heights = [r.position[2] for r in motions[i].rests if r.start < high and r.end > low]
             if heights and rng.random() < 0.5:
                 joints = at_seat_height(joints, float(heights[0]), rng.uniform(*_PELVIS))
-            pieces, missing = fitted(rng, joints, root_from_joints(joints), probes(joints))
+            pieces, missing = fitted(rng, joints, root_from_joints(joints), probes(joints), bank)
             tally["no " + missing if missing in _PIECES else missing] += 1
-            for piece, boxes in pieces:
+            for piece, found in pieces:
                 tally[piece + " tried"] += 1
-                tally[piece + " fitted"] += boxes is not None
+                tally[piece + " fitted"] += found is not None
         cells = "".join(f"{tally[p + ' fitted']}/{tally[p + ' tried']}".rjust(12) for p in _PIECES)
         lines.append(f"{kind:14}{tally['']:>7}{tally['no seat']:>9}{tally['no bed']:>8}{tally['cut']:>6}" + cells)
     return "\n".join(lines)

@@ -11,73 +11,39 @@ import numpy as np
 from ..core.root import RootPath
 from ..core.skeleton import SEAT_TO_PELVIS, joint
 from .boxes import NO_BOXES, box, placed
+from .flesh import FAR, NO_BANK, Furnishing, box_clearance, nearest_box, pressed, probes
+from .real_pieces import LIES_OVER, bed_shape_for, seat_shape_for, stray_shape
+from .rests import Rest, resting
+from .shapes import PELVIS_OVER, ShapeBank
 from .uses import Use, lying, reaching, runs, stroking, working
 
 __all__ = [
-    "Rest", "SeatKind", "rest_of", "resting", "probes", "seat_for", "desk_for", "board_for", "scattered", "fitted", "furnished",
+    "SeatKind", "seat_for", "desk_for", "board_for", "scattered", "fitted", "furnished",
 ]
 
-_PROBES = [  # bone from, bone to, share of the way, radius of the flesh there
-    ("pelvis", "pelvis", 0.0, 0.09), ("left_hip", "left_knee", 0.5, 0.06), ("right_hip", "right_knee", 0.5, 0.06),
-    ("left_hip", "left_knee", 0.0, 0.08), ("right_hip", "right_knee", 0.0, 0.08),
-    ("left_knee", "left_ankle", 0.0, 0.05), ("right_knee", "right_ankle", 0.0, 0.05),
-    *((f"{side}_knee", f"{side}_ankle", share, 0.05) for side in ("left", "right") for share in (0.25, 0.5, 0.75)),
-    *((f"{side}_hip", f"{side}_knee", share, 0.06) for side in ("left", "right") for share in (0.25, 0.75)),
-    ("left_ankle", "left_foot", 0.0, 0.05), ("right_ankle", "right_foot", 0.0, 0.05),
-    ("left_foot", "left_foot", 0.0, 0.04), ("right_foot", "right_foot", 0.0, 0.04),
-    ("spine1", "spine2", 0.5, 0.10), ("spine3", "neck", 0.3, 0.10), ("neck", "head", 1.0, 0.10),
-    ("left_shoulder", "left_elbow", 0.0, 0.07), ("right_shoulder", "right_elbow", 0.0, 0.07),
-    ("left_shoulder", "left_elbow", 0.6, 0.05), ("right_shoulder", "right_elbow", 0.6, 0.05),
-    ("left_elbow", "left_wrist", 0.0, 0.04), ("right_elbow", "right_wrist", 0.0, 0.04),
-    ("left_elbow", "left_wrist", 0.5, 0.04), ("right_elbow", "right_wrist", 0.5, 0.04),
-    ("left_elbow", "left_wrist", 1.0, 0.04), ("right_elbow", "right_wrist", 1.0, 0.04),
-    ("left_elbow", "left_wrist", 1.35, 0.04), ("right_elbow", "right_wrist", 1.35, 0.04),
-]
-_FROM = np.array([joint(p[0]) for p in _PROBES])
-_TO = np.array([joint(p[1]) for p in _PROBES])
-_SHARE = np.array([p[2] for p in _PROBES])[:, None]
-_RADIUS = np.array([p[3] for p in _PROBES])
-_MIN_REST = 8
-_FAR = 0.3
 _TRIES = 16
 _ONE_SEAT = 0.25
 _ON_THE_FLOOR = 0.22  # a pelvis that rests lower than this sits on the floor
 _HALF_DOWN = 0.80
+_REAL, _REAL_STRAY = 0.7, 0.5  # of what carries a body, and of what stands about, where there are real pieces
 _NEAR_BY = 0.8
 _LIKELY = {"desk": 0.95, "board": 0.8, "shelf": 0.6, "spare desk": 0.35}
 _STANDS_BEFORE = 0.2  # metres a second: a slower body may have a desk before it, too
-_SOFT = 0.4  # of the seats that may be
-
-
-def _pressed(rest: float, **parts: float) -> np.ndarray:
-    """Metres by which each probe's flesh may give: ``rest``, or what is said of a part of the body."""
-    out = np.full(len(_PROBES), rest)
-    for i, (start, end, share, _) in enumerate(_PROBES):
-        if "wrist" in end:
-            name = "hand" if share > 1 else "wrist" if share == 1 else "elbow"
-        elif start.endswith("hip"):
-            name = "thigh" if share else "hip"
-        elif start.endswith("shoulder"):
-            name = "elbow" if share else "shoulder"
-        else:
-            name = {"pelvis": "hip", "spine1": "trunk", "spine3": "trunk", "neck": "head"}.get(start, "")
-        out[i] = parts.get(name, rest)
-    return out
 
 
 # The hand's probe lies where a stretched wrist would carry it; on a top or a board the wrist bends.
-_ON_SEAT = _pressed(0.025, hip=0.07, thigh=0.07)
-_SINKS = _pressed(0.0, hip=1.0, thigh=1.0)
-_ON_BED = _pressed(0.06, hip=0.08, thigh=0.08, trunk=0.08, head=0.10, shoulder=0.09, elbow=0.10, wrist=0.09, hand=0.10)
-_ON_DESK = _pressed(0.0, wrist=0.035, hand=0.09, elbow=0.03)
-_ON_BOARD = _pressed(0.0, wrist=0.01, hand=0.12)
+_ON_SEAT = pressed(0.025, hip=0.07, thigh=0.07)
+_SINKS = pressed(0.0, hip=1.0, thigh=1.0)
+_ON_BED = pressed(0.14, hip=0.18, thigh=0.18, trunk=0.18, head=0.20, shoulder=0.19, elbow=0.20, wrist=0.19, hand=0.20)
+_ON_DESK = pressed(0.0, wrist=0.035, hand=0.09, elbow=0.03)
+_ON_BOARD = pressed(0.0, wrist=0.01, hand=0.12)
 _STYLES = ("block", "legs", "legs", "column", "panels")
 
 
 @dataclass(frozen=True)
 class SeatKind:
     """Ranges of a kind of seat in metres: half its width, what lies behind and before the pelvis, thickness; how often it has a
-    back and arms; what may carry it; whether it is ever soft.
+    back and arms; how far over its surface it carries a pelvis; what may carry it.
     """
 
     half_width: tuple[float, float]
@@ -86,82 +52,24 @@ class SeatKind:
     thick: tuple[float, float]
     backed: float
     armed: float
+    over: float
     styles: tuple[str, ...] = _STYLES
-    soft: bool = False
 
 
 _SEATS = (
-    SeatKind((0.15, 0.22), (0.12, 0.2), (0.1, 0.25), (0.03, 0.08), 0.0, 0.0),  # stool
-    SeatKind((0.18, 0.26), (0.14, 0.30), (0.14, 0.36), (0.03, 0.08), 0.85, 0.2, ("legs", "legs", "panels")),  # chair
-    SeatKind((0.22, 0.30), (0.15, 0.30), (0.14, 0.36), (0.05, 0.10), 0.9, 0.6, ("column",)),  # office chair
-    SeatKind((0.5, 1.0), (0.12, 0.25), (0.12, 0.3), (0.03, 0.12), 0.2, 0.0, ("block", "legs", "panels")),  # bench
-    SeatKind((0.27, 0.36), (0.18, 0.35), (0.2, 0.42), (0.1, 0.25), 0.9, 0.8, ("block", "legs"), soft=True),  # armchair
-    SeatKind((0.5, 1.1), (0.18, 0.35), (0.2, 0.42), (0.1, 0.25), 0.9, 0.7, ("block", "legs"), soft=True),  # sofa
-    SeatKind((0.3, 1.0), (0.3, 0.6), (0.04, 0.14), (0.03, 0.3), 0.3, 0.0, ("block", "legs", "panels")),  # its edge
+    SeatKind((0.15, 0.22), (0.12, 0.2), (0.1, 0.25), (0.03, 0.08), 0.0, 0.0, PELVIS_OVER["stool"]),
+    SeatKind(
+        (0.18, 0.26), (0.14, 0.30), (0.14, 0.36), (0.02, 0.08), 0.85, 0.2, PELVIS_OVER["chair"], ("legs", "legs", "panels")
+    ),
+    SeatKind((0.22, 0.30), (0.15, 0.30), (0.14, 0.36), (0.05, 0.10), 0.9, 0.6, PELVIS_OVER["armchair"], ("column",)),  # office
+    SeatKind((0.5, 1.0), (0.12, 0.25), (0.12, 0.3), (0.03, 0.12), 0.2, 0.0, PELVIS_OVER["bench"], ("block", "legs", "panels")),
+    SeatKind((0.27, 0.36), (0.18, 0.35), (0.2, 0.42), (0.12, 0.25), 0.9, 0.8, PELVIS_OVER["armchair"], ("block", "legs")),
+    SeatKind((0.5, 1.1), (0.18, 0.35), (0.2, 0.42), (0.15, 0.3), 0.9, 0.7, PELVIS_OVER["sofa"], ("block", "legs")),
+    SeatKind((0.3, 1.0), (0.3, 0.6), (0.04, 0.14), (0.02, 0.07), 0.1, 0.0, PELVIS_OVER["table"], ("legs", "panels")),  # edges
+    SeatKind((0.5, 1.0), (0.3, 0.6), (0.06, 0.2), (0.15, 0.3), 0.3, 0.0, PELVIS_OVER["bed"], ("block", "legs")),
 )
-_SEAT_SHARES = (0.14, 0.27, 0.15, 0.10, 0.10, 0.14, 0.10)
-
-
-@dataclass(frozen=True)
-class Rest:
-    """A seated episode: in frames ``start`` to ``end`` (exclusive) the pelvis rests at ``position`` (3,), facing ``yaw``."""
-
-    start: int
-    end: int
-    position: np.ndarray
-    yaw: float
-
-
-def rest_of(joints: np.ndarray, path: RootPath, start: int, end: int) -> Rest:
-    """The seated episode of a clip (T, 22, 3) in these frames."""
-    return Rest(start, end, np.median(joints[start:end, 0], axis=0), float(np.median(path.yaw[start:end])))
-
-
-def resting(joints: np.ndarray, path: RootPath) -> list[Rest]:
-    """Seated episodes of a clip (T, 22, 3): the pelvis low and still, the trunk upright, for a quarter of a second or more."""
-    pelvis = joints[:, 0]
-    speed = np.linalg.norm(np.gradient(pelvis, axis=0), axis=-1) * 30.0 if len(pelvis) > 2 else np.zeros(len(pelvis))
-    trunk = joints[:, joint("neck")] - pelvis
-    upright = trunk[:, 2] > 0.6 * np.linalg.norm(trunk, axis=-1)
-    # In a squat the heels are under the hips; on a seat the knees reach forward and the shins stand.
-    ankles = (joints[:, joint("left_ankle")] + joints[:, joint("right_ankle")]) / 2
-    ahead = np.linalg.norm((ankles - pelvis)[:, :2], axis=-1) > 0.15
-    still = (pelvis[:, 2] < 0.88) & (speed < 0.12) & upright & ahead
-    return [rest_of(joints, path, start, end) for start, end in runs(still, _MIN_REST)]
-
-
-def probes(joints: np.ndarray, step: int = 3) -> np.ndarray:
-    """Points (N, P, 3) of the body's flesh at every ``step``-th frame; their radii are known to this module."""
-    j = joints[::step]
-    return j[:, _FROM] + (j[:, _TO] - j[:, _FROM]) * _SHARE
-
-
-def _nearest(boxes: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Signed distance (N,) of points (N, 3) to the nearest of the boxes: ``boxes.distances``, axis by axis for speed."""
-    x, y, z = (points[:, i] - boxes[:, i, None] for i in range(3))
-    c, s = np.cos(boxes[:, 6, None]), np.sin(boxes[:, 6, None])
-    turned = c * x + s * y, c * y - s * x, z
-    qx, qy, qz = (np.abs(q) - boxes[:, 3 + i, None] for i, q in enumerate(turned))
-    inside = np.minimum(np.maximum(np.maximum(qx, qy), qz), 0.0)
-    outside = np.sqrt(np.maximum(qx, 0.0) ** 2 + np.maximum(qy, 0.0) ** 2 + np.maximum(qz, 0.0) ** 2)
-    return (outside + inside).min(0)
-
-
-def _clearance(boxes: np.ndarray, points: np.ndarray, pressed: float | np.ndarray = 0.0) -> float:
-    """How far (metres) the flesh about the probes (N, P, 3) stays from the boxes at least; negative where it cuts them.
-
-    ``pressed`` (a number, or one per probe) is let off: flesh gives where it rests on something. Far probes count as 0.3 m.
-    """
-    flat = points.reshape(-1, 3)
-    limits = np.broadcast_to(_RADIUS - pressed, points.shape[:2]).reshape(-1)
-    if not len(boxes):
-        return _FAR
-    centre = boxes[:, :2].mean(0)
-    span = np.linalg.norm(boxes[:, :2] - centre, axis=1).max() + np.linalg.norm(boxes[:, 3:5], axis=1).max() + _FAR
-    near = ((flat[:, :2] - centre) ** 2).sum(1) < (span + 0.1) ** 2
-    if not near.any():
-        return _FAR
-    return min(_FAR, float((_nearest(boxes, flat[near]) - limits[near]).min()))
+_SEAT_SHARES = (0.16, 0.25, 0.13, 0.11, 0.09, 0.13, 0.06, 0.07)
+_HIGH_SEAT = 0.58  # metres over the floor: from there on feet may have a rest of their own
 
 
 def _carrier(
@@ -181,8 +89,77 @@ def _carrier(
         return [box((0, front - 0.02, under / 2), (2 * x, 0.04, under))]
     if style == "column":
         t, foot = rng.uniform(0.05, 0.12), rng.uniform(0.3, 0.5)
-        return [box((0, middle, under / 2), (t, t, under)), box((0, middle, 0.03), (foot, foot, 0.06))]
+        column = box((0, middle, under / 2), (t, t, under))
+        if rng.random() < 0.5:
+            return [column, box((0, middle, 0.03), (foot, foot, 0.06))]
+        star = [np.pi / 2 + 2 * np.pi * k / 5 for k in range(5)]
+        arms = [(foot / 4 * np.cos(a), middle + foot / 4 * np.sin(a), 0.06) for a in star]
+        return [column, *(box(arm, (foot / 2, 0.04, 0.08), a) for arm, a in zip(arms, star, strict=True))]
     return [box((sx * (x - 0.02), middle, under / 2), (0.04, depth, under)) for sx in (-1, 1)]
+
+
+def _surface(rng: np.random.Generator, kind: SeatKind, top: float, thick: float, x: float, back: float, front: float
+             ) -> list[np.ndarray]:
+    """What one sits on, from ``back`` to ``front`` (y), ``x`` to either side: whole, of slats, open in the middle, cushioned."""
+    middle, depth = (front + back) / 2, front - back
+    style = rng.choice(["whole", "slats", "open", "cushion"], p=[0.6, 0.16, 0.08, 0.16])
+    if style == "slats" and thick < 0.09:
+        count = int(rng.integers(4, 8))
+        each = depth / (count - 0.4)
+        return [box((0, back + each * (k + 0.3), top - thick / 2), (2 * x, 0.6 * each, thick)) for k in range(count)]
+    if style == "open" and thick < 0.09 and min(2 * x, depth) > 0.3:
+        rim = rng.uniform(0.09, 0.13)
+        sides = [box((s * (x - rim / 2), middle, top - thick / 2), (rim, depth, thick)) for s in (-1, 1)]
+        ends = [box((0, y, top - thick / 2), (2 * x, rim, thick)) for y in (back + rim / 2, front - rim / 2)]
+        return sides + ends
+    if style == "cushion" and thick > 0.05:
+        pad = min(0.6 * thick, rng.uniform(0.03, 0.12))
+        inset = rng.uniform(0.0, 0.03)
+        return [
+            box((0, middle, top - pad - (thick - pad) / 2), (2 * x, depth, thick - pad)),
+            box((0, middle, top - pad / 2), (2 * (x - inset), depth - inset, pad)),
+        ]
+    return [box((0, middle, top - thick / 2), (2 * x, depth, thick))]
+
+
+def _back(rng: np.random.Generator, thick: float, top: float, x: float, back: float) -> list[np.ndarray]:
+    """A back behind ``back`` (y): one board, bars across or upright, leaning away from the sitter in steps."""
+    height, low = rng.uniform(0.25, 0.6), rng.choice([0.0, rng.uniform(0.05, 0.2)]) if thick < 0.06 else 0.0
+    at = back - thick / 2 + rng.uniform(0, 0.03)
+    style = rng.choice(["board", "across", "upright", "leaning"], p=[0.4, 0.2, 0.12, 0.28])
+    if style == "across" and thick < 0.09:
+        count = int(rng.integers(2, 5))
+        bar = rng.uniform(0.04, 0.09)
+        heights = np.linspace(top + max(low, 0.06), top + height, count)
+        posts = [box((s * (x - 0.02), at, top + height / 2), (0.04, thick, height)) for s in (-1, 1)]
+        return posts + [box((0, at, z), (2 * x, 0.6 * thick, bar)) for z in heights]
+    if style == "upright" and thick < 0.09:
+        bars = [box((s, at, top + height / 2), (0.03, thick, height)) for s in np.linspace(-x + 0.02, x - 0.02, 5)]
+        return [*bars, box((0, at, top + height), (2 * x, thick, 0.05))]
+    if style == "leaning":
+        count, lean = 4, np.tan(np.radians(rng.uniform(6.0, 28.0)))
+        part = (height - low) / count
+        rises = [low + part * (k + 0.5) for k in range(count)]
+        return [box((0, at - lean * rise, top + rise), (2 * x, thick, 1.05 * part)) for rise in rises]
+    return [box((0, at, top + (low + height) / 2), (2 * x, thick, height - low))]
+
+
+def _arms(rng: np.random.Generator, kind: SeatKind, thick: float, top: float, x: float, back: float, front: float
+          ) -> list[np.ndarray]:
+    """Arms to both sides: closed down to the floor or the seat, or a rest on two posts."""
+    height = rng.uniform(0.12, 0.25)
+    # The arms of an office chair hang on its seat; others stand on the floor.
+    foot = top if kind.styles == ("column",) else 0.0
+    middle, depth = (front + back) / 2, front - back
+    if thick < 0.08 and rng.random() < 0.6:
+        rests = [box((s * (x + thick / 2), middle, top + height - 0.02), (thick, 0.8 * depth, 0.04)) for s in (-1, 1)]
+        ys = (middle - 0.35 * depth, middle + 0.35 * depth)
+        posts = [
+            box((s * (x + thick / 2), y, (foot + top + height) / 2), (0.03, 0.03, top + height - foot)) for s in (-1, 1) for y in ys
+        ]
+        return rests + posts
+    size = (thick, depth, top + height - foot)
+    return [box((s * (x + thick / 2), middle, (top + height + foot) / 2), size) for s in (-1, 1)]
 
 
 def _seat(rng: np.random.Generator, top: float, kind: SeatKind, small: float) -> tuple[np.ndarray, np.ndarray]:
@@ -195,20 +172,16 @@ def _seat(rng: np.random.Generator, top: float, kind: SeatKind, small: float) ->
     shift = rng.uniform(-room, room) + rng.uniform(-0.03, 0.03)
     back, front = -rng.uniform(*kind.behind), rng.uniform(*kind.before) * small
     thick = min(rng.uniform(*kind.thick), top - 0.03)
-    rows = [box((0, (front + back) / 2, top - thick / 2), (2 * x, front - back, thick))]
+    rows = _surface(rng, kind, top, thick, x, back, front)
     rows += _carrier(rng, top, thick, x, back, front, kind.styles)
+    if top > _HIGH_SEAT and rng.random() < 0.5:
+        rows.append(box((0, front - 0.02, rng.uniform(0.15, top - 0.35)), (2 * x, 0.03, 0.03)))  # for the feet
     extra = []
-    t = rng.uniform(0.03, 0.06) + 0.6 * max(0.0, thick - 0.08)
+    side = rng.uniform(0.03, 0.06) + 0.6 * max(0.0, thick - 0.08)
     if rng.random() < kind.backed:
-        h = rng.uniform(0.25, 0.6)
-        low = rng.choice([0.0, rng.uniform(0.05, 0.2)]) if t < 0.06 else 0.0
-        extra.append(box((0, back - t / 2 + rng.uniform(0, 0.03), top + (low + h) / 2), (2 * x, t, h - low)))
+        extra += _back(rng, side, top, x, back)
     if rng.random() < kind.armed:
-        h = rng.uniform(0.12, 0.25)
-        # The arms of an office chair hang on its seat; others stand on the floor.
-        foot = top if kind.styles == ("column",) else 0.0
-        middle, size = (front + back) / 2, (t, front - back, top + h - foot)
-        extra += [box((s * (x + t / 2), middle, (top + h + foot) / 2), size) for s in (-1, 1)]
+        extra += _arms(rng, kind, side, top, x, back, front)
     both = np.array(rows), (np.array(extra) if extra else NO_BOXES.copy())
     for part in both:
         part[:, 0] += shift
@@ -220,22 +193,21 @@ def seat_for(
 ) -> np.ndarray | None:
     """Boxes of a random seat under a resting pelvis, or None where no try leaves the body's path (``points``) free.
 
-    A ``wanted`` kind of seat is exactly as far under the pelvis as hard seats are, and no stool takes its place.
+    A ``wanted`` kind of seat is exactly as far under the pelvis as it says, and no stool takes its place.
     """
     kind = wanted or _SEATS[rng.choice(len(_SEATS), p=_SEAT_SHARES)]
-    sink = 0.0 if wanted else float(np.clip(rng.normal(0.0, 0.015), -0.04, 0.04))
-    if kind.soft and rng.random() < _SOFT:
-        sink = SEAT_TO_PELVIS - rng.uniform(0.0, 0.06)
+    error = 0.0 if wanted else float(np.clip(rng.normal(0.0, 0.008), -0.02, 0.02))
     for attempt in range(_TRIES):
         if attempt == _TRIES // 2 and not wanted:
             kind = _SEATS[0]  # a plain stool fits where nothing else does
-        top = rest.position[2] - SEAT_TO_PELVIS + sink
+        over = kind.over + error
+        top = rest.position[2] - over
         carrying, extra = _seat(rng, top, kind, small=1.0 - 0.5 * attempt / _TRIES)
         yaw = rest.yaw + rng.normal(0.0, 0.08)
         carrying, extra = (placed(part, rest.position[:2], yaw) for part in (carrying, extra))
-        if _clearance(carrying, points, _ON_SEAT + max(0.0, sink) * _SINKS) < 0:
+        if box_clearance(carrying, points, _ON_SEAT + max(0.0, SEAT_TO_PELVIS - over) * _SINKS) < 0:
             continue
-        if _clearance(extra, points, 0.02) < 0:
+        if box_clearance(extra, points, 0.02) < 0:
             if attempt < _TRIES // 4:
                 continue
             extra = NO_BOXES
@@ -243,23 +215,30 @@ def seat_for(
     return None
 
 
-def _carried(boxes: np.ndarray, rest: Rest) -> bool:
+def _carried(found: Furnishing, rest: Rest) -> bool:
     """Whether a bed is the seat of this rest as well: one sits down on its edge, a little higher than one lies."""
     at = rest.position - (0.0, 0.0, SEAT_TO_PELVIS)
-    return len(boxes) > 0 and float(_nearest(boxes, at[None])[0]) < 0.1
+    on_box = len(found.boxes) > 0 and float(nearest_box(found.boxes, at[None])[0]) < 0.1
+    return on_box or (len(found.shapes) > 0 and float(found.bank.distances(found.shapes, at[None])[0]) < 0.1)
+
+
+def _beside(use: Use, rests: list[Rest]) -> list[Rest]:
+    """The rests on the edge of where one lies."""
+    middle = use.points.mean(0)
+    return [rest for rest in rests if np.linalg.norm((rest.position - middle)[:2]) < _NEAR_BY]
 
 
 def _bed_for(rng: np.random.Generator, use: Use, points: np.ndarray, rests: list[Rest]) -> np.ndarray | None:
     """A bed, or a sofa with its back to one side, under a lying body, head end along +y; it carries the rests beside it too."""
     middle = use.points.mean(0)
-    beside_it = [rest for rest in rests if np.linalg.norm((rest.position - middle)[:2]) < _NEAR_BY]
+    beside_it = _beside(use, rests)
     for attempt in range(_TRIES):
         sofa = rng.random() < 0.35
         x = rng.uniform(0.32, 0.45) if sofa else rng.uniform(0.4, 0.95)
         shift = rng.uniform(-1, 1) * (x - 0.24)
         head, feet = rng.uniform(0.65, 0.95), -rng.uniform(0.9, 1.35) * (1.0 - 0.4 * attempt / _TRIES)
-        top = middle[2] - rng.uniform(0.10, 0.14)
-        thick = min(rng.uniform(0.08, 0.3), top - 0.05)
+        top = middle[2] - LIES_OVER - rng.uniform(0.0, 0.02)
+        thick = min(rng.uniform(0.12, 0.3), top - 0.05)
         rows = [box((shift, (head + feet) / 2, top - thick / 2), (2 * x, head - feet, thick))]
         extra = []
         if sofa:
@@ -273,9 +252,9 @@ def _bed_for(rng: np.random.Generator, use: Use, points: np.ndarray, rests: list
         beside = np.array(extra) if extra else NO_BOXES
         yaw = use.yaw + rng.normal(0.0, 0.05)
         carrying, beside = (placed(part, middle[:2], yaw) for part in (carrying, beside))
-        if _clearance(carrying, points, _ON_BED) < 0 or not all(_carried(carrying[:1], rest) for rest in beside_it):
+        if box_clearance(carrying, points, _ON_BED) < 0 or not all(_carried(Furnishing(carrying[:1]), rest) for rest in beside_it):
             continue
-        return np.concatenate([carrying, beside if _clearance(beside, points, 0.02) >= 0 else NO_BOXES])
+        return np.concatenate([carrying, beside if box_clearance(beside, points, 0.02) >= 0 else NO_BOXES])
     return None
 
 
@@ -304,7 +283,7 @@ def desk_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarr
         desk = np.array(rows)
         desk[:, 0] += (left_side + right_side) / 2
         desk = placed(desk, origin, use.yaw)
-        if _clearance(desk, points, _ON_DESK) >= 0:
+        if box_clearance(desk, points, _ON_DESK) >= 0:
             return desk
     return None
 
@@ -322,7 +301,7 @@ def board_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndar
         lower = 0.0 if rng.random() < 0.3 * share else max(0.0, low - rng.uniform(0.1, 0.5))
         size = (right_side - left_side, thick, upper - lower)
         board = placed(box(((left_side + right_side) / 2, face + thick / 2, (lower + upper) / 2), size)[None], origin, use.yaw)
-        if _clearance(board, points, _ON_BOARD) >= 0:
+        if box_clearance(board, points, _ON_BOARD) >= 0:
             return board
     return None
 
@@ -348,7 +327,7 @@ def _shelf_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.nda
         shelf = np.array(rows)
         shelf[:, 0] += rng.uniform(-0.6, 0.6) * x
         shelf = placed(shelf, origin, use.yaw + rng.normal(0.0, 0.1))
-        if _clearance(shelf, points, _ON_DESK) >= 0:
+        if box_clearance(shelf, points, _ON_DESK) >= 0:
             return shelf
     return None
 
@@ -364,7 +343,7 @@ def _spare_desk(rng: np.random.Generator, rest: Rest, points: np.ndarray) -> np.
     gap = rng.uniform(0.01, 0.08)
     for distance in np.arange(0.2, 1.0, 0.08):
         candidate = placed(desk, rest.position[:2] + distance * forward, rest.yaw)
-        if _clearance(candidate, points) >= gap:
+        if box_clearance(candidate, points) >= gap:
             return candidate
     return None
 
@@ -416,19 +395,19 @@ def scattered(rng: np.random.Generator, points: np.ndarray, path: RootPath, coun
     kept = [NO_BOXES]
     for _ in range(count):
         piece = _piece(rng)
-        wanted = rng.uniform(0.05, 0.2) if rng.random() < 0.5 else _FAR
+        wanted = rng.uniform(0.05, 0.2) if rng.random() < 0.5 else FAR
         for _ in range(5):
             at = path.position[rng.integers(len(path)), :2]
             direction, distance = rng.uniform(0, 2 * np.pi), rng.uniform(0.25, 1.5)
             towards = np.array([np.cos(direction), np.sin(direction)])
             candidate = placed(piece, at + distance * towards, rng.uniform(0, 2 * np.pi))
-            clearance = _clearance(candidate, points)
+            clearance = box_clearance(candidate, points)
             if clearance < 0.03:
                 continue
             for _ in range(4):  # no step can be longer than what is free
                 if clearance > wanted + 0.01:
                     candidate[:, :2] -= (clearance - wanted) * towards
-                    clearance = _clearance(candidate, points)
+                    clearance = box_clearance(candidate, points)
             kept.append(candidate)
             break
     return np.concatenate(kept)
@@ -449,54 +428,82 @@ def _cut_off(joints: np.ndarray, beds: list[Use], rests: list[Rest]) -> bool:
 
 
 def fitted(
-    rng: np.random.Generator, joints: np.ndarray, path: RootPath, points: np.ndarray
-) -> tuple[list[tuple[str, np.ndarray | None]], str]:
-    """What a motion uses, one word each, with the boxes fitted to it or None where none could be had; and what is missing.
+    rng: np.random.Generator, joints: np.ndarray, path: RootPath, points: np.ndarray, bank: ShapeBank = NO_BANK
+) -> tuple[list[tuple[str, Furnishing | None]], str]:
+    """What a motion uses, one word each, with the furniture fitted to it or None where none could be had; and what is missing.
 
-    Hands may as well work in the air: now and then theirs is not tried, and not in the list. A "spare desk" stands before some
-    who sit or stand, and nobody uses it: a desk alone is no reason to sit down.
+    Where a ``bank`` of real pieces is given, most of what carries a body is one of them. Hands may as well work in the air: now
+    and then theirs is not tried, and not in the list. A "spare desk" stands before some who sit or stand, and nobody uses it: a
+    desk alone is no reason to sit down.
     """
     beds, rests = lying(joints), resting(joints, path)
     if _cut_off(joints, beds, rests):
         return [], "cut"
-    pieces = [("bed", _bed_for(rng, use, points, rests)) for use in beds]
-    carrying = np.concatenate([NO_BOXES, *(rows for _, rows in pieces if rows is not None)])
+    pieces = [("bed", _bed(rng, bank, use, points, rests)) for use in beds]
     places: list[Rest] = []
     for rest in rests:
         apart = all(np.linalg.norm(rest.position - other.position) > _ONE_SEAT for other in places)
-        if apart and rest.position[2] > _ON_THE_FLOOR and not _carried(carrying, rest):
+        on_bed = any(found is not None and _carried(found, rest) for _, found in pieces)
+        if apart and rest.position[2] > _ON_THE_FLOOR and not on_bed:
             places.append(rest)
-    pieces += [("seat", seat_for(rng, place, points)) for place in places]
-    missing = next((kind for kind, rows in pieces if rows is None), "")
+    pieces += [("seat", _seat_under(rng, bank, place, points)) for place in places]
+    missing = next((kind for kind, found in pieces if found is None), "")
     if not missing:
         # Hands get one piece, as pieces do not know of one another; a top first, as a hand that moves to and fro has both.
         reaches = reaching(joints, path)
         for use in working(joints, path) + stroking(joints, path) or [reaches[i] for i in rng.permutation(len(reaches))]:
             kind = use.kind
             if rng.random() < _LIKELY[kind]:
-                pieces.append((kind, _FITS[kind](rng, use, points)))
+                pieces.append((kind, _furnishing(_FITS[kind](rng, use, points))))
                 if pieces[-1][1] is not None:
                     break
         place = places[0] if places else _standing_place(path)
-        bare = all(kind not in ("desk", "bed") or rows is None for kind, rows in pieces)
+        bare = all(kind not in ("desk", "bed") or found is None for kind, found in pieces)
         if place is not None and bare and rng.random() < _LIKELY["spare desk"]:
-            pieces.append(("spare desk", _spare_desk(rng, place, points)))
+            pieces.append(("spare desk", _furnishing(_spare_desk(rng, place, points))))
     return pieces, missing
 
 
-def furnished(rng: np.random.Generator, joints: np.ndarray, path: RootPath) -> tuple[np.ndarray | None, str]:
-    """All boxes (B, 7) of a room for one motion (T, 22, 3) with its root path, what the body uses and random pieces, and "".
+def _furnishing(boxes: np.ndarray | None) -> Furnishing | None:
+    return None if boxes is None else Furnishing(boxes)
+
+
+def _seat_under(rng: np.random.Generator, bank: ShapeBank, rest: Rest, points: np.ndarray) -> Furnishing | None:
+    """A real seat where there is one to be had, else one of boxes."""
+    real = len(bank) > 0 and rng.random() < _REAL
+    return (seat_shape_for(rng, bank, rest, points) if real else None) or _furnishing(seat_for(rng, rest, points))
+
+
+def _bed(
+    rng: np.random.Generator, bank: ShapeBank, use: Use, points: np.ndarray, rests: list[Rest]
+) -> Furnishing | None:
+    """A real bed or sofa where there is one to be had, else one of boxes."""
+    real = len(bank) > 0 and rng.random() < _REAL
+    found = bed_shape_for(rng, bank, use, points, _beside(use, rests)) if real else None
+    return found or _furnishing(_bed_for(rng, use, points, rests))
+
+
+def furnished(
+    rng: np.random.Generator, joints: np.ndarray, path: RootPath, bank: ShapeBank = NO_BANK
+) -> tuple[Furnishing | None, str]:
+    """A room for one motion (T, 22, 3) with its root path: what the body uses and random pieces, and "".
 
     Or None and one word for why not: "seat" or "bed", that could not be had, or "cut", where the motion begins or ends half-way
     down to one. A desk, board or shelf that does not fit is left out. Paper, section 5.2.
     """
     points = probes(joints)
-    pieces, missing = fitted(rng, joints, path, points)
+    pieces, missing = fitted(rng, joints, path, points, bank)
     if missing:
         return None, missing
     count = int(rng.integers(1, 5)) if rng.random() < 0.8 else 0
-    used = [rows for _, rows in pieces if rows is not None]
-    return np.concatenate([NO_BOXES, *used, scattered(rng, points, path, count)]), ""
+    real = rng.binomial(count, _REAL_STRAY) if len(bank) else 0
+    room = Furnishing(scattered(rng, points, path, count - real), bank=bank)
+    for _ in range(real):
+        room = room + stray_shape(rng, bank, points, path)
+    for _, found in pieces:
+        if found is not None:
+            room = found + room
+    return room, ""
 
 
 _FITS = {"desk": desk_for, "board": board_for, "shelf": _shelf_for}

@@ -17,7 +17,7 @@ from ..core.root import RootPath, raw_root_from_joints
 from ..core.rotations import yaw_matrix
 from ..core.solids import Box, Scene
 from .canonical import calibrate, canonical
-from .furniture import Rest, rest_of
+from .rests import Rest, rest_of
 from .joins import joined
 from .mocap import Clip, read_clips
 from .prepare import load_motions

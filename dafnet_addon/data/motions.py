@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .furniture import Rest
+from .rests import Rest
 from .windows import Motion
 
 __all__ = ["Draws", "write_motions", "read_motions"]

@@ -35,7 +35,9 @@ from ..core.skeleton import REST, SEAT_TO_PELVIS, joint
 from .boxes import distances
 from .compose import LEANS, at_board, at_top, seated_work
 from .contacts import contacts
-from .furniture import Rest, SeatKind, board_for, desk_for, probes, rest_of, resting, seat_for
+from .flesh import probes
+from .furniture import SeatKind, board_for, desk_for, seat_for
+from .rests import Rest, rest_of, resting
 from .held_out import HeldClip, fingerprint, is_frozen
 from .joins import joined
 from .pieces import DIRECTIONS, TOELESS, Pool, features_of, fluent, matches_of, pool_of, sit_downs, upper_bodies
@@ -63,8 +65,8 @@ class _Kind:
     chair: SeatKind | None = None
 
 
-_CHAIR = SeatKind((0.20, 0.25), (0.13, 0.26), (0.10, 0.28), (0.03, 0.06), 1.0, 0.0, ("legs", "column"))
-_WIDE = SeatKind((0.30, 0.42), (0.14, 0.28), (0.10, 0.30), (0.03, 0.08), 1.0, 0.0, ("legs", "panels"))
+_CHAIR = SeatKind((0.20, 0.25), (0.13, 0.26), (0.10, 0.28), (0.03, 0.06), 1.0, 0.0, SEAT_TO_PELVIS, ("legs", "column"))
+_WIDE = SeatKind((0.30, 0.42), (0.14, 0.28), (0.10, 0.30), (0.03, 0.08), 1.0, 0.0, SEAT_TO_PELVIS, ("legs", "panels"))
 _KINDS = {
     "low chair": _Kind(6, 2, (0.38, 0.42), None, _CHAIR),
     "high wide chair": _Kind(6, 3, (0.50, 0.55), None, _WIDE),

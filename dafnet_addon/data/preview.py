@@ -6,8 +6,10 @@ import numpy as np
 
 from ..core.root import root_from_joints
 from .contacts import contacts
+from .flesh import NO_BANK
 from .furniture import furnished
 from .motions import Draws
+from .shapes import ShapeBank
 from .sheet import sheet
 from .windows import Motion
 
@@ -17,17 +19,19 @@ _BEFORE, _AFTER = 100, 120  # frames about a moment
 _TRIES = 10
 
 
-def preview(file: Path, motions: list[Motion], draws: Draws, rng: np.random.Generator, each: int = 1) -> None:
+def preview(
+    file: Path, motions: list[Motion], draws: Draws, rng: np.random.Generator, each: int = 1, bank: ShapeBank = NO_BANK
+) -> None:
     """Draw ``each`` moments of every kind into ``file`` (.png), with furniture as training fits it."""
     rows, touching = [], []
     for kind, (moments, weights) in draws.items():
         shown = 0
         for i, frame in moments[rng.choice(len(moments), _TRIES * each, p=weights)]:
             joints = motions[i].joints[max(0, frame - _BEFORE) : frame + _AFTER]
-            boxes, _ = furnished(rng, joints, root_from_joints(joints))
-            if boxes is None or shown == each:
+            room, _ = furnished(rng, joints, root_from_joints(joints), bank)
+            if room is None or shown == each:
                 continue
             shown += 1
-            rows.append((f"{kind}: {motions[i].source}, {motions[i].name}", joints, boxes))
+            rows.append((f"{kind}: {motions[i].source}, {motions[i].name}", joints, room))
             touching.append(contacts(joints))
     sheet(file, rows, contacts=touching)

@@ -14,13 +14,14 @@ from ..core.files import whole_file
 from ..core.root import root_from_joints
 from ..core.rotations import normalised, rotate, yaw_matrix
 from ..core.skeleton import PARENTS, joint
+from .flesh import Furnishing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["sheet"]
 
-Row = tuple[str, np.ndarray, np.ndarray | None]
+Row = tuple[str, np.ndarray, Furnishing | None]
 Cell = tuple[float, float, float, float]  # left, bottom, width, height
 
 _LEFT, _RIGHT, _TRUNK = "#1f6fb4", "#e0701a", "#3a3a3a"
@@ -43,10 +44,12 @@ def _camera(yaw: float) -> np.ndarray:
     return np.stack([right, np.cross(toward, right), toward]) @ yaw_matrix(np.array(-yaw))
 
 
-def _wireframe(boxes: np.ndarray) -> np.ndarray:
-    """(12 B, 2, 3) edges of the boxes (B, 7)."""
+def _wireframe(room: Furnishing) -> np.ndarray:
+    """(N, 2, 3) edges of the boxes, and dots on the surfaces of the shapes."""
+    boxes = room.boxes
     corners = rotate(yaw_matrix(boxes[:, None, 6]), _CORNERS * boxes[:, None, 3:6]) + boxes[:, None, :3]
-    return corners[:, _EDGES].reshape(-1, 2, 3)
+    dots = room.bank.surface(room.shapes)
+    return np.concatenate([corners[:, _EDGES].reshape(-1, 2, 3), np.stack([dots, dots + (0.0, 0.0, 0.012)], axis=1)])
 
 
 def _lines(ax: "Axes", segments: np.ndarray, colours: str | list[str], width: float, cell: Cell) -> None:
@@ -59,7 +62,7 @@ def _lines(ax: "Axes", segments: np.ndarray, colours: str | list[str], width: fl
 
 
 def _figure(
-    ax: "Axes", pose: np.ndarray, yaw: float, boxes: np.ndarray | None, contacts: np.ndarray | None, camera: np.ndarray,
+    ax: "Axes", pose: np.ndarray, yaw: float, room: Furnishing | None, contacts: np.ndarray | None, camera: np.ndarray,
     cell: Cell,
 ) -> None:
     """One pose (22, 3) in its cell, the camera following the pelvis along the floor."""
@@ -74,8 +77,8 @@ def _figure(
     grid = [((x, low[1], 0), (x, high[1], 0)) for x in np.arange(low[0], high[0] + 1)]
     grid += [((low[0], y, 0), (high[0], y, 0)) for y in np.arange(low[1], high[1] + 1)]
     _lines(ax, seen(np.array(grid, dtype=float)), _FAINT, 0.5, cell)
-    if boxes is not None and len(boxes):
-        _lines(ax, seen(_wireframe(boxes)), _FURNITURE, 0.8, cell)
+    if room is not None and len(room):
+        _lines(ax, seen(_wireframe(room)), _FURNITURE, 0.8, cell)
 
     forward = rotate(yaw_matrix(np.array(yaw)), np.array([0.0, 1.0, 0.0]))
     start, end = seen(np.stack([ground, ground + 0.38 * forward]))
@@ -96,7 +99,7 @@ def _figure(
 
 
 def _plan(
-    ax: "Axes", joints: np.ndarray, yaw: np.ndarray, boxes: np.ndarray | None, frames: np.ndarray, cell: Cell,
+    ax: "Axes", joints: np.ndarray, yaw: np.ndarray, room: Furnishing | None, frames: np.ndarray, cell: Cell,
 ) -> None:
     """The pelvis' path from above, with hips, shoulders and facing at the frames shown, and a bar of one metre."""
     path = joints[:, 0, :2]
@@ -108,8 +111,8 @@ def _plan(
     def seen(points: np.ndarray) -> np.ndarray:
         return (points[..., :2] - middle) * scale + corner
 
-    if boxes is not None and len(boxes):
-        _lines(ax, seen(_wireframe(boxes)), _FURNITURE, 0.8, cell)
+    if room is not None and len(room):
+        _lines(ax, seen(_wireframe(room)), _FURNITURE, 0.8, cell)
     _lines(ax, seen(np.stack([path[:-1], path[1:]], 1)), _TRUNK, 0.8, cell)
     for frame in frames:
         pose = joints[frame]
@@ -132,7 +135,7 @@ def sheet(
 ) -> None:
     """Draw a contact sheet into ``file`` (.png or .svg).
 
-    A row is a title, joints (T, 22, 3) at 30 fps in world metres, and boxes (B, 7) or None; it is shown at ``columns`` times
+    A row is a title, joints (T, 22, 3) at 30 fps in world metres, and furniture or None; it is shown at ``columns`` times
     spread over its length. ``contacts`` holds (T, 5) booleans for each row (left foot, right foot, left hand, right hand,
     pelvis), or None.
     """
@@ -145,7 +148,7 @@ def sheet(
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     ax.set(xlim=(0, across), ylim=(-down, 0), aspect="equal")
     ax.axis("off")
-    for r, (title, joints, boxes) in enumerate(rows):
+    for r, (title, joints, room) in enumerate(rows):
         yaw = root_from_joints(joints).yaw
         frames = np.linspace(0, len(joints) - 1, columns).round().astype(int)
         # One camera a row, set by where the body mostly faces.
@@ -154,9 +157,9 @@ def sheet(
         touching = None if contacts is None else contacts[r]
         for c, frame in enumerate(frames):
             cell = (c * _WIDTH, bottom, _WIDTH, _HEIGHT)
-            _figure(ax, joints[frame], float(yaw[frame]), boxes, None if touching is None else touching[frame], camera, cell)
+            _figure(ax, joints[frame], float(yaw[frame]), room, None if touching is None else touching[frame], camera, cell)
             ax.text((c + 0.5) * _WIDTH, bottom + 0.04, f"{frame / 30:.1f} s", ha="center", va="bottom", fontsize=6)
-        _plan(ax, joints, yaw, boxes, frames, (columns * _WIDTH, bottom, _HEIGHT, _HEIGHT - 0.15))
+        _plan(ax, joints, yaw, room, frames, (columns * _WIDTH, bottom, _HEIGHT, _HEIGHT - 0.15))
         ax.text(0.05, bottom + _HEIGHT - 0.03, title, ha="left", va="top", fontsize=8, weight="bold")
         ax.plot([0, across], [bottom, bottom], color=_FAINT, lw=0.8)
     with whole_file(file) as part:

@@ -12,8 +12,11 @@ from ..core.root import RootPath, ahead, root_from_joints, smoothed, to_root, ve
 from ..core.skeleton import MIRROR, joint
 from .boxes import near
 from .cuts import bad_frames
-from .furniture import Rest, furnished, resting
+from .flesh import NO_BANK
+from .furniture import furnished
+from .rests import Rest, resting
 from .retarget import at_seat_height
+from .shapes import ABSENT_SHAPE, SHAPES, ShapeBank
 
 __all__ = ["COMPOSED", "HISTORY", "LENGTH", "Motion", "Window", "motion_of", "draw", "mirrored"]
 
@@ -24,7 +27,8 @@ _FRAMES = HISTORY + LENGTH
 _MARGIN = 32  # the root is smoothed over 24 frames and known 30 ahead
 _AROUND = 100  # frames before and after that, in which the body shows what furniture there is
 _HOLD = 45
-_LOWEST, _HIGHEST = 0.40, 0.86  # resting pelvis, metres: seats of 0.28 to 0.74
+_LOWEST, _HIGHEST = 0.36, 0.95  # resting pelvis, metres: from a step of 0.22 to a bar stool of 0.81
+_USUAL = 0.38, 0.66  # metres: the pelvis on sofas and chairs
 _LOWERED = 0.3  # metres; from a high stool further down, every wave of the pelvis would grow
 
 
@@ -44,7 +48,8 @@ class Motion:
 @dataclass(frozen=True)
 class Window:
     """``poses`` (80, 66) in each frame's root, ``velocity`` (80, 3); of the last 70 frames: ``ahead`` (70, 18) and ``root``
-    (70, 3), its place x, y and yaw in the world of ``boxes`` (``boxes.MOST``, 7). Metres, radians.
+    (70, 3), its place x, y and yaw in the world of ``boxes`` (``boxes.MOST``, 7) and ``shapes`` (``shapes.SHAPES``, 5).
+    Metres, radians.
     """
 
     poses: np.ndarray
@@ -52,6 +57,7 @@ class Window:
     ahead: np.ndarray
     root: np.ndarray
     boxes: np.ndarray
+    shapes: np.ndarray
 
 
 def _usable(joints: np.ndarray) -> np.ndarray:
@@ -111,8 +117,29 @@ def _farthest(valid: np.ndarray, frame: int, step: int) -> int:
     return frame
 
 
-def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> Window | None:
-    """One augmented, furnished window, around frame ``focus`` where given; None where this draw cannot be used."""
+def _seat_height(rng: np.random.Generator, height: float) -> float:
+    """Where a pelvis that was captured at rest at this height (metres) shall rest: mostly where furniture carries one."""
+    if rng.random() < 0.2:
+        wanted = height + rng.normal(0, 0.02)
+    else:
+        wanted = rng.uniform(*(_USUAL if rng.random() < 0.6 else (_LOWEST, _HIGHEST)))
+    return float(np.clip(wanted, max(_LOWEST, height - _LOWERED), _HIGHEST))
+
+
+def _near_shapes(placed: np.ndarray, path: RootPath) -> np.ndarray:
+    """The placed shapes nearest to a path, filled up or cut to (SHAPES, 5)."""
+    gap = np.linalg.norm(path.position[None, :, :2] - placed[:, None, 1:3], axis=-1).min(1, initial=np.inf)
+    kept = placed[np.argsort(gap)[:SHAPES]]
+    return np.concatenate([kept, np.tile(ABSENT_SHAPE, (SHAPES - len(kept), 1))])
+
+
+def draw(
+    rng: np.random.Generator, motion: Motion, focus: int | None = None, bank: ShapeBank = NO_BANK
+) -> Window | None:
+    """One augmented, furnished window, around frame ``focus`` where given; None where this draw cannot be used.
+
+    Real pieces of ``bank`` stand among the furniture, where one is given.
+    """
     total = len(motion.joints)
     speed = rng.uniform(0.85, 1.2) if rng.random() < 0.4 else 1.0
     span = int(np.ceil(_FRAMES * speed)) + 2
@@ -131,8 +158,7 @@ def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> 
     rests = [r for r in motion.rests if r.start < high and r.end > low]
     if rests:
         height = float(rests[0].position[2])
-        wanted = rng.uniform(_LOWEST, _HIGHEST) if rng.random() < 0.75 else height + rng.normal(0, 0.02)
-        joints = at_seat_height(joints, height, float(np.clip(wanted, max(_LOWEST, height - _LOWERED), _HIGHEST)))
+        joints = at_seat_height(joints, height, _seat_height(rng, height))
     if speed != 1.0:
         joints = _retimed(joints, speed)
     first = min(round((start - low) / speed), len(joints) - _FRAMES)
@@ -142,8 +168,8 @@ def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> 
     if rng.random() < 0.5:
         joints = mirrored(joints)
     path = root_from_joints(joints)
-    boxes, _ = furnished(rng, joints, path)
-    if boxes is None:
+    room, _ = furnished(rng, joints, path, bank)
+    if room is None:
         return None
     if rng.random() < 0.5:
         path = _animated_by_hand(rng, path)
@@ -152,7 +178,8 @@ def draw(rng: np.random.Generator, motion: Motion, focus: int | None = None) -> 
     recent = RootPath(path.position[cut][HISTORY:], path.yaw[cut][HISTORY:])
     root = np.concatenate([recent.position[:, :2], recent.yaw[:, None]], axis=1)
     return Window(
-        poses, velocities(path)[cut], ahead(path)[cut][HISTORY:], root, near(boxes, recent)
+        poses, velocities(path)[cut], ahead(path)[cut][HISTORY:], root, near(room.boxes, recent),
+        _near_shapes(room.shapes, recent),
     )
 
 

@@ -16,6 +16,8 @@ _CELL = 0.03
 _LOWEST, _HIGHEST, _OVERHEAD = 0.22, 0.85, 1.5  # metres over the floor: of seats; what is higher is no part of one
 _FLAT, _BACK = 0.05, 0.15  # metres over the seat: of what still is seat; of a back or an arm
 _LEAST = 0.035  # square metres
+_ROOM = 0.21  # metres: side of the square that a seat has room for; arms and the rims of backs have not
+_NEARLY = 0.5  # of the roomiest level's area, that a lower level needs to be the seat: cushions and backs lie higher
 _ONE_SIDED = 0.10  # metres between the middles of seat and of what stands up around it, where that is a back
 _BEFORE_BACK, _FROM_EDGE = 0.20, 0.22  # metres between the pelvis and the back; and the front edge, where there is no back
 _SNAP = np.radians(30.0)
@@ -27,13 +29,14 @@ _HALF_WIDTH = 0.28  # metres that a body needs to each side
 @dataclass(frozen=True)
 class SeatPlace:
     """``position`` (2,) of the resting pelvis and ``yaw`` that it faces (``core.root``); ``height`` of the seat's top over the
-    world's zero, metres; whether there is a ``back``.
+    world's zero, metres; whether there is a ``back``; ``aside``: metres to each side within which one may sit as well.
     """
 
     position: np.ndarray
     yaw: float
     height: float
     back: bool
+    aside: float
 
 
 def _hull(points: np.ndarray) -> np.ndarray:
@@ -67,18 +70,40 @@ def _axes(cells: np.ndarray) -> np.ndarray:
     return found
 
 
-def _largest(field: HeightField, floor: float) -> tuple[float, np.ndarray] | None:
-    """Height and cells (N, 2) of the level that most of the furniture's top lies at, among heights to sit at."""
+def _shrunk(mask: np.ndarray, reach: int) -> np.ndarray:
+    """Cells (X, Y) of which all within ``reach`` cells, along both sides, are set."""
+    size = 2 * reach + 1
+    padded = np.pad(mask, reach)
+    rows = np.lib.stride_tricks.sliding_window_view(padded, size, axis=0).all(-1)
+    return np.lib.stride_tricks.sliding_window_view(rows, size, axis=1).all(-1)
+
+
+def _roomy(mask: np.ndarray, reach: int) -> np.ndarray:
+    """The cells (X, Y) of squares that fit into the mask; slits of one or two cells in it, as between slats, are no gap."""
+    closed = ~_shrunk(~np.pad(mask, 1), 1)[1:-1, 1:-1] if mask.any() else mask
+    return ~_shrunk(~_shrunk(closed, reach), reach) & mask
+
+
+def _seat_level(field: HeightField, floor: float) -> tuple[float, np.ndarray] | None:
+    """Height and cells (N, 2) of the level that one sits on: the lowest one that has about as much room as any.
+
+    Backs, arms and cushions are higher than the seat between them, and rims have no room for a body.
+    """
     over = field.top - floor
-    heights = over[(over > _LOWEST) & (over < _HIGHEST)]
-    if not len(heights):
+    reach = max(1, round(0.5 * _ROOM / field.cell))
+    levels = np.arange(_LOWEST, _HIGHEST, 0.02)
+    masks = [_roomy(np.abs(over - level) < _FLAT, reach) for level in levels]
+    room = np.array([mask.sum() for mask in masks])
+    if not room.any():
+        masks = [np.abs(over - level) < _FLAT for level in levels]
+        room = np.array([mask.sum() for mask in masks])
+    if room.max(initial=0) * field.cell**2 < _LEAST:
         return None
-    # The level with most cells within its reach; of equals the lower one, a seat rather than its arms.
-    levels = np.arange(_LOWEST, _HIGHEST, 0.01)
-    count = (np.abs(heights[:, None] - levels) < _FLAT).sum(0)
-    level = float(np.median(heights[np.abs(heights - levels[np.argmax(count)]) < _FLAT]))
-    cells = np.argwhere(np.abs(over - level) < _FLAT)
-    return (level, cells) if len(cells) * field.cell**2 >= _LEAST else None
+    lowest = int(np.argmax(room >= _NEARLY * room.max()))
+    best = lowest + int(np.argmax(room[lowest : lowest + round(2 * _FLAT / 0.02)]))
+    level = float(np.median(over[masks[best]]))
+    cells = np.argwhere(masks[best] & (np.abs(over - level) < _FLAT))
+    return level, cells
 
 
 def on_a_seat(solids: Sequence[Box | Mesh], position: np.ndarray, floor: float = 0.0) -> bool:
@@ -104,7 +129,7 @@ def seat_of(
     found = None
     if len(points):
         field = height_field(points, points[:, :2].min(0), points[:, :2].max(0), _CELL)
-        found = _largest(field, floor)
+        found = _seat_level(field, floor)
     if found is None:
         if not _SMALLEST < (across := extent(solids)) < _LARGEST:
             raise InputError(f"'{name}' is {across * size:.2g} m across: is its unit right? Scale it to the character's size.")
@@ -136,4 +161,4 @@ def seat_of(
     if near is not None and room > 0.0:
         aside = float(np.clip(near @ sideways, aside - room, aside + room))
     position = min(at, high) * forward + aside * sideways
-    return SeatPlace(position, float(np.arctan2(-forward[0], forward[1])), floor + level, back)
+    return SeatPlace(position, float(np.arctan2(-forward[0], forward[1])), floor + level, back, max(room, 0.0))

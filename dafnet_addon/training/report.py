@@ -36,6 +36,7 @@ from ..core.skeleton import SEAT_TO_PELVIS
 from ..core.take import Controls
 from ..core.weights import Weights
 from ..data.boxes import box, placed
+from ..data.flesh import Furnishing
 from ..data.held_out import ACTIVITIES, HeldClip, scene_of
 from ..data.sheet import sheet
 from .batches import NOISE
@@ -460,7 +461,7 @@ def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) ->
         chosen += [of_it[i] for i in np.unique(np.linspace(0, len(of_it) - 1, min(count, len(of_it))).astype(int))]
     takes = in_processes(weights, _calm, chosen, lambda share: None)
     drawn: list[tuple[str, np.ndarray, np.ndarray | None]] = [
-        (f"{clip.name}, {kind}", joints, clip.boxes)
+        (f"{clip.name}, {kind}", joints, Furnishing(clip.boxes))
         for clip, take in zip(chosen, takes, strict=True)
         for kind, joints in (("composed" if clip.composed else "real", clip.joints), ("generated", take))
     ]

@@ -1,0 +1,254 @@
+"""Real pieces of furniture as the training holds them: distance grids in bytes, and the places where one sits on them.
+
+Every piece is kept at a few heights (``FACTORS``), since a grid that is stretched further no longer holds distances; between
+two of them it is stretched by at most ``STRETCH``, which is off by at most 4 mm at the sensor's reach and by nothing on the
+surface. A placed shape is a row: which shape, x and y (metres), yaw (radians, counter-clockwise), stretch of its height.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..core.distance import BAND, DistanceGrid, build_grid
+from ..core.errors import InputError
+from ..core.root import RootPath
+from ..core.rotations import rotate, yaw_matrix
+from ..core.sensor import RADIUS, REACH, SPHERES, occupancy_of_distance
+from ..core.solids import Mesh
+from ..director.seats import seat_of
+from .library import Piece
+
+__all__ = [
+    "ABSENT_SHAPE", "DEEPEST", "FACTORS", "FARTHEST", "NO_SHAPES", "PELVIS_OVER", "SHAPES", "STRETCH", "Seat", "Shape",
+    "ShapeBank", "bank_of", "shapes_of",
+]
+
+PELVIS_OVER = {
+    "table": 0.14, "desk": 0.14, "bench": 0.14, "stool": 0.14, "toilet": 0.11, "chair": 0.11, "armchair": 0.07, "sofa": 0.03,
+    "bed": 0.03,
+}
+"""Metres by which a seated pelvis joint is over the undeformed surface of a kind of furniture: how far one sinks in belongs to
+the piece. Medians over captured sitting on real furniture; half of the pieces of a kind lie within 2 cm.
+"""
+
+FACTORS = (0.8, 0.88, 0.97, 1.07, 1.18)
+"""Heights at which each piece that one sits on is kept, over its true height."""
+STRETCH = 0.05
+"""How far a grid's height may be stretched or pressed together, beside 1."""
+SHAPES = 6
+"""Placed shapes that a training window holds at most."""
+NO_SHAPES = np.zeros((0, 5))
+ABSENT_SHAPE = np.array([-1.0, 0.0, 0.0, 0.0, 1.0])
+"""A row of no shape: fills up the rows of a window."""
+DEEPEST, FARTHEST = -0.05, 0.11
+"""Metres between which distances are kept, in bytes; beyond them they are these."""
+
+_STEP = (FARTHEST - DEEPEST) / 255.0
+_FLOOR = np.array([0.0, 0.0, 1.0, 0.0])
+_APPROACH = np.array([0.0, -3.0])
+"""From where one comes to a piece without a back: its front faces −y."""
+_ASTRAY = np.cos(np.radians(60.0))
+_FRAMES_AT_ONCE = 16
+
+
+@dataclass(frozen=True)
+class Seat:
+    """Where one sits on a shape, in its own frame: ``position`` (2,) under the pelvis, ``yaw`` that one faces, ``height`` of
+    the surface, ``pelvis`` height of the joint, ``aside`` metres to each side where another may sit as well.
+    """
+
+    position: np.ndarray
+    yaw: float
+    height: float
+    pelvis: float
+    aside: float
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A piece at ``factor`` of its height. ``values`` (nx, ny, nz) uint8: distances from ``DEEPEST`` to ``FARTHEST`` at nodes
+    ``spacing`` metres apart from ``origin`` (3,) on. ``seat``: None where nobody sits.
+    """
+
+    name: str
+    kind: str
+    maker: str
+    factor: float
+    origin: np.ndarray
+    spacing: float
+    values: np.ndarray
+    seat: Seat | None
+
+    @property
+    def grid(self) -> DistanceGrid:
+        """The distances as the core knows them."""
+        values = (DEEPEST + _STEP * self.values).astype(np.float32)
+        return DistanceGrid(self.origin, self.spacing, values, FARTHEST)
+
+    @property
+    def top(self) -> float:
+        """Height of its highest part (metres)."""
+        inside = np.flatnonzero((self.values <= -DEEPEST / _STEP).any((0, 1)))
+        return float(self.origin[2] + self.spacing * inside[-1]) if len(inside) else 0.0
+
+
+@dataclass(frozen=True)
+class ShapeBank:
+    """All shapes that windows name by their number."""
+
+    shapes: tuple[Shape, ...]
+
+    def __len__(self) -> int:
+        return len(self.shapes)
+
+    def distances(self, placed: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Signed distance (N,) of world ``points`` (N, 3) to the nearest of the placed shapes (S, 5), at most ``FARTHEST``."""
+        out = np.full(len(points), FARTHEST, np.float32)
+        for number, x, y, yaw, stretch in placed:
+            shape = self.shapes[int(number)]
+            local = rotate(yaw_matrix(np.array(-yaw)), points - (x, y, 0.0)) / (1.0, 1.0, stretch)
+            low = shape.origin
+            near = ((local > low) & (local < low + shape.spacing * (np.array(shape.values.shape) - 1))).all(-1)
+            if near.any():
+                out[near] = np.minimum(out[near], _sampled(shape, local[near]))
+        return out
+
+    def occupancy(self, placed: np.ndarray, path: RootPath) -> np.ndarray:
+        """Occupancy (T, 2640) float32 of placed shapes (S, 5) along a root path on the floor z = 0; as ``core.occupancy``."""
+        out = np.zeros((len(path), len(SPHERES)), np.float32)
+        for row in placed:
+            shape = self.shapes[int(row[0])]
+            size = shape.spacing * (np.array(shape.values.shape) - 1)
+            reach = REACH + RADIUS + np.linalg.norm(np.maximum(np.abs(shape.origin), np.abs(shape.origin + size))[:2])
+            frames = np.flatnonzero(np.linalg.norm(path.position[:, :2] - row[1:3], axis=-1) < reach)
+            for start in range(0, len(frames), _FRAMES_AT_ONCE):
+                some = frames[start : start + _FRAMES_AT_ONCE]
+                spheres = rotate(yaw_matrix(path.yaw[some])[:, None], SPHERES) + path.position[some, None] * (1, 1, 0)
+                found = occupancy_of_distance(self.distances(row[None], spheres.reshape(-1, 3)))
+                out[some] = np.maximum(out[some], found.reshape(len(some), -1))
+        return out
+
+    def meshes(self, placed: np.ndarray, name: str = "") -> list[Mesh]:
+        """Placed shapes (S, 5) as solids of the core, with their grids; they have no triangles."""
+        solids = []
+        for number, x, y, yaw, stretch in placed:
+            shape = self.shapes[int(number)]
+            matrix = np.eye(4)
+            matrix[:3, :3], matrix[:2, 3] = yaw_matrix(np.array(yaw)), (x, y)
+            grid = shape.grid if stretch == 1.0 else _stretched(shape, float(stretch))
+            empty = np.zeros((0, 3))
+            solids.append(Mesh(empty, empty.astype(np.int64), matrix, name or shape.name, grid))
+        return solids
+
+    def surface(self, placed: np.ndarray, spacing: float = 0.06) -> np.ndarray:
+        """Points (N, 3) of the placed shapes' surfaces, world, about ``spacing`` metres apart: to be drawn."""
+        found = [np.zeros((0, 3))]
+        for number, x, y, yaw, stretch in placed:
+            shape = self.shapes[int(number)]
+            step = max(1, round(spacing / shape.spacing))
+            nodes = np.argwhere(np.abs(DEEPEST + _STEP * shape.values) < 0.6 * shape.spacing)
+            nodes = nodes[(nodes % step == 0).sum(1) >= 2]
+            points = (shape.origin + shape.spacing * nodes) * (1.0, 1.0, stretch)
+            found.append(rotate(yaw_matrix(np.array(yaw)), points) + (x, y, 0.0))
+        return np.concatenate(found)
+
+    def write(self, file: Path) -> None:
+        """Write the bank, whole or not at all."""
+        seats = [
+            [*s.seat.position, s.seat.yaw, s.seat.height, s.seat.pelvis, s.seat.aside] if s.seat else [np.nan] * 6
+            for s in self.shapes
+        ]
+        part = file.with_suffix(".part.npz")
+        np.savez_compressed(
+            part, texts=np.array([[s.name, s.kind, s.maker] for s in self.shapes]),
+            places=np.array([[s.factor, *s.origin, s.spacing] for s in self.shapes]), seats=np.array(seats),
+            sizes=np.array([s.values.shape for s in self.shapes]),
+            values=np.concatenate([s.values.ravel() for s in self.shapes]),
+        )
+        part.replace(file)
+
+    @staticmethod
+    def read(file: Path) -> "ShapeBank":
+        """What ``write`` wrote."""
+        with np.load(file) as z:
+            texts, places, seats, sizes, values = (z[name] for name in ("texts", "places", "seats", "sizes", "values"))
+        shapes, at = [], 0
+        for text, place, seat, size in zip(texts, places, seats, sizes, strict=True):
+            count = int(np.prod(size))
+            sits = None if np.isnan(seat[0]) else Seat(seat[:2], *(float(v) for v in seat[2:]))
+            shapes.append(Shape(
+                name=str(text[0]), kind=str(text[1]), maker=str(text[2]), factor=float(place[0]), origin=place[1:4],
+                spacing=float(place[4]), values=values[at : at + count].reshape(size), seat=sits,
+            ))
+            at += count
+        return ShapeBank(tuple(shapes))
+
+
+def _sampled(shape: Shape, local: np.ndarray) -> np.ndarray:
+    """Trilinear distances (N,) at points (N, 3) of the shape's own frame, all within its grid."""
+    at = ((local - shape.origin) / shape.spacing).astype(np.float32)
+    cell = np.minimum(at.astype(np.int32), np.array(shape.values.shape, np.int32) - 2)
+    fx, fy, fz = (at - cell).T
+    _, ny, nz = shape.values.shape
+    node = (cell[:, 0] * ny + cell[:, 1]) * nz + cell[:, 2]
+    values = shape.values.reshape(-1)
+
+    def along_z(n: np.ndarray) -> np.ndarray:
+        below = values[n].astype(np.float32)
+        return below + fz * (values[n + 1] - below)
+
+    near, far = along_z(node), along_z(node + ny * nz)
+    near += fy * (along_z(node + nz) - near)
+    far += fy * (along_z(node + (ny + 1) * nz) - far)
+    return np.float32(DEEPEST) + np.float32(_STEP) * (near + fx * (far - near))
+
+
+def _stretched(shape: Shape, stretch: float) -> DistanceGrid:
+    """The grid of a shape whose height is stretched, on nodes of its own."""
+    grid = shape.grid
+    heights = grid.origin[2] * stretch + grid.spacing * np.arange(int(np.ceil((grid.values.shape[2] - 1) * stretch)) + 1)
+    at = np.clip((heights / stretch - grid.origin[2]) / grid.spacing, 0.0, grid.values.shape[2] - 1.001)
+    below = at.astype(int)
+    share = (at - below).astype(np.float32)
+    values = grid.values[..., below] * (1 - share) + grid.values[..., below + 1] * share
+    values[..., [0, -1]] = FARTHEST
+    return DistanceGrid(grid.origin * (1.0, 1.0, stretch), grid.spacing, values.astype(np.float32), FARTHEST)
+
+
+def _seat(piece: Piece, vertices: np.ndarray) -> Seat | None:
+    """Where one sits on a piece, if one does."""
+    if piece.kind not in PELVIS_OVER:
+        return None
+    mesh = Mesh(vertices, piece.triangles, name=piece.title)
+    try:
+        place = seat_of([mesh], _APPROACH, 0.0, piece.title)
+    except InputError:
+        return None
+    if np.cos(place.yaw - np.pi) < _ASTRAY:
+        return None  # a piece's front faces −y: what looks elsewhere was misjudged
+    return Seat(place.position, place.yaw, place.height, place.height + PELVIS_OVER[piece.kind], place.aside)
+
+
+def shapes_of(piece: Piece, factors: Sequence[float] = FACTORS) -> list[Shape]:
+    """A piece at ``factors`` of its true height; where nobody sits, only at the true one."""
+    sits = _seat(piece, piece.vertices) is not None
+    found = []
+    for factor in factors if sits else (1.0,):
+        vertices = piece.vertices * (1.0, 1.0, factor)
+        grid = build_grid(vertices, piece.triangles, _FLOOR)
+        values = np.clip(np.rint((grid.values - DEEPEST) / _STEP), 0, 255).astype(np.uint8)
+        found.append(Shape(
+            name=piece.name, kind=piece.kind, maker=piece.maker, factor=float(factor), origin=grid.origin,
+            spacing=grid.spacing, values=values, seat=_seat(piece, vertices) if sits else None,
+        ))
+    return found
+
+
+def bank_of(pieces: Iterable[Piece], factors: Sequence[float] = FACTORS) -> ShapeBank:
+    """The shapes of all these pieces. Building them takes about a second each."""
+    return ShapeBank(tuple(shape for piece in pieces for shape in shapes_of(piece, factors)))
+
+
+assert FARTHEST < BAND
