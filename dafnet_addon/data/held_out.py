@@ -85,7 +85,7 @@ def scene_of(rows: np.ndarray) -> Scene:
 
 def test_motions(folder: Path) -> dict[str, Motion]:
     """All motions of the test by name: those of ``load_motions``, and of sources that are never trained on."""
-    found = load_motions(folder, "test")
+    found = load_motions(folder, "choose", "tell")
     bodies: dict[str, list[Clip]] = defaultdict(list)
     for clip in read_clips(folder):
         if clip.source in _TEST_ONLY:

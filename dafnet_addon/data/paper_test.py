@@ -41,8 +41,9 @@ from .rests import Rest, rest_of, resting
 from .held_out import HeldClip, fingerprint, is_frozen
 from .joins import joined
 from .pieces import DIRECTIONS, TOELESS, Pool, features_of, fluent, matches_of, pool_of, sit_downs, upper_bodies
-from .prepare import TRAINED_ON_PARTLY, load_motions
+from .prepare import load_motions
 from .retarget import at_seat_height
+from .splits import TRAINED_ON_PARTLY
 from .uses import Use, stroking
 from .windows import Motion, mirrored
 
@@ -110,7 +111,7 @@ Recipe = dict[str, Any]
 
 def _unseen(folder: Path) -> dict[str, Motion]:
     """Motions by "source/name", of bodies that have no clip in training."""
-    motions = load_motions(folder, "test")
+    motions = load_motions(folder, "choose", "tell")
     return {
         f"{m.source}/{m.name}": m for m in motions if TRAINED_ON_PARTLY.isdisjoint({m.source, f"{m.source}/{m.subject}"})
     }

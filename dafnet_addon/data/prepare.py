@@ -22,13 +22,17 @@ from .archive import read_arrays
 from .canonical import Calibration, calibrate, canonical
 from .compose import composed
 from .fits import fit_report
+from .flesh import NO_BANK
+from .library import read_library
 from .mocap import Clip, leaving_out, read_clips
 from .motions import Draws, read_motions, write_motions
 from .preview import preview
+from .shapes import ShapeBank, bank_of
+from .splits import role_of_clip, role_of_maker
 from .summary import summary
 from .windows import Motion, Window, draw, motion_of
 
-__all__ = ["load_motions", "sample", "prepare", "load_pool", "POSE_UNIT", "TRAINED_ON_PARTLY"]
+__all__ = ["load_motions", "sample", "prepare", "load_pool", "FURNITURE", "POSE_UNIT"]
 
 _WALK = {"locomotion", "walk", "turn", "run", "carry_other", "door"}
 _STAND = {"standing", "standing_idle", "standing_gesture", "social_gesture", "greeting", "work_standing", "documents",
@@ -55,14 +59,13 @@ _SHARE_ALIKE = {"hdm05_cuts"}
 _ONE_RIG = {"cmu_daz", "cmu_expmap", "cmu_fbx", "gazebo_actors", "snu_tiling", "snu_ys2010"}
 _ARMS_RAISED = {"ui_prmd"}
 _WEIGHT = {"ui_prmd": 0.35, "snu_tiling": 3.0}  # of a sit-down: the one stands with borrowed arms, the other walks up to it
-TRAINED_ON_PARTLY = {"cmu69", "snu_tiling/wd2(dir 1)", "snu_ys2010", "gazebo_actors"}
-"""Bodies with clips on both sides of the split; figures of their test clips are reported apart."""
-
 _ARMS = [18, 20, 19, 21]  # elbow and wrist, left then right
 _SHARD, _SHARDS = 1000, 10_000  # seeds of shards are seed * _SHARDS + i
 _DRAWS = 2000  # in a row, of which none gives a window
 _FIT_TRIES = 60  # moments of each kind that are furnished for the report
-_STORED = ("poses", "velocity", "ahead", "root", "boxes")
+_STORED = ("poses", "velocity", "ahead", "root", "boxes", "shapes")
+FURNITURE = "furniture.npz"
+"""The dataset's file of real pieces (``shapes.ShapeBank``), which its windows name by number."""
 POSE_UNIT = 1e-4
 """Poses are stored as whole numbers of these (metres)."""
 
@@ -119,16 +122,16 @@ def _with_arms(joints: np.ndarray, standing: np.ndarray, seated: np.ndarray) -> 
 
 
 def _measured(
-    clips: Iterable[Clip], splits: Sequence[str], left_out: list[str] | None
+    clips: Iterable[Clip], roles: Sequence[str], left_out: list[str] | None
 ) -> list[tuple[Clip, Calibration]]:
-    """The clips of some splits that are used, body by body, each with its body's constants, calibrated on all its clips."""
+    """The clips of some roles that are used, body by body, each with its body's constants, calibrated on all its clips."""
     bodies: dict[tuple[str, str], list[Clip]] = defaultdict(list)
     for clip in clips:
         if clip.source not in _SHARE_ALIKE:
             bodies[clip.source, "" if clip.source in _ONE_RIG else clip.subject].append(clip)
     found: list[tuple[Clip, Calibration]] = []
     for own in bodies.values():
-        used = [clip for clip in own if clip.split in splits and not _why_not(clip)]
+        used = [clip for clip in own if role_of_clip(clip) in roles and not _why_not(clip)]
         if used:
             with leaving_out(left_out):
                 body = calibrate(own)
@@ -136,8 +139,10 @@ def _measured(
     return found
 
 
-def _motions(measured: list[tuple[Clip, Calibration]], split: str, left_out: list[str] | None) -> list[Motion]:
-    fitted = [(clip, canonical(clip, body)) for clip, body in measured if clip.split == split]
+def _motions(
+    measured: list[tuple[Clip, Calibration]], roles: Sequence[str], left_out: list[str] | None
+) -> list[Motion]:
+    fitted = [(clip, canonical(clip, body)) for clip, body in measured if role_of_clip(clip) in roles]
     rng = np.random.default_rng(7)
     lend = {kind: [j for c, j in fitted if c.category == kind] for kind in ("standing_idle", "seated_chair")}
     motions = []
@@ -147,7 +152,7 @@ def _motions(measured: list[tuple[Clip, Calibration]], split: str, left_out: lis
                 if not all(lend.values()):
                     raise InputError(
                         f"The clip '{clip.name}' of '{clip.source}' has arms that are not real, and none to borrow; add clips "
-                        f"of split '{split}' and of the categories {' and '.join(lend)}."
+                        f"of the same split and of the categories {' and '.join(lend)}."
                     )
                 poses = [clips[i][rng.integers(len(clips[i]))] for clips in lend.values() for i in [rng.integers(len(clips))]]
                 joints = _with_arms(joints, *poses)
@@ -155,12 +160,13 @@ def _motions(measured: list[tuple[Clip, Calibration]], split: str, left_out: lis
     return motions
 
 
-def load_motions(folder: Path, split: str) -> list[Motion]:
-    """Every usable clip of a split ('train' or 'test') on the canonical body, bodies calibrated on all their clips.
+def load_motions(folder: Path, *roles: str) -> list[Motion]:
+    """Every usable clip of these roles (``splits``: 'train', 'choose', 'tell') on the canonical body, bodies calibrated on all
+    their clips.
 
     Raises InputError where a file or a body cannot be used.
     """
-    return _motions(_measured(read_clips(folder), (split,), None), split, None)
+    return _motions(_measured(read_clips(folder), roles, None), roles, None)
 
 
 def _captured(motions: list[Motion]) -> dict[str, list[tuple[int, int, float]]]:
@@ -193,7 +199,9 @@ def _draws(motions: list[Motion]) -> tuple[list[Motion], Draws]:
     return motions, {kind: (t[:, :2].astype(int), t[:, 2] / t[:, 2].sum()) for kind, t in tables.items()}
 
 
-def sample(rng: np.random.Generator, motions: list[Motion], draws: Draws) -> tuple[str, Window]:
+def sample(
+    rng: np.random.Generator, motions: list[Motion], draws: Draws, bank: ShapeBank = NO_BANK
+) -> tuple[str, Window]:
     """A kind of moment by its share, a moment of that kind, and a window around it.
 
     Raises InputError where hardly any window can be drawn.
@@ -204,7 +212,7 @@ def sample(rng: np.random.Generator, motions: list[Motion], draws: Draws) -> tup
         kind = kinds[rng.choice(len(kinds), p=share / share.sum())]
         rows, weight = draws[kind]
         motion, frame = rows[rng.choice(len(rows), p=weight)]
-        window = draw(rng, motions[motion], int(frame))
+        window = draw(rng, motions[motion], int(frame), bank)
         if window is not None:
             return kind, window
     raise InputError(
@@ -213,10 +221,10 @@ def sample(rng: np.random.Generator, motions: list[Motion], draws: Draws) -> tup
     )
 
 
-_known: tuple[list[Motion], Draws]
+_known: tuple[list[Motion], Draws, ShapeBank]
 
 
-def _start(known: tuple[list[Motion], Draws]) -> None:
+def _start(known: tuple[list[Motion], Draws, ShapeBank]) -> None:
     global _known
     _known = known
 
@@ -240,16 +248,19 @@ def _written(file: Path, text: Callable[[], str]) -> None:
 
 
 def _read(folder: Path, out: Path) -> dict[str, Any]:
-    """Read the motion files; write the motions of both splits and the summary. What is known of the training set."""
+    """Read the motion files; write the training's motions, those that choose weights, and the summary.
+
+    Where the project's own bodies that choose are not among them, those of split 'test' do. What is known of the training set.
+    """
     left_out: list[str] = []
     clips = list(read_clips(folder, left_out))
-    names = {"test": "held_out", "train": "train"}
-    measured = _measured(clips, tuple(names), left_out)
+    chooses = "choose" if any(role_of_clip(clip) == "choose" for clip in clips) else "tell"
+    measured = _measured(clips, (chooses, "train"), left_out)
     licence_of = {(clip.source, clip.name): clip.licence for clip, _ in measured}
     licences: dict[str, set[str]] = defaultdict(set)
     described: dict[str, Any] = {}
-    for split, name in names.items():
-        captured = _motions(measured, split, left_out)
+    for split, role, name in (("test", chooses, "held_out"), ("train", "train", "train")):
+        captured = _motions(measured, (role,), left_out)
         motions, draws = _draws(captured)
         if not draws:
             raise InputError(
@@ -294,11 +305,11 @@ def _asked(described: dict[str, Any], out: Path, windows: int, seed: int) -> Non
 
 def prepare(
     folder: Path, out: Path, windows: int = 12000, processes: int = 1, seed: int = 0,
-    progress: Callable[[float], None] = lambda _: None,
+    progress: Callable[[float], None] = lambda _: None, furniture: Path | None = None,
 ) -> None:
     """Make (or go on making) the dataset ``out`` from the motion files in ``folder``. What is finished is kept.
 
-    Files, bodies and clips that cannot be used are left out, which ``summary.txt`` says. Raises InputError where the folder
+    Real pieces of the library in the folder ``furniture`` stand among the furniture, where one is given. Files, bodies and clips that cannot be used are left out, which ``summary.txt`` says. Raises InputError where the folder
     holds no motion files, or none to train on or none that are held out, and where ``out`` holds another dataset.
     """
     record = out / "dataset.json"
@@ -309,23 +320,39 @@ def prepare(
         left.unlink()
     if not described:
         described = _read(folder, out)
+        if furniture:
+            described["furniture"] = _furniture(furniture, out)
     described |= {"windows": windows, "seed": seed, "shares": _SHARES, "composed": _COMPOSITION}
     save_text(record, json.dumps(described, indent=1))
 
     sizes = [min(_SHARD, windows - done) for done in range(0, windows, _SHARD)]
     train = [(out / f"pool-{i:04d}.npz", seed * _SHARDS + i, size) for i, size in enumerate(sizes)]
+    bank = ShapeBank.read(out / FURNITURE) if "furniture" in described else NO_BANK
+    # The training's pieces come first, so that a number means the same piece to both.
+    trained = ShapeBank(tuple(shape for shape in bank.shapes if role_of_maker(shape.maker) == "train"))
     done = 0
-    for split, tasks in (("test", [(out / "held.npz", 99, min(600, windows))]), ("train", train)):
+    for split, shapes, tasks in (
+        ("test", bank, [(out / "held.npz", 99, min(600, windows))]), ("train", trained, train)
+    ):
         known = read_motions(out / f"{split}.npz")
         missing = [task for task in tasks if _windows_in(task[0]) != task[2]]
         # Forked: the motions are read once and shared by all.
-        with multiprocessing.get_context("fork").Pool(max(processes, 1), _start, (known,)) as pool:
+        with multiprocessing.get_context("fork").Pool(max(processes, 1), _start, ((*known, shapes),)) as pool:
             for k, _ in enumerate(pool.imap_unordered(_shard, missing)):
                 progress((done + k + 1) / (1 + len(train)))
         done += len(tasks)
-    _written(out / "fits.txt", lambda: fit_report(*read_motions(out / "train.npz"), np.random.default_rng(seed), _FIT_TRIES))
+    _written(out / "fits.txt", lambda: fit_report(*read_motions(out / "train.npz"), np.random.default_rng(seed), _FIT_TRIES, trained))
     if not (out / "preview.png").exists():
-        preview(out / "preview.png", *read_motions(out / "train.npz"), np.random.default_rng(seed))
+        preview(out / "preview.png", *read_motions(out / "train.npz"), np.random.default_rng(seed), bank=trained)
+
+
+def _furniture(folder: Path, out: Path) -> dict[str, list[str]]:
+    """Read a furniture library and write the shapes of what trains and of what chooses weights: whose they are."""
+    pieces, left_out = read_library(folder)
+    wanted = [piece for role in ("train", "choose") for piece in pieces if role_of_maker(piece.maker) == role]
+    bank_of(wanted).write(out / FURNITURE)
+    makers = {f"{piece.source}: {piece.maker} ({piece.licence})" for piece in wanted if role_of_maker(piece.maker) == "train"}
+    return {"trained_on": sorted(makers), "left_out": left_out}
 
 
 def load_pool(files: Iterable[Path]) -> dict[str, np.ndarray]:
