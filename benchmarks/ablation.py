@@ -21,6 +21,7 @@ import torch
 
 from dafnet_addon.core.weights import Weights, load_weights
 from dafnet_addon.data.held_out import HeldClip, held_out
+from dafnet_addon.data.prepare import bank_in
 from dafnet_addon.model.config import SMALL, ModelConfig
 from dafnet_addon.training import precision
 from dafnet_addon.training.batches import Pool
@@ -57,7 +58,7 @@ def _train(
 
 def _likelihood(folder: Path, dataset: Path) -> float:
     """Negative log-likelihood a frame of held-out windows, nats, in standardised units; the same draws for all variants."""
-    held = Pool(lambda: [dataset / "held.npz"], torch.device("cpu"))
+    held = Pool(lambda: [dataset / "held.npz"], torch.device("cpu"), bank_in(dataset))
     predictor = Run.load("predictor", folder)
     total = 0.0
     for part in ("upper", "lower"):

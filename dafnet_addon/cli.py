@@ -183,6 +183,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     )
     prepare.add_argument("folder", type=Path, metavar="FOLDER", help="holds the motion files")
     prepare.add_argument("-o", "--output", type=Path, required=True, metavar="DATASET")
+    prepare.add_argument("--furniture", type=Path, metavar="LIBRARY", help="folder of real pieces to stand among the boxes")
     prepare.add_argument("--windows", type=_number(int, 1), default=12000, help="how many training windows")
     prepare.add_argument("--processes", type=_number(int, 1, _MOST_PROCESSES), default=cores())
     prepare.add_argument("--seed", type=_number(int, 0, MOST_SEED), default=0)
@@ -326,7 +327,7 @@ def _prepare(options: argparse.Namespace, bar: "_Bar") -> _Result:
     from .data.prepare import prepare
 
     require_writable(options.output / "dataset.json")
-    prepare(options.folder, options.output, options.windows, options.processes, options.seed, bar)
+    prepare(options.folder, options.output, options.windows, options.processes, options.seed, bar, options.furniture)
     described, *told = (
         (options.output / name).read_text(encoding="utf-8") for name in ("dataset.json", "summary.txt", "fits.txt")
     )

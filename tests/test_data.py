@@ -15,9 +15,9 @@ from dafnet_addon.core.skeleton import OFFSETS, PARENTS, REST, TOE_HEIGHT, joint
 from dafnet_addon.core.solids import Box, Scene
 from dafnet_addon.data import boxes as b
 from dafnet_addon.data.canonical import LEG, calibrate, canonical, pose_legs
-from dafnet_addon.data.rests import resting
 from dafnet_addon.data.mocap import Clip, read_clips
 from dafnet_addon.data.motions import read_motions, write_motions
+from dafnet_addon.data.rests import resting
 from dafnet_addon.data.windows import draw, mirrored, motion_of
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -18,8 +18,8 @@ from dafnet_addon.core.take import Controls
 from dafnet_addon.core.weights import load_weights
 from dafnet_addon.data import held_out as h
 from dafnet_addon.data.boxes import box
-from dafnet_addon.data.rests import Rest
 from dafnet_addon.data.mocap import read_clips
+from dafnet_addon.data.rests import Rest
 from dafnet_addon.training import evaluate as e
 
 MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"

@@ -10,7 +10,11 @@ from dafnet_addon.data.boxes import distances
 from dafnet_addon.data.canonical import pose_legs
 from dafnet_addon.data.contacts import CONTACTS, contacts
 from dafnet_addon.data.fits import fit_report
-from dafnet_addon.data.furniture import fitted, furnished, probes, resting, scattered, seat_for
+from dafnet_addon.data.flesh import probes
+from dafnet_addon.data.furniture import fitted, furnished, scattered, seat_for
+from dafnet_addon.data.real_pieces import LIES_OVER
+from dafnet_addon.data.rests import resting
+from dafnet_addon.data.shapes import PELVIS_OVER
 from dafnet_addon.data.uses import lying, reaching, stroking, working
 from dafnet_addon.data.windows import motion_of
 
@@ -93,6 +97,12 @@ def _lies(height: float = 0.55, frames: int = 60) -> np.ndarray:
     return np.repeat((turned + np.array([0.3, 0.2, height]))[None], frames, axis=0)
 
 
+def _furnished(seed: int, joints: np.ndarray) -> tuple[np.ndarray | None, str]:
+    """The boxes of a room for a motion, or why there are none."""
+    room, reason = furnished(np.random.default_rng(seed), joints, root_from_joints(joints))
+    return None if room is None else room.boxes, reason
+
+
 def _turned(joints: np.ndarray, yaw: float) -> np.ndarray:
     return rotate(yaw_matrix(np.array(yaw)), joints) + np.array([2.0, -1.0, 0.0])
 
@@ -109,15 +119,16 @@ def test_no_piece_cuts_the_swept_body(name, yaw):
     joints = _turned(MOTIONS[name](), yaw)
     path, rooms = root_from_joints(joints), 0
     for seed in range(12):
-        boxes, reason = furnished(np.random.default_rng(seed), joints, path)
+        boxes, reason = _furnished(seed, joints)
         assert (boxes is None) == bool(reason)
         if boxes is None or not len(boxes):
             continue
         rooms += 1
         assert (boxes[:, 3:6] > 0).all() and (boxes[:, 2] - boxes[:, 5] > -1e-9).all(), "nothing reaches under the floor"
-        assert distances(boxes, joints[:, FEET].reshape(-1, 3)).min() > -0.03
+        # Beds are soft: who lies sinks in.
+        assert distances(boxes, joints[:, FEET].reshape(-1, 3)).min() > (-0.06 if name == "bed" else -0.03)
         trunk = distances(boxes, joints[:, TORSO].reshape(-1, 3)).min()
-        assert trunk > (-0.01 if name == "bed" else 0.03), "a joint of the trunk never comes this near"
+        assert trunk > (-0.11 if name == "bed" else 0.03), "a joint of the trunk never comes this near"
         assert distances(boxes, joints[:, :1].reshape(-1, 3)).min() > 0.0
     assert rooms >= 6
 
@@ -134,9 +145,9 @@ def test_seats_are_at_the_right_height(pelvis):
             under = np.abs(seat[:, :2] - rest.position[:2]).max(-1) < 1.2
             gaps.append(rest.position[2] - (seat[under, 2] + seat[under, 5])[0])
     assert len(gaps) >= 50
-    hard = np.array([g for g in gaps if g > 0.075])
-    assert np.abs(hard - SEAT_TO_PELVIS).max() <= 0.0401 and min(gaps) > -0.001
-    assert 0.0 <= 1 - len(hard) / len(gaps) < 0.25, "soft seats are few"
+    # How far one sinks in belongs to a kind of seat: each gap is that of one kind, within 2 cm.
+    known = np.array(sorted(set(PELVIS_OVER.values())))
+    assert np.abs(np.array(gaps)[:, None] - known).min(1).max() <= 0.0201
     assert len({round(g, 4) for g in gaps}) > 40, "every draw is another seat"
 
 
@@ -149,7 +160,7 @@ def test_desk_top_lies_under_the_wrists_and_beside_the_seat():
         assert use.end - use.start > 60 and abs(use.points[:, 2].min() - lowest) < 0.01
         found = 0
         for seed in range(12):
-            boxes, _ = furnished(np.random.default_rng(seed), joints, path)
+            boxes, _ = _furnished(seed, joints)
             if boxes is None:
                 continue
             tops = boxes[:, 2] + boxes[:, 5]
@@ -173,7 +184,7 @@ def test_board_stands_beyond_the_hand_that_strokes_it():
     assert abs(use.yaw - 0.8) < 0.1
     wrists, found = joints[:, joint("right_wrist")], 0
     for seed in range(12):
-        boxes, _ = furnished(np.random.default_rng(seed), joints, path)
+        boxes, _ = _furnished(seed, joints)
         gaps = distances(boxes, wrists) if boxes is not None and len(boxes) else np.ones((1, 1))
         found += bool(((gaps.min(1) > 0.045) & (gaps.max(1) < 0.1)).any())
     assert found >= 7
@@ -187,7 +198,7 @@ def test_a_shelf_lies_under_the_hand_that_reached():
     assert 35 < use.start < use.end < 90
     hand, found = use.points.mean(0), 0
     for seed in range(20):
-        boxes, _ = furnished(np.random.default_rng(seed), joints, path)
+        boxes, _ = _furnished(seed, joints)
         if boxes is not None and len(boxes):
             under = np.abs(boxes[:, 2] + boxes[:, 5] - (hand[2] - 0.055)) < 0.03
             found += bool((under & (distances(boxes, hand[None])[:, 0] < 0.09)).any())
@@ -200,15 +211,15 @@ def test_a_lying_body_gets_a_bed_and_a_body_on_the_floor_none():
     assert abs(use.yaw + np.pi / 2) < 0.1, "the head lies along +x"
     path = root_from_joints(joints)
     for seed in range(8):
-        boxes, reason = furnished(np.random.default_rng(seed), joints, path)
+        boxes, reason = _furnished(seed, joints)
         assert boxes is not None, reason
         line = joints[0, [joint("pelvis"), joint("spine3")]].mean(0)
         depth = line[2] - (boxes[:, 2] + boxes[:, 5])
         under = distances(boxes, (line - (0, 0, 0.15))[None])[:, 0] < 0.02
-        assert (under & (depth >= 0.0999) & (depth <= 0.1401)).any()
+        assert (under & (depth >= LIES_OVER - 1e-4) & (depth <= LIES_OVER + 0.0201)).any()
     on_floor = _lies(0.12)
     assert not lying(on_floor)
-    boxes, _ = furnished(np.random.default_rng(0), on_floor, root_from_joints(on_floor))
+    boxes, _ = _furnished(0, on_floor)
     assert boxes is not None and (distances(boxes, on_floor[0]).min() > 0.0 if len(boxes) else True)
 
 
@@ -245,16 +256,16 @@ def test_who_sits_on_the_edge_and_lies_down_has_one_bed():
             found += 1
             (bed,) = [rows for kind, rows in pieces if kind == "bed"]
             assert all(kind != "seat" for kind, _ in pieces)
-            assert distances(bed, (place - (0, 0, SEAT_TO_PELVIS))[None]).min() < 0.1
+            assert distances(bed.boxes, (place - (0, 0, SEAT_TO_PELVIS))[None]).min() < 0.1
     assert found >= 4
 
 
 def test_motion_cut_off_half_way_down_is_not_used():
     joints = _seated(frames=120, down=40)[:58]
-    boxes, reason = furnished(np.random.default_rng(0), joints, root_from_joints(joints))
+    boxes, reason = _furnished(0, joints)
     assert boxes is None and reason == "cut"
     backward = joints[::-1]
-    assert furnished(np.random.default_rng(0), backward, root_from_joints(backward))[1] == "cut"
+    assert _furnished(0, backward)[1] == "cut"
 
 
 def test_a_seat_that_cannot_be_had_says_so():
@@ -263,7 +274,7 @@ def test_a_seat_that_cannot_be_had_says_so():
     through = _standing(frames=60)
     through[:, :, 1] += np.linspace(-1.5, 0.0, 60)[:, None]
     joints = np.concatenate([through, joints])
-    boxes, reason = furnished(np.random.default_rng(0), joints, root_from_joints(joints))
+    boxes, reason = _furnished(0, joints)
     assert boxes is None and reason == "seat"
 
 

@@ -17,10 +17,10 @@ from dafnet_addon.core.skeleton import JOINTS, PARENTS, REST, TOE_HEIGHT, joint
 from dafnet_addon.data.acclaim import read_amc, read_asf
 from dafnet_addon.data.amass import read_amass
 from dafnet_addon.data.boxes import box
-from dafnet_addon.data.flesh import Furnishing
 from dafnet_addon.data.bvh import read_bvh
 from dafnet_addon.data.canonical import calibrate
 from dafnet_addon.data.cuts import bad_frames, cuts
+from dafnet_addon.data.flesh import Furnishing
 from dafnet_addon.data.mocap import UNSTATED, Clip, read_clips
 from dafnet_addon.data.recording import Recording, posed, rotation_about
 from dafnet_addon.data.rigs import mapped, rigs

@@ -15,7 +15,7 @@ from .flesh import FAR, NO_BANK, Furnishing, box_clearance, nearest_box, pressed
 from .real_pieces import LIES_OVER, bed_shape_for, seat_shape_for, stray_shape
 from .rests import Rest, resting
 from .shapes import PELVIS_OVER, ShapeBank
-from .uses import Use, lying, reaching, runs, stroking, working
+from .uses import Use, lying, reaching, stroking, working
 
 __all__ = [
     "SeatKind", "seat_for", "desk_for", "board_for", "scattered", "fitted", "furnished",
@@ -34,7 +34,7 @@ _STANDS_BEFORE = 0.2  # metres a second: a slower body may have a desk before it
 # The hand's probe lies where a stretched wrist would carry it; on a top or a board the wrist bends.
 _ON_SEAT = pressed(0.025, hip=0.07, thigh=0.07)
 _SINKS = pressed(0.0, hip=1.0, thigh=1.0)
-_ON_BED = pressed(0.14, hip=0.18, thigh=0.18, trunk=0.18, head=0.20, shoulder=0.19, elbow=0.20, wrist=0.19, hand=0.20)
+_ON_BED = pressed(0.10, hip=0.18, thigh=0.18, trunk=0.18, head=0.20, shoulder=0.19, elbow=0.20, wrist=0.19, hand=0.20)
 _ON_DESK = pressed(0.0, wrist=0.035, hand=0.09, elbow=0.03)
 _ON_BOARD = pressed(0.0, wrist=0.01, hand=0.12)
 _STYLES = ("block", "legs", "legs", "column", "panels")
@@ -98,8 +98,9 @@ def _carrier(
     return [box((sx * (x - 0.02), middle, under / 2), (0.04, depth, under)) for sx in (-1, 1)]
 
 
-def _surface(rng: np.random.Generator, kind: SeatKind, top: float, thick: float, x: float, back: float, front: float
-             ) -> list[np.ndarray]:
+def _surface(
+    rng: np.random.Generator, top: float, thick: float, x: float, back: float, front: float
+) -> list[np.ndarray]:
     """What one sits on, from ``back`` to ``front`` (y), ``x`` to either side: whole, of slats, open in the middle, cushioned."""
     middle, depth = (front + back) / 2, front - back
     style = rng.choice(["whole", "slats", "open", "cushion"], p=[0.6, 0.16, 0.08, 0.16])
@@ -116,8 +117,8 @@ def _surface(rng: np.random.Generator, kind: SeatKind, top: float, thick: float,
         pad = min(0.6 * thick, rng.uniform(0.03, 0.12))
         inset = rng.uniform(0.0, 0.03)
         return [
-            box((0, middle, top - pad - (thick - pad) / 2), (2 * x, depth, thick - pad)),
             box((0, middle, top - pad / 2), (2 * (x - inset), depth - inset, pad)),
+            box((0, middle, top - pad - (thick - pad) / 2), (2 * x, depth, thick - pad)),
         ]
     return [box((0, middle, top - thick / 2), (2 * x, depth, thick))]
 
@@ -144,8 +145,9 @@ def _back(rng: np.random.Generator, thick: float, top: float, x: float, back: fl
     return [box((0, at, top + (low + height) / 2), (2 * x, thick, height - low))]
 
 
-def _arms(rng: np.random.Generator, kind: SeatKind, thick: float, top: float, x: float, back: float, front: float
-          ) -> list[np.ndarray]:
+def _arms(
+    rng: np.random.Generator, kind: SeatKind, thick: float, top: float, x: float, back: float, front: float
+) -> list[np.ndarray]:
     """Arms to both sides: closed down to the floor or the seat, or a rest on two posts."""
     height = rng.uniform(0.12, 0.25)
     # The arms of an office chair hang on its seat; others stand on the floor.
@@ -154,9 +156,8 @@ def _arms(rng: np.random.Generator, kind: SeatKind, thick: float, top: float, x:
     if thick < 0.08 and rng.random() < 0.6:
         rests = [box((s * (x + thick / 2), middle, top + height - 0.02), (thick, 0.8 * depth, 0.04)) for s in (-1, 1)]
         ys = (middle - 0.35 * depth, middle + 0.35 * depth)
-        posts = [
-            box((s * (x + thick / 2), y, (foot + top + height) / 2), (0.03, 0.03, top + height - foot)) for s in (-1, 1) for y in ys
-        ]
+        post = (0.03, 0.03, top + height - foot)
+        posts = [box((s * (x + thick / 2), y, (foot + top + height) / 2), post) for s in (-1, 1) for y in ys]
         return rests + posts
     size = (thick, depth, top + height - foot)
     return [box((s * (x + thick / 2), middle, (top + height + foot) / 2), size) for s in (-1, 1)]
@@ -172,7 +173,7 @@ def _seat(rng: np.random.Generator, top: float, kind: SeatKind, small: float) ->
     shift = rng.uniform(-room, room) + rng.uniform(-0.03, 0.03)
     back, front = -rng.uniform(*kind.behind), rng.uniform(*kind.before) * small
     thick = min(rng.uniform(*kind.thick), top - 0.03)
-    rows = _surface(rng, kind, top, thick, x, back, front)
+    rows = _surface(rng, top, thick, x, back, front)
     rows += _carrier(rng, top, thick, x, back, front, kind.styles)
     if top > _HIGH_SEAT and rng.random() < 0.5:
         rows.append(box((0, front - 0.02, rng.uniform(0.15, top - 0.35)), (2 * x, 0.03, 0.03)))  # for the feet
@@ -252,7 +253,8 @@ def _bed_for(rng: np.random.Generator, use: Use, points: np.ndarray, rests: list
         beside = np.array(extra) if extra else NO_BOXES
         yaw = use.yaw + rng.normal(0.0, 0.05)
         carrying, beside = (placed(part, middle[:2], yaw) for part in (carrying, beside))
-        if box_clearance(carrying, points, _ON_BED) < 0 or not all(_carried(Furnishing(carrying[:1]), rest) for rest in beside_it):
+        under = Furnishing(carrying[:1])
+        if box_clearance(carrying, points, _ON_BED) < 0 or not all(_carried(under, rest) for rest in beside_it):
             continue
         return np.concatenate([carrying, beside if box_clearance(beside, points, 0.02) >= 0 else NO_BOXES])
     return None

@@ -17,10 +17,10 @@ from ..core.root import RootPath, raw_root_from_joints
 from ..core.rotations import yaw_matrix
 from ..core.solids import Box, Scene
 from .canonical import calibrate, canonical
-from .rests import Rest, rest_of
 from .joins import joined
 from .mocap import Clip, read_clips
 from .prepare import load_motions
+from .rests import Rest, rest_of
 from .windows import Motion, mirrored, motion_of
 
 __all__ = ["ACTIVITIES", "FROZEN", "HeldClip", "fingerprint", "held_out", "is_frozen", "scene_of", "test_motions"]

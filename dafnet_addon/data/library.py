@@ -86,8 +86,8 @@ def read_library(folder: Path) -> tuple[list[Piece], list[str]]:
     if not pieces:
         why = f" ({left_out[0]})" if left_out else ""
         raise InputError(
-            f"The folder '{folder}' holds no furniture that can be used{why}; give one with .sh3f libraries, with an index.json, "
-            "or with meshes and a pieces.json that states their licence."
+            f"The folder '{folder}' holds no furniture that can be used{why}; give one with .sh3f libraries, an index.json, or "
+            "meshes and a pieces.json that states their licence."
         )
     return pieces, left_out
 
@@ -135,7 +135,9 @@ def _compact(index: Path) -> Iterator[Piece | str]:
         rows = json.loads(index.read_text(encoding="utf-8"))["pieces"]
         known = [{text: str(row[text]) for text in _COMPACT_TEXTS} for row in rows]
     except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"The index '{index}' does not list pieces ({error!r}); each needs {', '.join(_COMPACT_TEXTS)}.") from None
+        raise InputError(
+            f"The index '{index}' does not list pieces ({error!r}); each needs {', '.join(_COMPACT_TEXTS)}."
+        ) from None
     for row in known:
         file = index.with_name(f"{PurePosixPath(row['name']).name}.npz")
         try:

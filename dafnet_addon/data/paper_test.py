@@ -37,11 +37,11 @@ from .compose import LEANS, at_board, at_top, seated_work
 from .contacts import contacts
 from .flesh import probes
 from .furniture import SeatKind, board_for, desk_for, seat_for
-from .rests import Rest, rest_of, resting
 from .held_out import HeldClip, fingerprint, is_frozen
 from .joins import joined
 from .pieces import DIRECTIONS, TOELESS, Pool, features_of, fluent, matches_of, pool_of, sit_downs, upper_bodies
 from .prepare import load_motions
+from .rests import Rest, rest_of, resting
 from .retarget import at_seat_height
 from .splits import TRAINED_ON_PARTLY
 from .uses import Use, stroking

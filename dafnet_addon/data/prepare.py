@@ -32,7 +32,7 @@ from .splits import role_of_clip, role_of_maker
 from .summary import summary
 from .windows import Motion, Window, draw, motion_of
 
-__all__ = ["load_motions", "sample", "prepare", "load_pool", "FURNITURE", "POSE_UNIT"]
+__all__ = ["bank_in", "load_motions", "sample", "prepare", "load_pool", "FURNITURE", "POSE_UNIT"]
 
 _WALK = {"locomotion", "walk", "turn", "run", "carry_other", "door"}
 _STAND = {"standing", "standing_idle", "standing_gesture", "social_gesture", "greeting", "work_standing", "documents",
@@ -309,8 +309,9 @@ def prepare(
 ) -> None:
     """Make (or go on making) the dataset ``out`` from the motion files in ``folder``. What is finished is kept.
 
-    Real pieces of the library in the folder ``furniture`` stand among the furniture, where one is given. Files, bodies and clips that cannot be used are left out, which ``summary.txt`` says. Raises InputError where the folder
-    holds no motion files, or none to train on or none that are held out, and where ``out`` holds another dataset.
+    Real pieces of the library in the folder ``furniture`` stand among the furniture, where one is given. Files,
+    bodies and clips that cannot be used are left out, which ``summary.txt`` says. Raises InputError where the folder holds no
+    motion files, or none to train on or none that are held out, and where ``out`` holds another dataset.
     """
     record = out / "dataset.json"
     described = json.loads(record.read_text(encoding="utf-8")) if record.exists() else {}
@@ -327,7 +328,7 @@ def prepare(
 
     sizes = [min(_SHARD, windows - done) for done in range(0, windows, _SHARD)]
     train = [(out / f"pool-{i:04d}.npz", seed * _SHARDS + i, size) for i, size in enumerate(sizes)]
-    bank = ShapeBank.read(out / FURNITURE) if "furniture" in described else NO_BANK
+    bank = bank_in(out)
     # The training's pieces come first, so that a number means the same piece to both.
     trained = ShapeBank(tuple(shape for shape in bank.shapes if role_of_maker(shape.maker) == "train"))
     done = 0
@@ -341,9 +342,10 @@ def prepare(
             for k, _ in enumerate(pool.imap_unordered(_shard, missing)):
                 progress((done + k + 1) / (1 + len(train)))
         done += len(tasks)
-    _written(out / "fits.txt", lambda: fit_report(*read_motions(out / "train.npz"), np.random.default_rng(seed), _FIT_TRIES, trained))
+    rng, known = np.random.default_rng(seed), read_motions(out / "train.npz")
+    _written(out / "fits.txt", lambda: fit_report(*known, rng, _FIT_TRIES, trained))
     if not (out / "preview.png").exists():
-        preview(out / "preview.png", *read_motions(out / "train.npz"), np.random.default_rng(seed), bank=trained)
+        preview(out / "preview.png", *known, np.random.default_rng(seed), bank=trained)
 
 
 def _furniture(folder: Path, out: Path) -> dict[str, list[str]]:
@@ -353,6 +355,12 @@ def _furniture(folder: Path, out: Path) -> dict[str, list[str]]:
     bank_of(wanted).write(out / FURNITURE)
     makers = {f"{piece.source}: {piece.maker} ({piece.licence})" for piece in wanted if role_of_maker(piece.maker) == "train"}
     return {"trained_on": sorted(makers), "left_out": left_out}
+
+
+def bank_in(dataset: Path) -> ShapeBank:
+    """The shapes that a dataset's windows name: none where it was made without real furniture."""
+    file = dataset / FURNITURE
+    return ShapeBank.read(file) if file.exists() else NO_BANK
 
 
 def load_pool(files: Iterable[Path]) -> dict[str, np.ndarray]:

@@ -28,7 +28,7 @@ _TURNED = 0.08  # radians
 _HARD = 0.12  # metres over a surface from which on the body does not sink into it
 _GIVES = pressed(0.03, hip=0.08, thigh=0.08, trunk=0.05, shoulder=0.05, elbow=0.045, wrist=0.045, hand=0.08)
 _SINKS = pressed(0.3, hip=1.0, thigh=1.0)
-_GIVES_LYING = pressed(0.14, hip=0.2, thigh=0.2, trunk=0.2, head=0.2, shoulder=0.2, elbow=0.2, wrist=0.2, hand=0.2)
+_GIVES_LYING = pressed(0.10, hip=0.2, thigh=0.2, trunk=0.2, head=0.2, shoulder=0.2, elbow=0.2, wrist=0.2, hand=0.2)
 _HEAD_FROM_END = (0.75, 1.1)  # metres between the middle of pelvis and chest and a bed's head
 _SLEEPS_FROM_EDGE = 0.32
 

@@ -12,8 +12,11 @@ from torch import Tensor
 from ..core.sampler import model_order
 from ..core.sensor import RADIUS, REACH, SPHERES
 from ..core.skeleton import END_EFFECTORS, MODEL_ORDER, UPPER
+from ..data.flesh import NO_BANK
 from ..data.prepare import POSE_UNIT, load_pool
+from ..data.shapes import ShapeBank
 from ..model.config import UPPER_SIZE, ModelConfig
+from .placed_shapes import DeviceBank
 
 __all__ = ["Statistics", "Pool", "Batch", "past_of", "observation_for", "occupancy_of", "seen"]
 
@@ -72,17 +75,18 @@ def past_of(poses: Tensor, velocity: Tensor, history: int) -> Tensor:
     return torch.cat(past + [velocity[:, k : k + frames] for k in range(history + 1)], dim=-1)
 
 
-def seen(file: Path) -> np.ndarray:
+def seen(file: Path, bank: DeviceBank) -> np.ndarray:
     """Occupancy of a shard's windows (N, 70, 2640) in bytes, 255 of which are 1; made once and kept beside the shard."""
     kept = file.with_suffix(".seen.npy")
     if not kept.exists():
         shard = load_pool([file])
-        boxes, root = torch.from_numpy(shard["boxes"]), torch.from_numpy(shard["root"])
+        boxes, shapes, root = (torch.from_numpy(shard[name]) for name in ("boxes", "shapes", "root"))
         part = file.with_suffix(f".{os.getpid()}.npy")
         out = np.lib.format.open_memmap(part, "w+", np.uint8, (*root.shape[:2], len(SPHERES)))
         for k in range(0, len(root), _AT_ONCE):
             some = slice(k, k + _AT_ONCE)
-            out[some] = (255.0 * occupancy_of(boxes[some], root[some])).round().to(torch.uint8).numpy()
+            found = torch.maximum(occupancy_of(boxes[some], root[some]), bank.occupancy(shapes[some], root[some]))
+            out[some] = (255.0 * found).round().to(torch.uint8).numpy()
         out.flush()
         part.rename(kept)
     return np.load(kept, mmap_mode="r")
@@ -94,8 +98,8 @@ class Pool:
     training; other devices make it.
     """
 
-    def __init__(self, files: Callable[[], Sequence[Path]], device: torch.device) -> None:
-        self.files, self.device = files, device
+    def __init__(self, files: Callable[[], Sequence[Path]], device: torch.device, bank: ShapeBank = NO_BANK) -> None:
+        self.files, self.device, self.bank = files, device, DeviceBank(bank, device)
         self.shards: dict[Path, dict[str, np.ndarray]] = {}
         self.refresh()
 
@@ -108,7 +112,7 @@ class Pool:
             if file not in self.shards:
                 self.shards[file] = load_pool([file])
                 if self.device.type == "cpu":
-                    self.shards[file]["seen"] = seen(file)
+                    self.shards[file]["seen"] = seen(file, self.bank)
         self.ends = np.cumsum([len(shard["poses"]) for shard in self.shards.values()])
 
     def statistics(self, most: int = 20) -> Statistics:
@@ -143,7 +147,10 @@ class Pool:
         velocity = (step - v_mean) / v_std
         way = ((a["ahead"] - a_mean) / a_std)[..., : config.ahead]
         now = poses[:, history:]
-        occupancy = a["seen"].float() / 255.0 if "seen" in a else occupancy_of(a["boxes"], a["root"])
+        if "seen" in a:
+            occupancy = a["seen"].float() / 255.0
+        else:
+            occupancy = torch.maximum(occupancy_of(a["boxes"], a["root"]), self.bank.occupancy(a["shapes"], a["root"]))
         return Batch(
             past_of(poses, velocity, history), now[..., :UPPER_SIZE], now[..., UPPER_SIZE:],
             torch.cat([velocity[:, history:], way], dim=-1), occupancy, step[:, history:],

@@ -25,6 +25,7 @@ from ..baselines.flows import flow_of, parts_of
 from ..core.errors import InputError
 from ..core.threads import cores
 from ..core.weights import Weights
+from ..data.prepare import bank_in
 from ..model.config import (
     AHEAD_SIZE,
     LOWER_SIZE,
@@ -293,7 +294,7 @@ def _statistics_of(kept: Checkpoint) -> Statistics:
 
 def dataset_pool(dataset: Path, device: str = "cpu") -> Pool:
     """The training windows of a dataset. Raises InputError where there are none."""
-    pool = Pool(lambda: sorted(Path(dataset).glob("pool-????.npz")), torch.device(device))
+    pool = Pool(lambda: sorted(Path(dataset).glob("pool-????.npz")), torch.device(device), bank_in(Path(dataset)))
     if not len(pool):
         raise InputError(f"The dataset '{dataset}' holds no windows; make it with 'dafnet prepare'.")
     return pool
@@ -338,7 +339,7 @@ def train_part(
     device = ranks.device_of(device)
     torch.backends.cuda.matmul.allow_tf32 = True
     pool = dataset_pool(dataset, device)
-    held = Pool(lambda: [Path(dataset) / "held.npz"], torch.device(device))
+    held = Pool(lambda: [Path(dataset) / "held.npz"], torch.device(device), bank_in(Path(dataset)))
     predictor = None if part == "predictor" or not model.predicts else Run.load("predictor", folder, device=device)
     if checkpoint_file(folder, part).exists():
         run = Run.load(part, folder, config, device)
