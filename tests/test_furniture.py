@@ -116,8 +116,7 @@ MOTIONS = {
 @pytest.mark.parametrize("name", MOTIONS)
 @pytest.mark.parametrize("yaw", [0.0, 2.1])
 def test_no_piece_cuts_the_swept_body(name, yaw):
-    joints = _turned(MOTIONS[name](), yaw)
-    path, rooms = root_from_joints(joints), 0
+    joints, rooms = _turned(MOTIONS[name](), yaw), 0
     for seed in range(12):
         boxes, reason = _furnished(seed, joints)
         assert (boxes is None) == bool(reason)
@@ -209,7 +208,6 @@ def test_a_lying_body_gets_a_bed_and_a_body_on_the_floor_none():
     joints = _lies()
     (use,) = lying(joints)
     assert abs(use.yaw + np.pi / 2) < 0.1, "the head lies along +x"
-    path = root_from_joints(joints)
     for seed in range(8):
         boxes, reason = _furnished(seed, joints)
         assert boxes is not None, reason
