@@ -101,7 +101,7 @@ def _carrier(
 def _surface(
     rng: np.random.Generator, top: float, thick: float, x: float, back: float, front: float
 ) -> list[np.ndarray]:
-    """What one sits on, from ``back`` to ``front`` (y), ``x`` to either side: whole, of slats, open in the middle, cushioned."""
+    """What one sits on, from ``back`` to ``front`` (y), ``x`` to either side: whole, slatted, open in the middle, cushioned."""
     middle, depth = (front + back) / 2, front - back
     style = rng.choice(["whole", "slats", "open", "cushion"], p=[0.6, 0.16, 0.08, 0.16])
     if style == "slats" and thick < 0.09:

@@ -6,7 +6,7 @@ figures of different weights are of the same test. It holds no motion; that come
 
 import json
 from collections import defaultdict
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from ..core.root import RootPath, raw_root_from_joints
 from ..core.rotations import yaw_matrix
 from ..core.solids import Box, Scene
 from .canonical import calibrate, canonical
+from .flesh import Furnishing
 from .joins import joined
 from .mocap import Clip, read_clips
 from .prepare import load_motions
@@ -46,6 +47,7 @@ class HeldClip:
     ``scene``. ``rests``: seated episodes, on a bed lying ones. ``activity``: one of ``ACTIVITIES``. ``unseen``: whether the
     body has no clip in training. ``composed``: whether it was made of several clips, or raised from the floor onto a bed.
     ``room``: what there is beside seats and chance pieces, "desk", "shelf" or "bed" where the body uses one, else "".
+    ``real``: real pieces beside the boxes; ``piece``: the one that carries the body, with its ``kind`` and ``maker``.
     """
 
     name: str
@@ -58,10 +60,15 @@ class HeldClip:
     path: RootPath
     boxes: np.ndarray
     rests: tuple[Rest, ...]
+    real: Furnishing = field(default_factory=Furnishing)
+    piece: str = ""
+    kind: str = ""
+    maker: str = ""
 
     @property
     def scene(self) -> Scene:
-        return scene_of(self.boxes)
+        """All furniture, as the core knows it."""
+        return Scene((*scene_of(self.boxes).solids, *self.real.scene().solids))
 
 
 def fingerprint(joints: np.ndarray) -> list[float]:

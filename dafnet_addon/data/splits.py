@@ -6,7 +6,7 @@ What is told must not have been chosen by, and what chooses must not have been t
 
 from .mocap import Clip
 
-__all__ = ["TRAINED_ON_PARTLY", "role_of_clip", "role_of_maker"]
+__all__ = ["TRAINED_ON_PARTLY", "role_of_body", "role_of_clip", "role_of_maker"]
 
 _CHOOSING_BODIES = {("mhad", "MHAD_s09"), ("mhad", "MHAD_s10")}
 _NAMELESS = {"cmu_expmap"}  # whose people may be those of the test
@@ -18,15 +18,18 @@ _TELLING_MAKERS = {"Kator Legaz"}
 
 
 def role_of_clip(clip: Clip) -> str:
-    """ "train", "choose" or "tell", or "" for a clip that is not used."""
+    """Whether a clip is there to "train", "choose" or "tell"; "" where it is not used."""
     if clip.source in _NAMELESS:
         return ""
     if (clip.source, clip.subject) in _CHOOSING_BODIES:
         return "choose"
-    if clip.split == "test":
-        partly = clip.source in TRAINED_ON_PARTLY or f"{clip.source}/{clip.subject}" in TRAINED_ON_PARTLY
-        return "choose" if partly else "tell"
-    return clip.split
+    return role_of_body(clip.source, clip.subject) if clip.split == "test" else clip.split
+
+
+def role_of_body(source: str, subject: str) -> str:
+    """Whether the test clips of a body "choose" or "tell"."""
+    partly = source in TRAINED_ON_PARTLY or f"{source}/{subject}" in TRAINED_ON_PARTLY
+    return "choose" if partly or (source, subject) in _CHOOSING_BODIES else "tell"
 
 
 def role_of_maker(maker: str) -> str:

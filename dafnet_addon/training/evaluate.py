@@ -5,6 +5,7 @@ head and hands in EE, the true upper body in FULL; nothing is cleaned up after t
 a ratio of sums over clips, its interval (95 %) a bootstrap over clips.
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..baselines.samplers import sampler_of
+from ..core import liveliness
 from ..core.cleanup import CleanUp
 from ..core.conditions import PREROLL, Shot, shot_steps
 from ..core.generate import cleaned_up
@@ -41,7 +43,7 @@ from ..data.held_out import HeldClip
 from .processes import spread_out
 
 __all__ = [
-    "SEEDS", "Figures", "Measured", "beside", "captured", "figures", "in_processes", "made", "measured", "row",
+    "COLUMNS", "SEEDS", "Figures", "Measured", "beside", "captured", "figures", "in_processes", "made", "measured", "row",
     "rows", "rows_of", "shot_of", "table",
 ]
 
@@ -51,8 +53,9 @@ _RUNS = (
     "ground_truth", "free_t0", "free_t0_clean", "free_t1", "ee_t0", "ee_t0_clean", "ee_t1", "full_t0", "full_t0_clean",
     "full_t1",
 )
-_SITS_WITHIN = 0.06  # metres
+_SITS_WITHIN = (2, 4, 6, 8)  # centimetres between the made and the real pelvis, the median over an episode
 _STANDING, _STANDS_ABOVE = 0.90, 0.86  # metres, the pelvis of one that stands: the real one's, and at least
+_DEEP = 0.02  # metres inside furniture, from where on a body is seen to penetrate it
 _OFF_FLOOR = 0.07  # metres; under it the paper counts a toe base as low
 _DRAWS = 1000
 _LEGS = [1 + 4 * (j - 1) + k for j in LOWER for k in range(4)]  # of ``body_points``
@@ -122,6 +125,8 @@ def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
         "skate_cm": (each(lambda j: skate(j, 30.0)), weight),
         "bad_collisions_per_frame": (float(bad_collisions(reach(flat[:, list(BAD_COLLISION_JOINTS)])).sum()), weight),
         "penetration_mean": (penetration(points)[0] * weight, weight),
+        "penetrates": (float((points < -_DEEP).any(1).sum()), weight),
+        "penetration_deepest": (float(np.maximum(-points.min(1), 0.0).sum()), weight),
         "end_effector_error": (end_effector_distance(flat, targets) * weight, weight),
         "jerk": (each(lambda j: jerk(j, 30.0)), weight),
         "stands_when_it_should": (float((takes[:, standing, 0, 2] > _STANDS_ABOVE).sum()), float(count * standing.sum())),
@@ -138,8 +143,27 @@ def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
         float(np.median(take[r.start : r.end, 0, 2]) - np.median(clip.joints[r.start : r.end, 0, 2]))
         for take in takes for r in clip.rests
     ]
-    sums["sits_within_6cm"] = (float(sum(abs(error) <= _SITS_WITHIN for error in seats)), float(len(seats)))
-    return Figures(sums, seats)
+    for within in _SITS_WITHIN:
+        sums[f"sits_within_{within}cm"] = (float(sum(abs(error) <= within / 100 for error in seats)), float(len(seats)))
+    return Figures(sums | _life(clip, takes), seats)
+
+
+def _life(clip: HeldClip, takes: np.ndarray) -> Sums:
+    """How lively takes (S, T, 22, 3) are, how they sway, sit down and lean: means over takes and episodes that show it."""
+    found: dict[str, list[float]] = defaultdict(list)
+    forward = np.stack([-np.sin(clip.path.yaw), np.cos(clip.path.yaw)], axis=-1)
+    for take in takes:
+        for name, joints in liveliness.LIVELY.items():
+            found[f"speed_{name}"].append(liveliness.speed(take, 30.0, joints))
+        for band, value in liveliness.band_speeds(take, 30.0, liveliness.LIVELY["wrists"] + liveliness.LIVELY["head"]).items():
+            found[f"speed_{band}"].append(value)
+        found["sway"].append(liveliness.sway(take, 30.0))
+        leans = np.degrees(liveliness.lean(take, forward))
+        for rest in clip.rests:
+            found["descent_seconds"].append(liveliness.descent(take, 30.0, rest.start))
+            found["lean_degrees"].append(float(np.median(leans[rest.start : rest.end])))
+    known = {name: [value for value in values if np.isfinite(value)] for name, values in found.items()}
+    return {name: (float(np.sum(values)), float(len(values))) for name, values in known.items()}
 
 
 def _noise(sampler: Sampler, seed: int, seeds: int, mode: str) -> tuple[np.ndarray, dict[str, list[int]]]:
@@ -258,17 +282,18 @@ def rows(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
     return out
 
 
-_COLUMNS = (
+COLUMNS = (
     "clips", "seat_episodes", "sits_within_6cm", "seat_error_median", "stands_when_it_should", "end_effector_error",
     "upper_body_error", "foot_sliding_per_frame", "foot_sliding_4mm_s", "skate_cm", "bad_collisions_per_frame",
     "penetration_mean", "jerk", "apd_upper", "apd_legs", "over_ee", "over_full", "feet_off_floor", "toes_under_floor",
     "legs_penetration_mean",
 )
+"""The figures of a table, in order."""
 
 
-def table(rows: dict[str, dict[str, Any]]) -> str:
+def table(rows: dict[str, dict[str, Any]], columns: Sequence[str] = COLUMNS) -> str:
     """The rows as a Markdown table, intervals in brackets."""
-    names = [name for name in _COLUMNS if any(values.get(name) is not None for values in rows.values())]
+    names = [name for name in columns if any(values.get(name) is not None for values in rows.values())]
 
     def cell(values: dict[str, Any], name: str) -> str:
         if values.get(name) is None:

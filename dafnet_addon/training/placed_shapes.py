@@ -35,7 +35,7 @@ class DeviceBank:
         self.spheres = torch.as_tensor(SPHERES, **single)
 
     def occupancy(self, placed: Tensor, root: Tensor) -> Tensor:
-        """Occupancy (B, T, 2640) of ``placed`` shapes (B, S, 5), whose number may be −1 for none, seen from ``root`` (B, T, 3)."""
+        """Occupancy (B, T, 2640) of ``placed`` shapes (B, S, 5), number −1 for none, seen from ``root`` (B, T, 3)."""
         windows, frames, _ = root.shape
         out = torch.zeros(windows * frames, len(SPHERES), device=self.device)
         if not self.count:
