@@ -211,6 +211,8 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     evaluate.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="write evaluation.json, .md and .png there")
     evaluate.add_argument("--save", action="store_true", help="write the figures into the weights' metadata")
     evaluate.add_argument("--sheets", type=Path, metavar="FOLDER", help="also draw twenty clips, real beside generated")
+    evaluate.add_argument("--furniture", type=Path, metavar="LIBRARY", help="measure among these real pieces instead")
+    evaluate.add_argument("--role", choices=["choose", "tell"], default="choose", help="whose bodies and makers, then")
 
     bench = command(
         "bench", _bench, "measure: 'seats' sits on ten heights from three sides; 'speed' times every system",
@@ -368,6 +370,8 @@ def _evaluate(options: argparse.Namespace, bar: "_Bar") -> _Result:
 
     for folder in filter(None, (options.output, options.sheets)):
         require_writable(folder / "evaluation.json")
+    if options.furniture:
+        return _evaluate_among_real(options, bar)
     clips = held_out(options.folder)
     if _is_samp(options.weights):
         return _evaluate_samp(options, clips, bar)
@@ -387,6 +391,22 @@ def _evaluate(options: argparse.Namespace, bar: "_Bar") -> _Result:
 
 def _is_samp(weights: Path | None) -> bool:
     return weights is not None and weights.suffix in (".checkpoint", ".pt")
+
+
+def _evaluate_among_real(options: argparse.Namespace, bar: "_Bar") -> _Result:
+    """The test among real furniture: seats by kind, maker and body."""
+    from .core.weights import load_weights
+    from .data.real_test import real_test
+    from .training.real_report import real_report, real_text
+
+    if options.save or options.sheets:
+        raise InputError("Of the test among real furniture only the tables are made; leave out --save and --sheets.")
+    weights = load_weights(options.weights)
+    found = real_report(weights, real_test(options.folder, options.furniture, options.role), bar)
+    if options.output:
+        save_text(options.output / f"real-{options.role}.json", json.dumps(found, indent=2))
+        save_text(options.output / f"real-{options.role}.md", real_text(found))
+    return found, real_text(found)
 
 
 def _evaluate_samp(options: argparse.Namespace, clips: "list[HeldClip]", bar: "_Bar") -> _Result:

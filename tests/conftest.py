@@ -75,6 +75,7 @@ def dataset(tmp_path: Path) -> Path:
 
     from dafnet_addon.data import boxes as boxes_module
     from dafnet_addon.data.prepare import POSE_UNIT
+    from dafnet_addon.data.shapes import ABSENT_SHAPE, SHAPES
 
     rng, windows = np.random.default_rng(0), 12
     sway = np.sin(np.linspace(0, 6, 80))[None, :, None] * rng.uniform(0.05, 0.2, (windows, 1, 66))
@@ -84,6 +85,7 @@ def dataset(tmp_path: Path) -> Path:
     pool = {
         "poses": np.round(poses / POSE_UNIT).astype(np.int16), "velocity": rng.normal(scale=0.01, size=(windows, 80, 3)),
         "ahead": rng.normal(size=(windows, 70, 18)), "root": rng.normal(scale=0.1, size=(windows, 70, 3)), "boxes": rows,
+        "shapes": np.tile(ABSENT_SHAPE, (windows, SHAPES, 1)),
     }
     pool = {name: a if a.dtype == np.int16 else a.astype(np.float32) for name, a in pool.items()}
     pool["kinds"] = np.array(["walk"] * windows)

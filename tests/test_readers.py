@@ -608,7 +608,8 @@ def test_a_sheet_is_drawn_for_any_length(tmp_path):
     touching = np.ones((30, 5), dtype=bool)
     plain, full = tmp_path / "plain.png", tmp_path / "full.png"
     sheet(plain, [("a pose", REST[None], None), ("a motion", _standing(30), None)], columns=3)
-    sheet(full, [("a pose", REST[None], None), ("a motion", _standing(30), Furnishing(seat))], columns=3, contacts=[None, touching])
+    rows = [("a pose", REST[None], None), ("a motion", _standing(30), Furnishing(seat))]
+    sheet(full, rows, columns=3, contacts=[None, touching])
     assert 5_000 < plain.stat().st_size < full.stat().st_size, "furniture and contacts are drawn too"
 
 

@@ -15,6 +15,7 @@ from dafnet_addon.core.root import RootPath, ahead, velocities  # noqa: E402
 from dafnet_addon.core.rotations import rotate, yaw_matrix  # noqa: E402
 from dafnet_addon.core.skeleton import OFFSETS, PARENTS, REST, SEAT_TO_PELVIS, joint  # noqa: E402
 from dafnet_addon.data.boxes import ABSENT, MOST, NO_BOXES, box  # noqa: E402
+from dafnet_addon.data.shapes import ABSENT_SHAPE, SHAPES  # noqa: E402
 from dafnet_addon.data.held_out import HeldClip  # noqa: E402
 from dafnet_addon.data.prepare import POSE_UNIT  # noqa: E402
 from dafnet_addon.training import precision  # noqa: E402
@@ -54,6 +55,7 @@ def _windows(
         "poses": np.round(np.tile(pose.reshape(66), (80, 1)) / POSE_UNIT).astype(np.int16),
         "velocity": velocities(path)[1:81], "ahead": ahead(path)[11:81],
         "root": np.c_[path.position[11:81, :2], path.yaw[11:81]], "boxes": rows,
+        "shapes": np.tile(ABSENT_SHAPE, (SHAPES, 1)),
     }
     return {name: np.stack([a] * count) for name, a in window.items()}
 

@@ -151,6 +151,39 @@ def test_resuming_is_exact(dataset, tmp_path):
         assert torch.allclose(a, b, atol=1e-5)
 
 
+def test_a_rate_holds_then_falls_and_a_larger_budget_goes_on_from_before_it_fell(dataset, tmp_path):
+    model, folder = replace(TINY, system="moglow", steps_whole=1), tmp_path / "run"
+    config = replace(_config(1), steps_flow=10, cool_down=0.4, peak=1e-3, final=0.0, warmup=1)
+    rates = [config.rate(step, step / 10) for step in range(11)]
+    assert rates[:7] == [1e-3] * 7 and rates[10] == 0.0 and abs(rates[8] - 0.5e-3) < 1e-9
+    cooled = train_part("whole", dataset, folder, model, config)
+    assert cooled.step == 10
+    log = folder / "log.jsonl"
+    longer = train_part("whole", dataset, folder, model, replace(config, steps_flow=20))
+    steps = [json.loads(line)["step"] for line in log.read_text(encoding="utf-8").splitlines()]
+    assert longer.step == 20 and steps == [*range(1, 11), *range(8, 21)], "from the last step at the full rate"
+    once = train_part("whole", dataset, tmp_path / "once", model, replace(config, steps_flow=20))
+    for a, b in zip(longer.network.parameters(), once.network.parameters(), strict=True):
+        assert torch.equal(a, b), "as if the budget had been known from the beginning"
+    for name, value in longer.averaged.items():
+        assert torch.equal(value, once.averaged[name])
+
+
+def test_what_is_exported_is_the_average(dataset, tmp_path):
+    model = replace(TINY, system="moglow", steps_whole=1)
+    config = replace(_config(1), steps_flow=6, average=0.9)
+    run = train_part("whole", dataset, tmp_path, model, config)
+    flow, _, _ = trained(tmp_path)
+    apart = 0.0
+    for name, parameter in flow.parts()["whole"].named_parameters():
+        assert torch.equal(parameter, run.averaged[name])
+        apart += float((parameter.detach() - dict(run.network.named_parameters())[name].detach()).abs().max())
+    assert apart > 0.0
+    with run.with_average() as network:
+        assert all(torch.equal(p, run.averaged[name]) for name, p in network.named_parameters())
+    assert not all(torch.equal(p, run.averaged[name]) for name, p in run.network.named_parameters())
+
+
 def test_a_loss_that_is_no_number_stops_with_the_last_good_state(dataset, tmp_path):
     folder = tmp_path / "run"
     _until("predictor", dataset, folder, steps=2)

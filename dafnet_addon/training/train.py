@@ -2,7 +2,8 @@
 
 A run lives in a folder: ``predictor.checkpoint``, ``upper.checkpoint``, ``lower.checkpoint`` (each resumes exactly where it
 was saved), ``log.jsonl``, and ``tensorboard``.
-Time, not steps, is the budget: the learning rate follows the share of the minutes that is spent.
+Time, not steps, is the budget: the learning rate stays, and falls as the last of the minutes are spent. A run that gets more of
+them goes on from before it fell, so that a training may run for days and give weights at any time.
 """
 
 import json
@@ -10,9 +11,10 @@ import math
 import multiprocessing
 import time
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -57,13 +59,16 @@ __all__ = [
 ]
 
 _MOST_NUMBERS = 1 << 28
+_HELD = "-held"  # behind the name of a part: its checkpoint from before its rate fell
 """Of the networks that a checkpoint's settings describe: a GB; the paper's sizes are a seventh of it."""
 
 
 @dataclass(frozen=True)
 class TrainingConfig:
     """``minutes_predictor``, ``minutes_flow``: time budgets; ``steps_flow``, where not 0, is the flow's instead. Learning rates
-    rise over ``warmup`` steps to ``peak`` and fall along a cosine to ``final``. ``slot_dropout``: share of past-pose slots
+    rise over ``warmup`` steps to ``peak``, stay there, and fall straight to ``final`` over the last ``cool_down`` share of the
+    budget: a run that gets a larger budget goes on from before it cooled. What a run is worth are its weights averaged over
+    about 1 / (1 - ``average``) steps. ``slot_dropout``: share of past-pose slots
     hidden from the predictor while it learns, and of past poses hidden from MoGlow. ``environment_dropout``: share of sensor
     values hidden from all, in a share ``dropout_windows`` of the windows (the paper hides them in all; then only whole layers
     of spheres are told apart, and seats are met to 12 cm). ``clip_norm``: largest gradient norm. ``free_run``: weight of the
@@ -79,6 +84,8 @@ class TrainingConfig:
     warmup: int = 150
     peak: float = 2e-3
     final: float = 1e-4
+    cool_down: float = 0.3
+    average: float = 0.99
     slot_dropout: float = 0.95
     environment_dropout: float = 0.5
     dropout_windows: float = 0.5
@@ -96,6 +103,8 @@ class TrainingConfig:
             least = 1 if name in ("batch", "warmup", "save_every") else 0
             if not least <= value < math.inf:
                 raise ValueError(f"'{name}' must be {least} or more")
+        if self.cool_down > 1.0 or self.average >= 1.0:
+            raise ValueError("'cool_down' must be 1 at most, and 'average' less than 1")
 
     def share(self, step: int, seconds: float) -> float:
         """Share of the flow's budget that is spent."""
@@ -103,7 +112,8 @@ class TrainingConfig:
 
     def rate(self, step: int, share: float) -> float:
         """Learning rate of the step after ``step`` steps, ``share`` of the budget being spent."""
-        rate = self.final + 0.5 * (self.peak - self.final) * (1.0 + math.cos(math.pi * share))
+        left = (1.0 - share) / self.cool_down if self.cool_down else 1.0
+        rate = self.final + (self.peak - self.final) * min(1.0, left)
         return rate * min(1.0, (step + 1) / self.warmup)
 
 
@@ -150,6 +160,8 @@ class Run:
                 module.mixed = self.config.mixed
         self.network: nn.Module = self.gmvae if part == "predictor" else self.flow.parts()[part]
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=config.peak)
+        self.averaged = {name: p.detach().clone() for name, p in self.network.named_parameters()}
+        """The parameters, averaged over the last steps."""
         self.step, self.seconds = 0, 0.0
         self.adopted = ""
         """How the weights that the run began with were trained, in their own words; nothing where it began anew."""
@@ -161,6 +173,39 @@ class Run:
         else:
             adopt_part(self.flow.parts()[self.part], self.part, weights, self.model)
         self.adopted = weights.metadata.get("training", "not said")
+        self.averaged = {name: p.detach().clone() for name, p in self.network.named_parameters()}
+
+    @torch.no_grad()
+    def average(self) -> None:
+        """Take the parameters after a step into their average: at first all alike, then the older the less."""
+        keep = min(self.config.average, self.step / (self.step + 10.0))
+        parameters = dict(self.network.named_parameters())
+        torch._foreach_lerp_(list(self.averaged.values()), [parameters[name].data for name in self.averaged], 1.0 - keep)
+
+    @contextmanager
+    def with_average(self) -> Iterator[nn.Module]:
+        """The network with its averaged parameters, for as long as the context lasts."""
+        parameters = dict(self.network.named_parameters())
+        latest = {name: p.detach().clone() for name, p in parameters.items()}
+        try:
+            self._set(self.averaged)
+            yield self.network
+        finally:
+            self._set(latest)
+
+    def adopt_average(self) -> None:
+        """Let the network be its average from now on."""
+        self._set(self.averaged)
+
+    @torch.no_grad()
+    def _set(self, values: dict[str, torch.Tensor]) -> None:
+        for name, parameter in self.network.named_parameters():
+            parameter.copy_(values[name])
+
+    @property
+    def cools(self) -> bool:
+        """Whether the rate has begun to fall."""
+        return self.share > 1.0 - self.config.cool_down
 
     @property
     def share(self) -> float:
@@ -169,26 +214,29 @@ class Run:
             return min(1.0, self.seconds / max(60.0 * self.config.minutes_predictor, 1e-9))
         return self.config.share(self.step, self.seconds)
 
-    def save(self) -> None:
-        """Keep the run as it is, to be gone on with exactly from here."""
+    def save(self, name: str = "") -> None:
+        """Keep the run as it is, to be gone on with exactly from here; under another ``name`` than its part's, where given."""
         statistics = {name: torch.from_numpy(value.astype(float)) for name, value in asdict(self.statistics).items()}
         tensors = {
             **of_training(self.network, self.optimiser),
+            **{f"averaged.{name}": value for name, value in self.averaged.items()},
             **{f"generator.{name}": state for name, state in generators(self.device).items()},
             **{f"statistics.{name}": values for name, values in statistics.items()},
         }
-        write_checkpoint(checkpoint_file(self.folder, self.part), tensors, {
+        write_checkpoint(checkpoint_file(self.folder, name or self.part), tensors, {
             "model": self.model.as_dict(), "config": asdict(self.config), "step": self.step, "seconds": self.seconds,
             "adopted": self.adopted,
         })
 
     @staticmethod
-    def load(part: str, folder: Path, config: TrainingConfig | None = None, device: str = "cpu") -> "Run":
-        """The run saved in ``folder``; ``config`` replaces its settings, a longer budget for example.
+    def load(
+        part: str, folder: Path, config: TrainingConfig | None = None, device: str = "cpu", name: str = ""
+    ) -> "Run":
+        """The run saved in ``folder``; ``config`` replaces its settings, a longer budget for example; ``name`` as in ``save``.
 
         Raises InputError where the checkpoint is missing, damaged, of an earlier version, or does not fit itself.
         """
-        kept = Checkpoint.read(checkpoint_file(folder, part))
+        kept = Checkpoint.read(checkpoint_file(folder, name or part))
         model = kept.settings(ModelConfig, "model")
         if part != "predictor" and part not in parts_of(model):
             raise kept.refused(f"its model has no part '{part}'")
@@ -200,6 +248,7 @@ class Run:
         settings = config or kept.settings(TrainingConfig, "config")
         run = Run(part, folder, model, settings, _statistics_of(kept), device)
         kept.restore(run.network, run.optimiser)
+        run.averaged = {key: kept.tensor(f"averaged.{key}", like).to(run.device) for key, like in run.averaged.items()}
         run.step, run.seconds = kept.progress()
         run.adopted = kept.text("adopted")
         kept.set_generators(run.device)
@@ -342,7 +391,7 @@ def train_part(
     held = Pool(lambda: [Path(dataset) / "held.npz"], torch.device(device), bank_in(Path(dataset)))
     predictor = None if part == "predictor" or not model.predicts else Run.load("predictor", folder, device=device)
     if checkpoint_file(folder, part).exists():
-        run = Run.load(part, folder, config, device)
+        run = _resumed(part, folder, config, device)
         if run.model != model:
             own = run.model.as_dict()
             other = [f"{name} {own[name]}, not {value}" for name, value in model.as_dict().items() if own[name] != value]
@@ -360,26 +409,31 @@ def train_part(
     if ranks.rank():
         torch.manual_seed(hash((config.seed, run.step, ranks.rank())) % 2**31)
     if predictor is not None:
-        run.gmvae.load_state_dict(predictor.network.state_dict())
+        with predictor.with_average() as network:
+            run.gmvae.load_state_dict(network.state_dict())
         run.gmvae.requires_grad_(False)
     recent: list[torch.Tensor] = []
     writer = SummaryWriter(str(folder / "tensorboard" / part)) if ranks.rank() == 0 else None
     clock = clock_of(run.device)
     while run.share < 1.0:
-        begin = clock()
+        begin, held_its_rate = clock(), not run.cools
         rows = torch.randint(len(pool), (config.batch,))
         loss = run.loss(pool.batch(rows, run.statistics, run.model), initialise=run.step == 0 and not run.adopted)
         descend(run.network, run.optimiser, loss, run.config, run.step, run.share)
         recent.append(loss.detach())
         run.step += 1
+        run.average()
         if run.step % config.save_every == 0:
             torch.stack(recent).mean().item()  # what a device still has to do is counted too
         run.seconds = ranks.mean(run.seconds + clock() - begin, run.device)
+        if held_its_rate and run.cools and writer is not None:
+            run.save(f"{part}{_HELD}")
         if run.step % config.save_every == 0 or run.share >= 1.0:
             mean = ranks.mean(float(torch.stack(recent).mean()), run.device)
             if not math.isfinite(mean):
                 raise InputError(f"The loss of '{part}' is no number by step {run.step}; resume with a lower peak rate.")
-            held_out = run.held_loss(held)
+            with run.with_average():
+                held_out = run.held_loss(held)
             if writer is not None:
                 values = {
                     "part": part, "step": run.step, "minutes": run.seconds / 60, "loss": mean, "held_out": held_out,
@@ -395,6 +449,17 @@ def train_part(
             recent.clear()
             pool.refresh()
     return run
+
+
+def _resumed(part: str, folder: Path, config: TrainingConfig, device: str) -> Run:
+    """The saved run; where its budget has grown since its rate fell, as it was before that."""
+    name = f"{part}{_HELD}"
+    if checkpoint_file(folder, name).exists():
+        run = Run.load(part, folder, config, device, name)
+        # A share of the old budget in which the rate fell is less of a new one.
+        if not run.cools:
+            return run
+    return Run.load(part, folder, config, device)
 
 
 def train(
@@ -438,10 +503,11 @@ def train(
 
 
 def trained(folder: Path) -> tuple[BodyFlow, ActionPredictor | None, Statistics]:
-    """The flow, the predictor (of MoGlow none) and the statistics of a run's latest checkpoints."""
+    """The flow, the predictor (of MoGlow none) and the statistics of a run's latest checkpoints, their weights averaged."""
     runs = _checkpoints(folder)
     flow = next(run.flow for part, run in runs.items() if part != "predictor")
     for part, run in runs.items():
+        run.adopt_average()
         if part != "predictor":
             setattr(flow, part, run.network)
     predictor = runs["predictor"].gmvae.predictor if "predictor" in runs else None
