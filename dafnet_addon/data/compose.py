@@ -41,6 +41,7 @@ _HIGHEST_BED = 0.62
 _CARRIES, _WRIST_LIES = 0.02, 0.09  # metres over a bed: of a body, against the bare floor; and of a wrist whose hand lies on it
 _TURNING = 66  # frames of getting onto a bed
 _WAITS = 90  # frames
+_SITS = 16  # sit-downs of one body that are composed with
 _IDLES = 45  # pieces of standing that are used, of many that are alike
 _BOARD = np.array([0.0, 0.6])  # from the root that stands before it; or a counter
 LEANS = (-0.3, -0.15, 0.0, 0.0, 0.15, 0.3)  # radians; back is positive
@@ -226,12 +227,20 @@ def _lying(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed]:
         yield from made("lie", sit.name + " reversed", sit.subject, "lying", whole[::-1], np.arange(0, frames - start, 5))
 
 
+def _some_of_each_body(sits: list[Piece]) -> list[Piece]:
+    """At most ``_SITS`` sit-downs of one body, spread over all that it has: who sat down a hundred times sat much alike."""
+    bodies: dict[str, list[Piece]] = {}
+    for sit in sits:
+        bodies.setdefault(sit.subject, []).append(sit)
+    return [own[k] for own in bodies.values() for k in np.unique(np.linspace(0, len(own) - 1, _SITS).round().astype(int))]
+
+
 def composed(motions: list[Motion]) -> list[Composed]:
     """All composed motions of captured ones on the canonical body; the same for the same motions."""
     to, away = pool_of(motions, arriving=True), pool_of(motions, arriving=False)
     sits = list(sit_downs(motions))
     # Many of those with borrowed arms, and all of them begin in front of the seat.
-    sits = [s for s in sits if not s.borrowed] + [s for s in sits if s.borrowed][::9]
+    sits = _some_of_each_body([s for s in sits if not s.borrowed]) + [s for s in sits if s.borrowed][::9]
     return [
         *_to_and_from_seats(motions, sits, to, away), *_waiting(sits), *_while_seated(motions, sits),
         *_while_standing(motions, to, away), *_lying(motions, sits),
