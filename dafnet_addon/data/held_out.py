@@ -66,9 +66,14 @@ class HeldClip:
     maker: str = ""
 
     @property
+    def furniture(self) -> Furnishing:
+        """All furniture, boxes and real pieces."""
+        return Furnishing(self.boxes) + self.real
+
+    @property
     def scene(self) -> Scene:
-        """All furniture, as the core knows it."""
-        return Scene((*scene_of(self.boxes).solids, *self.real.scene().solids))
+        """The same, as the core knows it."""
+        return self.furniture.scene()
 
 
 def fingerprint(joints: np.ndarray) -> list[float]:

@@ -51,7 +51,7 @@ def _sitting(motions: Sequence[Motion]) -> Iterator[tuple[Motion, int, int, Rest
 def _by_kind(pieces: Sequence[Piece], rng: np.random.Generator) -> list[Piece]:
     """The pieces in an order in which kinds take turns."""
     turns: dict[str, int] = {}
-    rows = []
+    rows: list[tuple[int, int, Piece]] = []
     for i in rng.permutation(len(pieces)):
         kind = pieces[i].kind
         turns[kind] = turns.get(kind, -1) + 1

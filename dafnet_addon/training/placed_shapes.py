@@ -28,11 +28,14 @@ class DeviceBank:
         ]
         self.values = torch.from_numpy(np.concatenate([shape.values.ravel() for shape in bank.shapes])).to(device)
         self.sizes, self.first = torch.as_tensor(sizes, device=device), torch.as_tensor(first, device=device)
-        single = {"dtype": torch.float32, "device": device}
-        self.origins = torch.as_tensor(np.stack([shape.origin for shape in bank.shapes]), **single)
-        self.spacings = torch.as_tensor([shape.spacing for shape in bank.shapes], **single)
-        self.reaches = torch.as_tensor(np.array(reach), **single) + REACH + RADIUS
-        self.spheres = torch.as_tensor(SPHERES, **single)
+
+        def single(values: np.ndarray) -> Tensor:
+            return torch.as_tensor(np.asarray(values), dtype=torch.float32, device=device)
+
+        self.origins = single(np.stack([shape.origin for shape in bank.shapes]))
+        self.spacings = single(np.array([shape.spacing for shape in bank.shapes]))
+        self.reaches = single(np.array(reach)) + REACH + RADIUS
+        self.spheres = single(SPHERES)
 
     def occupancy(self, placed: Tensor, root: Tensor) -> Tensor:
         """Occupancy (B, T, 2640) of ``placed`` shapes (B, S, 5), number −1 for none, seen from ``root`` (B, T, 3)."""

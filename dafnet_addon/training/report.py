@@ -36,9 +36,8 @@ from ..core.skeleton import SEAT_TO_PELVIS
 from ..core.take import Controls
 from ..core.weights import Weights
 from ..data.boxes import box, placed
-from ..data.flesh import Furnishing
 from ..data.held_out import ACTIVITIES, HeldClip, scene_of
-from ..data.sheet import sheet
+from ..data.sheet import Row, sheet
 from .batches import NOISE
 from .evaluate import (
     SEEDS,
@@ -460,8 +459,8 @@ def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) ->
         of_it = [clip for clip in clips if clip.unseen and _kind(clip) == kind]
         chosen += [of_it[i] for i in np.unique(np.linspace(0, len(of_it) - 1, min(count, len(of_it))).astype(int))]
     takes = in_processes(weights, _calm, chosen, lambda share: None)
-    drawn: list[tuple[str, np.ndarray, np.ndarray | None]] = [
-        (f"{clip.name}, {kind}", joints, Furnishing(clip.boxes))
+    drawn: list[Row] = [
+        (f"{clip.name}, {kind}", joints, clip.furniture)
         for clip, take in zip(chosen, takes, strict=True)
         for kind, joints in (("composed" if clip.composed else "real", clip.joints), ("generated", take))
     ]
