@@ -14,8 +14,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.root import RootPath, raw_root_from_joints
-from ..core.rotations import yaw_matrix
-from ..core.solids import Box, Scene
+from ..core.solids import Scene
 from .canonical import calibrate, canonical
 from .flesh import Furnishing
 from .joins import joined
@@ -24,7 +23,7 @@ from .prepare import load_motions
 from .rests import Rest, rest_of
 from .windows import Motion, mirrored, motion_of
 
-__all__ = ["ACTIVITIES", "FROZEN", "HeldClip", "fingerprint", "held_out", "is_frozen", "scene_of", "test_motions"]
+__all__ = ["ACTIVITIES", "FROZEN", "HeldClip", "fingerprint", "held_out", "is_frozen", "test_motions"]
 
 FROZEN = Path(__file__).with_name("held_out.json")
 ACTIVITIES = {
@@ -88,11 +87,6 @@ def is_frozen(joints: np.ndarray, frozen: dict[str, Any]) -> bool:
     return len(joints) == frozen["frames"] and bool(
         np.abs(np.subtract(fingerprint(joints), frozen["fingerprint"])).max() <= _SAME
     )
-
-
-def scene_of(rows: np.ndarray) -> Scene:
-    """Boxes (B, 7) as solids."""
-    return Scene(tuple(Box(center=r[:3], half_size=r[3:6], rotation=yaw_matrix(r[6])) for r in rows))
 
 
 def test_motions(folder: Path) -> dict[str, Motion]:

@@ -36,7 +36,8 @@ from ..core.skeleton import SEAT_TO_PELVIS
 from ..core.take import Controls
 from ..core.weights import Weights
 from ..data.boxes import box, placed
-from ..data.held_out import ACTIVITIES, HeldClip, scene_of
+from ..data.flesh import Furnishing
+from ..data.held_out import ACTIVITIES, HeldClip
 from ..data.sheet import Row, sheet
 from .batches import NOISE
 from .evaluate import (
@@ -122,13 +123,13 @@ def seat_rooms() -> list[Room]:
 def _walk(sampler: Sampler, room: Room, seeds: int) -> np.ndarray:
     """Takes (1 + seeds, T, 22, 3) in a room: temperature 0 first, then 1."""
     controls = Controls(fps=30.0, root=room.walked.path.matrices())
-    shot = drained(shot_steps(scene_of(room.boxes), controls))
+    shot = drained(shot_steps(Furnishing(room.boxes).scene(), controls))
     return made(sampler, shot, np.concatenate([sampler.noise(0, temperature=0.0), *(sampler.noise(s) for s in range(seeds))]))
 
 
 def _round(room: Room, takes: np.ndarray, first: int, last: int) -> Figures:
     """Figures of takes (S, T, 22, 3) in frames ``first`` to ``last``; a seat's right height is that of its top plus 0.12 m."""
-    walked, scene = room.walked, scene_of(room.boxes)
+    walked, scene = room.walked, Furnishing(room.boxes).scene()
     cut = takes[:, first:last]
     flat, weight = cut.reshape(-1, 22, 3), float(cut.shape[0] * cut.shape[1])
     reach = partial(distance, scene, floor=0.0)
