@@ -152,7 +152,7 @@ def _frozen_lying(rng: np.random.Generator, role: str, folder: Path, bank: Shape
                 if shape.kind not in ("bed", "sofa") or shape.seat is None:
                     continue
                 raised = shape.seat.height + LIES_OVER - middle
-                joints = clip.joints + (0.0, 0.0, raised)
+                joints = clip.joints + np.array([0.0, 0.0, raised])
                 path, points = raw_root_from_joints(joints), probes(joints)
                 (moved,) = lying(joints)[:1] or [use]
                 under = bed_shape_for(rng, ShapeBank((shape,)), moved, points, [])
@@ -190,7 +190,7 @@ def _clip(
 ) -> HeldClip:
     name = frozen["name"]
     if "lies" in frozen:
-        joints = beds[name].joints + (0.0, 0.0, frozen["raised"])
+        joints = beds[name].joints + np.array([0.0, 0.0, frozen["raised"]])
     elif name in motions:
         cut = motions[name].joints[frozen["start"] : frozen["start"] + frozen["frames"]]
         joints = at_seat_height(cut, frozen["was"], frozen["pelvis"])

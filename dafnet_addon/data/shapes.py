@@ -151,7 +151,7 @@ class ShapeBank:
             nodes = np.argwhere(np.abs(DEEPEST + _STEP * shape.values) < 0.6 * shape.spacing)
             nodes = nodes[(nodes % step == 0).sum(1) >= 2]
             points = (shape.origin + shape.spacing * nodes) * (1.0, 1.0, stretch)
-            found.append(rotate(yaw_matrix(np.array(yaw)), points) + (x, y, 0.0))
+            found.append(rotate(yaw_matrix(np.array(yaw)), points) + np.array([x, y, 0.0]))
         return np.concatenate(found)
 
     def write(self, file: Path) -> None:

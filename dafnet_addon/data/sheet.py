@@ -50,7 +50,7 @@ def _wireframe(room: Furnishing) -> np.ndarray:
     boxes = room.boxes
     corners = rotate(yaw_matrix(boxes[:, None, 6]), _CORNERS * boxes[:, None, 3:6]) + boxes[:, None, :3]
     dots = room.bank.surface(room.shapes)
-    return np.concatenate([corners[:, _EDGES].reshape(-1, 2, 3), np.stack([dots, dots + (0.0, 0.0, 0.012)], axis=1)])
+    return np.concatenate([corners[:, _EDGES].reshape(-1, 2, 3), np.stack([dots, dots + np.array([0.0, 0.0, 0.012])], axis=1)])
 
 
 def _lines(ax: "Axes", segments: np.ndarray, colours: str | list[str], width: float, cell: Cell) -> None:
