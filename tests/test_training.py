@@ -247,8 +247,26 @@ def test_weights_that_were_not_told_of_the_way_ahead_begin_a_model_that_is(datas
             adopt_predictor(run.gmvae.predictor, weights)
             run.adopt(weights)
         assert abs(_loss_at(short, dataset) - _loss_at(long, dataset)) < 1e-2
-    with pytest.raises(WeightsError, match="choose another"):
+    with pytest.raises(WeightsError, match="choose others"):
         Run("upper", tmp_path / "two", replace(TINY, width=8), _config(2), found).adopt(weights)
+
+
+def test_a_wider_network_begins_as_the_narrower_one(dataset, tmp_path):
+    weights = load_weights(_exported(dataset, tmp_path / "one", TINY))
+    wide = replace(TINY, width=TINY.width + 5, code=TINY.code + 3, predictor_code=TINY.predictor_code + 2,
+                   predictor_width=TINY.predictor_width + 7)
+    statistics = adopted_statistics(weights, _pool(dataset).statistics())
+    for part in ("upper", "lower"):
+        losses = []
+        for model in (TINY, wide):
+            run = Run(part, tmp_path / "two", model, _config(2), statistics)
+            adopt_predictor(run.gmvae.predictor, weights)
+            run.adopt(weights)
+            losses.append(_loss_at(run, dataset))
+        assert abs(losses[0] - losses[1]) < 1e-3 * abs(losses[0]) + 1e-2
+        run.loss(_pool(dataset).batch(torch.arange(4), statistics, wide)).backward()
+        heard = run.network.couplings[0].out.weight.grad[:, TINY.width :]
+        assert heard.abs().max() > 0.0, "the new units learn to be heard"
 
 
 def test_mixed_precision_is_nearly_the_same(dataset, tmp_path):

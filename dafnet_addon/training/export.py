@@ -13,7 +13,7 @@ from ..core.files import whole_file
 from ..core.skeleton import JOINTS, OFFSETS
 from ..core.weights import FORMAT, Weights, quantised, read_safetensors, write_safetensors
 from ..model.config import VELOCITY_SIZE, ModelConfig
-from ..model.flow import BodyFlow, Coupling, PartFlow
+from ..model.flow import BodyFlow, PartFlow
 from ..model.predictor import ActionPredictor
 from .batches import NOISE, Statistics
 
@@ -37,46 +37,56 @@ def tensors_of(flow: BodyFlow, predictor: ActionPredictor | None, statistics: St
     return out
 
 
-def _copied(weights: Weights, name: str, target: torch.Tensor) -> None:
-    target.copy_(torch.from_numpy(np.array(weights.require(name, tuple(target.shape)))))
+def _grown(weights: Weights, name: str, array: np.ndarray, target: torch.Tensor) -> None:
+    """Give ``target`` what ``array`` holds, a matrix or vector of a narrower network of the same kind.
+
+    Rows of an LSTM are those of its four gates. Units that are new keep what they begin with, but nothing that was there before
+    hears them: so a wider network begins as the very function that the narrower one is.
+    """
+    gates = 4 if ".lstm." in name else 1
+    old, new = array.shape, tuple(target.shape)
+    if len(old) != len(new) or any(a > b for a, b in zip(old, new, strict=True)) or old[0] % gates:
+        raise WeightsError(
+            f"The weights '{weights.path}' do not fit this model ('{name}' is {old}, not {new}); choose others to begin with."
+        )
+    rows = target.view(gates, new[0] // gates, *new[1:])
+    kept = torch.from_numpy(np.array(array)).view(gates, old[0] // gates, *old[1:])
+    if len(old) == 2:
+        rows[:, : kept.shape[1], old[1] :] = 0.0
+        rows[:, : kept.shape[1], : old[1]] = kept
+    else:
+        rows[:, : kept.shape[1]] = kept
 
 
 @torch.no_grad()
 def adopt_predictor(predictor: ActionPredictor, weights: Weights) -> None:
-    """Give a predictor what a weights file of the same sizes holds. Raises WeightsError where the sizes differ."""
+    """Give a predictor what a weights file of the same or smaller sizes holds. Raises WeightsError where they do not fit."""
     for name, target in predictor.state_dict().items():
-        _copied(weights, f"predictor.{name}", target)
+        _grown(weights, name, weights.require(f"predictor.{name}"), target)
 
 
 @torch.no_grad()
 def adopt_part(part: PartFlow, name: str, weights: Weights, config: ModelConfig) -> None:
-    """Give the flow's part ``name`` what a weights file of the same sizes holds. Raises WeightsError where the sizes differ.
+    """Give the flow's part ``name`` what a weights file of the same or smaller sizes holds. Raises WeightsError where they do
+    not fit.
 
     A file that was not told of the root's way ahead serves a model that is: what weighs it starts at zero.
     """
     for key, target in part.encoders.state_dict().items():
-        _copied(weights, f"{name}.encoders.{key}", target)
+        _grown(weights, key, weights.require(f"{name}.encoders.{key}"), target)
     told = int(weights.config["model"].get("ahead", 0))
     if told not in (0, config.ahead):
         raise WeightsError(f"The weights '{weights.path}' are told of the root's way in another manner; choose another file.")
     for k, (norm, linear, coupling) in enumerate(part.steps()):
         prefix = f"{name}.{k}"
-        _copied(weights, f"{prefix}.bias", norm.bias)
-        _copied(weights, f"{prefix}.log_scale", norm.log_scale)
+        for key, target in (("bias", norm.bias), ("log_scale", norm.log_scale)):
+            target.copy_(torch.from_numpy(np.array(weights.require(f"{prefix}.{key}", tuple(target.shape)))))
         linear.adopt(torch.from_numpy(np.array(weights.require(f"{prefix}.weight", tuple(linear.weight().shape)))))
         for key, target in coupling.state_dict().items():
+            array = weights.require(f"{prefix}.{key}")
             if key == "lstm.weight_ih_l0" and told < config.ahead:
-                _adopt_first(coupling, weights.require(f"{prefix}.{key}"), target, config)
-            else:
-                _copied(weights, f"{prefix}.{key}", target)
-
-
-def _adopt_first(coupling: Coupling, matrix: np.ndarray, target: torch.Tensor, config: ModelConfig) -> None:
-    before = coupling.passes + config.actions + VELOCITY_SIZE
-    wide = np.insert(matrix, [before] * config.ahead, 0.0, axis=1)
-    if wide.shape != tuple(target.shape):
-        raise WeightsError(f"A layer of the shape {matrix.shape} does not fit this model; choose other weights to begin with.")
-    target.copy_(torch.from_numpy(wide))
+                array = np.insert(array, [coupling.passes + config.actions + VELOCITY_SIZE] * config.ahead, 0.0, axis=1)
+            _grown(weights, f"{prefix}.{key}", array, target)
 
 
 def adopted_statistics(weights: Weights, found: Statistics) -> Statistics:

@@ -167,7 +167,7 @@ class Run:
         """How the weights that the run began with were trained, in their own words; nothing where it began anew."""
 
     def adopt(self, weights: Weights) -> None:
-        """Begin with what these weights have learnt. Raises WeightsError where their sizes are others."""
+        """Begin with what these weights have learnt. Raises WeightsError where they do not fit into this model."""
         if self.part == "predictor":
             adopt_predictor(self.gmvae.predictor, weights)
         else:
@@ -378,7 +378,7 @@ def train_part(
 
     Raises InputError without a dataset, for a device that is not there, and where a part of other sizes was begun there.
 
-    A new run begins with what ``begin_with`` has learnt, where given: weights of the same sizes. A loss that is not a number
+    A new run begins with what ``begin_with`` has learnt, where given: weights of the same or smaller sizes. A loss that is not a number
     stops the run with the last good checkpoint kept. Shards that 'prepare' is still writing are taken in as they come.
     """
     from torch.utils.tensorboard import SummaryWriter
