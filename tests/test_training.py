@@ -1,5 +1,6 @@
 """Training: it learns, resumes exactly, stops on NaN with the last good state, and what it exports is what it trained."""
 
+import itertools
 import json
 import os
 import subprocess
@@ -140,15 +141,17 @@ def test_it_learns(part, dataset, tmp_path):
     assert _loss_at(_until(part, dataset, folder, steps=40), dataset) < before - 5.0
 
 
-def test_resuming_is_exact(dataset, tmp_path):
+def test_resuming_is_exact(dataset, tmp_path, monkeypatch):
+    # The Gumbel temperature follows the clock: let every step take a second.
+    monkeypatch.setattr(training, "clock_of", lambda device: itertools.count().__next__)
     one, two = tmp_path / "one", tmp_path / "two"
     straight = _until("predictor", dataset, one, steps=3, saves=2)
     _until("predictor", dataset, two, steps=3)
     resumed = _until("predictor", dataset, two, steps=3)
     assert straight.step == resumed.step == 6
     for a, b in zip(straight.network.parameters(), resumed.network.parameters(), strict=True):
-        # The learning rate follows the clock, so equality holds to what two clocks differ by.
-        assert torch.allclose(a, b, atol=1e-5)
+        assert torch.equal(a, b)
+    assert all(torch.equal(value, resumed.averaged[name]) for name, value in straight.averaged.items())
 
 
 def test_a_rate_holds_then_falls_and_a_larger_budget_goes_on_from_before_it_fell(dataset, tmp_path):
