@@ -23,7 +23,7 @@ from .prepare import load_motions
 from .rests import Rest, rest_of
 from .windows import Motion, mirrored, motion_of
 
-__all__ = ["ACTIVITIES", "FROZEN", "HeldClip", "fingerprint", "held_out", "is_frozen", "test_motions"]
+__all__ = ["ACTIVITIES", "FROZEN", "HeldClip", "fingerprint", "frozen_text", "held_out", "is_frozen", "test_motions"]
 
 FROZEN = Path(__file__).with_name("held_out.json")
 ACTIVITIES = {
@@ -87,6 +87,13 @@ def is_frozen(joints: np.ndarray, frozen: dict[str, Any]) -> bool:
     return len(joints) == frozen["frames"] and bool(
         np.abs(np.subtract(fingerprint(joints), frozen["fingerprint"])).max() <= _SAME
     )
+
+
+def frozen_text(frozen: dict[str, Any]) -> str:
+    """A frozen test as JSON, a clip a line."""
+    lines = ",\n".join(json.dumps(clip) for clip in frozen["clips"])
+    head = json.dumps({key: value for key, value in frozen.items() if key != "clips"})
+    return f'{head[:-1]}, "clips": [\n{lines}\n]}}\n'
 
 
 def test_motions(folder: Path) -> dict[str, Motion]:

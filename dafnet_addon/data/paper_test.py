@@ -37,7 +37,7 @@ from .compose import LEANS, at_board, at_top, seated_work
 from .contacts import contacts
 from .flesh import probes
 from .furniture import SeatKind, board_for, desk_for, seat_for
-from .held_out import HeldClip, fingerprint, is_frozen
+from .held_out import HeldClip, fingerprint, frozen_text, is_frozen
 from .joins import joined
 from .pieces import DIRECTIONS, TOELESS, Pool, features_of, fluent, matches_of, pool_of, sit_downs, upper_bodies
 from .prepare import load_motions
@@ -394,13 +394,6 @@ def freeze_paper_test(folder: Path, seed: int = SEED) -> dict[str, Any]:
     return {"version": 1, "seed": seed, "clips": clips}
 
 
-def _written(frozen: dict[str, Any]) -> str:
-    """The test as JSON, a clip a line."""
-    lines = ",\n".join(json.dumps(clip) for clip in frozen["clips"])
-    head = json.dumps({key: value for key, value in frozen.items() if key != "clips"})
-    return f'{head[:-1]}, "clips": [\n{lines}\n]}}\n'
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Make ``paper_test.json`` anew; 0 if all went well, else 1 and a sentence on standard error."""
     parser = argparse.ArgumentParser(prog="python -m dafnet_addon.data.paper_test", description="Makes the test set anew.")
@@ -412,7 +405,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
-    FROZEN.write_text(_written(frozen), encoding="utf-8")
+    FROZEN.write_text(frozen_text(frozen), encoding="utf-8")
     return 0
 
 

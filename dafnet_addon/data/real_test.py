@@ -8,7 +8,9 @@ The captured pelvis is moved to the height at which the piece carries one (``ret
 is at most a seat's height away from what was captured, and the piece is not changed at all.
 """
 
+import argparse
 import json
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,7 +20,7 @@ import numpy as np
 from ..core.errors import InputError
 from ..core.root import RootPath, raw_root_from_joints
 from .flesh import Furnishing, probes
-from .held_out import HeldClip, fingerprint, held_out, is_frozen, test_motions
+from .held_out import HeldClip, fingerprint, frozen_text, held_out, is_frozen, test_motions
 from .library import Piece, read_library
 from .real_pieces import LIES_OVER, bed_shape_for, seat_shape_for, stray_shape
 from .rests import Rest, rest_of
@@ -206,3 +208,22 @@ def _clip(
         rests=(rest_of(joints, path, *frozen["rest"]),), real=Furnishing(shapes=rows, bank=bank), piece=frozen["piece"],
         kind="lying" if "lies" in frozen else frozen["kind"], maker=frozen["maker"],
     )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Make ``real_test.json`` anew; 0 if all went well, else 1 and a sentence on standard error."""
+    parser = argparse.ArgumentParser(prog="python -m dafnet_addon.data.real_test", description="Makes the test set anew.")
+    parser.add_argument("folder", type=Path, help="the motion files")
+    parser.add_argument("library", type=Path, help="the furniture library")
+    options = parser.parse_args(arguments)
+    try:
+        frozen = freeze_real(options.folder, options.library)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    FROZEN_REAL.write_text(frozen_text(frozen), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -378,8 +378,8 @@ def train_part(
 
     Raises InputError without a dataset, for a device that is not there, and where a part of other sizes was begun there.
 
-    A new run begins with what ``begin_with`` has learnt, where given: weights of the same or smaller sizes. A loss that is not a
-    number stops the run with the last good checkpoint kept. Shards that 'prepare' is still writing are taken in as they come.
+    A new run begins with what ``begin_with`` has learnt, where given: weights of the same or smaller sizes. A loss that is not
+    a number stops the run with the last good checkpoint kept. Shards that 'prepare' is still writing are taken in as they come.
     """
     from torch.utils.tensorboard import SummaryWriter
 
