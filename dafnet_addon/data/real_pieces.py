@@ -18,8 +18,7 @@ LIES_OVER = 0.01
 """Metres by which the pelvis joint of one that lies is over the undeformed surface of a bed or sofa."""
 
 _SHARES = {
-    "chair": 0.34, "armchair": 0.17, "sofa": 0.17, "stool": 0.10, "bench": 0.08, "toilet": 0.03, "bed": 0.05, "table": 0.04,
-    "desk": 0.02,
+    "chair": 0.34, "armchair": 0.17, "sofa": 0.17, "stool": 0.10, "bench": 0.08, "toilet": 0.03, "bed": 0.05, "table": 0.06,
 }
 """How often each kind is sat on, among those that can be as high as the pelvis asks."""
 _TRIES = 10
@@ -31,6 +30,8 @@ _SINKS = pressed(0.3, hip=1.0, thigh=1.0)
 _GIVES_LYING = pressed(0.10, hip=0.2, thigh=0.2, trunk=0.2, head=0.2, shoulder=0.2, elbow=0.2, wrist=0.2, hand=0.2)
 _HEAD_FROM_END = (0.75, 1.1)  # metres between the middle of pelvis and chest and a bed's head
 _SLEEPS_FROM_EDGE = 0.32
+_GRID_BEYOND = 0.17  # metres by which a grid is larger than its piece on every side
+_ABOUT_SQUARE = 0.3  # metres
 
 
 def _stretch(seat: Seat, pelvis: float) -> float:
@@ -94,13 +95,13 @@ def bed_shape_for(
         assert shape.seat is not None
         size = shape.spacing * (np.array(shape.values.shape) - 1)
         centre = shape.origin[:2] + size[:2] / 2
-        # A bed's head is at its back, a sofa's at either side; the grid is wider than the piece by the band of its distances.
-        long_axis = 1 if shape.kind == "bed" else 0
+        # A bed's head is at its back, that of a sofa, or a bed as wide as one, at either side.
+        long_axis = 1 if shape.kind == "bed" and size[1] > size[0] - _ABOUT_SQUARE else 0
         side = 1.0 if long_axis == 1 else rng.choice([-1.0, 1.0])
-        half = size[:2] / 2 - 0.17
+        half = size[:2] / 2 - _GRID_BEYOND
         spot = centre.copy()
         spot[long_axis] += side * (half[long_axis] - rng.uniform(*_HEAD_FROM_END))
-        if shape.kind == "bed":
+        if long_axis == 1:
             room = max(0.0, half[0] - _SLEEPS_FROM_EDGE)
             spot[0] += rng.uniform(-room, room)
         else:
@@ -108,7 +109,9 @@ def bed_shape_for(
         head = 0.0 if long_axis == 1 else -side * np.pi / 2
         row = np.array([[number, *(-spot), 0.0, top / shape.seat.height]])
         found = Furnishing(shapes=row, bank=bank).moved(middle[:2], use.yaw - head + rng.normal(0.0, 0.05))
-        if clearance(found, points, _GIVES_LYING) >= 0.0 and all(_carries(found, rest) for rest in rests):
+        under = use.points - np.array([0.0, 0.0, _HARD])
+        lies_on_it = bool((found.bank.distances(found.shapes, under) < 0.03).all())
+        if lies_on_it and clearance(found, points, _GIVES_LYING) >= 0.0 and all(_carries(found, rest) for rest in rests):
             return found
     return None
 

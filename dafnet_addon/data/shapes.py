@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 PELVIS_OVER = {
-    "table": 0.14, "desk": 0.14, "bench": 0.14, "stool": 0.14, "toilet": 0.11, "chair": 0.11, "armchair": 0.07, "sofa": 0.03,
+    "table": 0.14, "bench": 0.14, "stool": 0.14, "toilet": 0.11, "chair": 0.11, "armchair": 0.07, "sofa": 0.03,
     "bed": 0.03,
 }
 """Metres by which a seated pelvis joint is over the undeformed surface of a kind of furniture: how far one sinks in belongs to
