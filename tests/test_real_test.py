@@ -6,6 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dafnet_addon.core.conditions import shot_steps
+from dafnet_addon.core.progress import drained
+from dafnet_addon.core.take import Controls
 from dafnet_addon.data.flesh import probes
 from dafnet_addon.data.real_test import FROZEN_REAL, real_test
 from dafnet_addon.data.splits import role_of_body, role_of_maker
@@ -40,6 +43,8 @@ def test_frozen_clips_sit_where_their_pieces_carry_them(role: str) -> None:
         pytest.skip(f"needs the motion capture and the furniture library in {SHARED}")
     clips = real_test(SHARED / "mocap", SHARED / "furniture" / "library", role)
     assert [clip.piece for clip in clips] == [frozen["piece"] for frozen in FROZEN if frozen["role"] == role]
+    seen = drained(shot_steps(clips[0].scene, Controls(fps=30.0, root=clips[0].path.matrices()))).conditions.occupancy
+    assert seen[-1].max() > 0.9, "a generation sees the furniture"
     for clip, frozen in zip(clips, (f for f in FROZEN if f["role"] == role), strict=True):
         (rest,) = clip.rests
         assert abs(np.median(clip.joints[rest.start : rest.end, 0, 2]) - frozen["pelvis"]) < 0.025, clip.name

@@ -51,6 +51,12 @@ _APPROACH = np.array([0.0, -3.0])
 """From where one comes to a piece without a back: its front faces −y."""
 _ASTRAY = np.cos(np.radians(60.0))
 _FRAMES_AT_ONCE = 16
+_CORNERS = np.array([(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+_SIDES = np.array([
+    (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7),
+    (1, 7, 3),
+])
+"""A box: its corners from 0 to 1, and their numbers in the triangles of its sides."""
 
 
 @dataclass(frozen=True)
@@ -131,15 +137,15 @@ class ShapeBank:
         return out
 
     def meshes(self, placed: np.ndarray, name: str = "") -> list[Mesh]:
-        """Placed shapes (S, 5) as solids of the core, with their grids; they have no triangles."""
+        """Placed shapes (S, 5) as solids of the core, with their grids; their triangles are those of the box around them."""
         solids = []
         for number, x, y, yaw, stretch in placed:
             shape = self.shapes[int(number)]
             matrix = np.eye(4)
             matrix[:3, :3], matrix[:2, 3] = yaw_matrix(np.array(yaw)), (x, y)
             grid = shape.grid if stretch == 1.0 else _stretched(shape, float(stretch))
-            empty = np.zeros((0, 3))
-            solids.append(Mesh(empty, empty.astype(np.int64), matrix, name or shape.name, grid))
+            corners = grid.origin + grid.spacing * (np.array(grid.values.shape) - 1) * _CORNERS
+            solids.append(Mesh(corners, _SIDES, matrix, name or shape.name, grid))
         return solids
 
     def surface(self, placed: np.ndarray, spacing: float = 0.06) -> np.ndarray:
