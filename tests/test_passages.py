@@ -151,4 +151,4 @@ def test_real_seats_are_sat_on_without_a_word() -> None:
         met |= {each.name for each in passages(scene, path, 30.0, seats_along(scene, path, 30.0))}
         tried += 1
     assert tried > 60
-    assert met <= {"sofa_007"}, "its seat is taken for where its arm is, which lies behind cushions"
+    assert not met

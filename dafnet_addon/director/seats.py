@@ -100,7 +100,7 @@ def _seat_level(field: HeightField, floor: float) -> tuple[float, np.ndarray] | 
     if room.max(initial=0) * field.cell**2 < _LEAST:
         return None
     lowest = int(np.argmax(room >= _NEARLY * room.max()))
-    best = lowest + int(np.argmax(room[lowest : lowest + round(2 * _FLAT / 0.02)]))
+    best = lowest + int(np.argmax(room[lowest : lowest + 1 + round(_FLAT / 0.02)]))
     level = float(np.median(over[masks[best]]))
     cells = np.argwhere(masks[best] & (np.abs(over - level) < _FLAT))
     return level, cells
