@@ -18,7 +18,7 @@ from dafnet_addon.core.skeleton import REST, SEAT_TO_PELVIS, joint
 from dafnet_addon.data import paper_test as p
 from dafnet_addon.data.boxes import box, distances
 from dafnet_addon.data.contacts import contacts
-from dafnet_addon.data.held_out import HeldClip
+from dafnet_addon.data.held_out import HeldClip, frozen_text
 from dafnet_addon.data.mocap import read_clips
 from dafnet_addon.data.windows import Motion
 
@@ -202,4 +202,4 @@ def test_freezing_is_the_same_again(monkeypatch):
     first = p.freeze_paper_test(MOCAP, 5)
     assert first == p.freeze_paper_test(MOCAP, 5) and len(first["clips"]) == 1
     assert first["clips"] != p.freeze_paper_test(MOCAP, 6)["clips"]
-    assert json.loads(p._written(first)) == first
+    assert json.loads(frozen_text(first)) == first
