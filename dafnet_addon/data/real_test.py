@@ -37,14 +37,15 @@ FROZEN_REAL = Path(__file__).with_name("real_test.json")
 _BEFORE, _AFTER, _LONGEST = 90, 45, 150  # frames around an episode, and of it
 _EPISODES = 14  # of each body
 _NO_HANDS = "ui_prmd"  # whose arms are made up
-_TRIES, _STRAYS = 6, 2
+_TRIES, _STRAYS = 10, 2
+_MOVED = 0.25  # metres by which a resting pelvis is moved at most: farther, it is another motion
 _SEED = 41
 
 
 def _sitting(motions: Sequence[Motion]) -> Iterator[tuple[Motion, int, int, Rest]]:
     """Where bodies sit, with frames before and after: motion, first frame, end, and the episode in the motion's frames."""
     for motion in motions:
-        for rest in motion.rests:
+        for rest in motion.rests if motion.category != "lying" else ():
             first, end = max(0, rest.start - _BEFORE), min(len(motion.joints), rest.end + _AFTER, rest.start + _LONGEST)
             if motion.valid[first:end].all():
                 yield motion, first, end, rest
@@ -110,6 +111,8 @@ def _on_piece(
     shape = bank.shapes[number]
     assert shape.seat is not None
     was = float(np.median(motion.joints[rest.start : rest.end, 0, 2]))
+    if abs(shape.seat.pelvis - was) > _MOVED:
+        return None
     joints = at_seat_height(motion.joints[first:end], was, shape.seat.pelvis)
     path = raw_root_from_joints(joints)
     start, stop = rest.start - first, min(rest.end, end) - first
