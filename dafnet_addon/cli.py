@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from .core.checks import MOST_SEED
 from .core.errors import DafnetError, InputError
@@ -80,8 +80,11 @@ def run(loading: Stop | None = None) -> None:
     """``main`` as a process."""
     _open_streams()
     code = main(loading=loading)
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            _nowhere(stream)
     if "bpy" in sys.modules:
         # The module of Blender 4.2 crashes at exit once a property with a poll function was registered, unregistered or not.
         os._exit(code)
@@ -98,6 +101,12 @@ def _open_streams() -> None:
             setattr(sys, name, open(os.devnull, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115
 
 
+def _nowhere(stream: TextIO) -> None:
+    """Lead a stream that cannot be written to nowhere: what it still holds would fail again at exit."""
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), stream.fileno())
+
+
 def _say(text: str) -> None:
     """Print on standard output what was asked for; a reader who has read enough, as ``head`` has, is no error."""
     try:
@@ -105,8 +114,7 @@ def _say(text: str) -> None:
             print(text)
         sys.stdout.flush()
     except OSError as error:
-        with open(os.devnull, "wb") as nowhere:  # for what is still to be flushed at exit
-            os.dup2(nowhere.fileno(), sys.stdout.fileno())
+        _nowhere(sys.stdout)
         if not isinstance(error, BrokenPipeError):
             raise InputError(f"The result cannot be written to standard output ({error.strerror}).") from error
 

@@ -20,8 +20,9 @@ import pytest
 ROOT = Path(__file__).absolute().parents[1]
 EXTENSION = "bl_ext.user_default.dafnet"
 
-if str(ROOT) not in sys.path:
-    sys.path.insert(0, str(ROOT))
+for folder in (ROOT, ROOT / "tests"):  # the package, and what tests share
+    if str(folder) not in sys.path:
+        sys.path.insert(0, str(folder))
 if "bpy" not in sys.modules:
     os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="dafnet_tests_")
 

@@ -10,6 +10,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from said import without_blenders
 
 from dafnet_addon.cli import main
 
@@ -53,7 +54,7 @@ def ran(*arguments: object, **options: Any) -> tuple[int, str, str]:
     """Exit code, standard output and standard error of the command."""
     process = started(*arguments, **options)
     out, err = process.communicate()
-    return process.returncode, out, err
+    return process.returncode, out, without_blenders(err)
 
 
 def names(folder: Path) -> list[str]:

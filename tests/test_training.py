@@ -435,7 +435,9 @@ def test_it_trains_without_avx_512_in_a_bare_environment(dataset, tmp_path):
 
 
 def test_two_processes_train_one_model(dataset, tmp_path):
-    together = ["-m", "torch.distributed.run", "--standalone", "--local-addr", "127.0.0.1", "--nproc-per-node", "2"]
+    # By number: a bare machine may not know the name localhost.
+    here = ["--rdzv-backend", "c10d", "--rdzv-endpoint", "127.0.0.1:0", "--local-addr", "127.0.0.1"]
+    together = ["-m", "torch.distributed.run", *here, "--nproc-per-node", "2"]
     _tiny_train(together, dataset, tmp_path / "run", {"OMP_NUM_THREADS": "1"})
     lines = [json.loads(line) for line in (tmp_path / "run" / "log.jsonl").read_text(encoding="utf-8").splitlines()]
     assert len(lines) == len({(line["part"], line["step"]) for line in lines}), "one process keeps the run"

@@ -1,0 +1,10 @@
+"""What a process said, without what Blender says of the machine it runs on."""
+
+__all__ = ["without_blenders"]
+
+_BLENDERS = ("could not get a list of mounted file-systems",)  # where /etc/mtab is missing
+
+
+def without_blenders(text: str) -> str:
+    """The lines of a standard error that are not Blender's own of its machine."""
+    return "".join(line for line in text.splitlines(keepends=True) if not line.startswith(_BLENDERS))
