@@ -54,7 +54,7 @@ def ran(*arguments: object, **options: Any) -> tuple[int, str, str]:
     """Exit code, standard output and standard error of the command."""
     process = started(*arguments, **options)
     out, err = process.communicate()
-    return process.returncode, out, without_blenders(err)
+    return process.returncode, without_blenders(out), without_blenders(err)
 
 
 def names(folder: Path) -> list[str]:
