@@ -11,8 +11,8 @@ import numpy as np
 from ..core.root import RootPath
 from ..core.skeleton import SEAT_TO_PELVIS, joint
 from .boxes import NO_BOXES, box, placed
-from .flesh import FAR, NO_BANK, Furnishing, box_clearance, nearest_box, pressed, probes
-from .real_pieces import LIES_OVER, bed_shape_for, seat_shape_for, stray_shape
+from .flesh import FAR, NO_BANK, Furnishing, box_clearance, pressed, probes
+from .real_pieces import LIES_OVER, bed_shape_for, carries, seat_shape_for, stray_shape
 from .rests import Rest, resting
 from .shapes import PELVIS_OVER, ShapeBank
 from .uses import Use, lying, reaching, stroking, working
@@ -216,13 +216,6 @@ def seat_for(
     return None
 
 
-def _carried(found: Furnishing, rest: Rest) -> bool:
-    """Whether a bed is the seat of this rest as well: one sits down on its edge, a little higher than one lies."""
-    at = rest.position - (0.0, 0.0, SEAT_TO_PELVIS)
-    on_box = len(found.boxes) > 0 and float(nearest_box(found.boxes, at[None])[0]) < 0.1
-    return on_box or (len(found.shapes) > 0 and float(found.bank.distances(found.shapes, at[None])[0]) < 0.1)
-
-
 def _beside(use: Use, rests: list[Rest]) -> list[Rest]:
     """The rests on the edge of where one lies."""
     middle = use.points.mean(0)
@@ -254,7 +247,7 @@ def _bed_for(rng: np.random.Generator, use: Use, points: np.ndarray, rests: list
         yaw = use.yaw + rng.normal(0.0, 0.05)
         carrying, beside = (placed(part, middle[:2], yaw) for part in (carrying, beside))
         under = Furnishing(carrying[:1])
-        if box_clearance(carrying, points, _ON_BED) < 0 or not all(_carried(under, rest) for rest in beside_it):
+        if box_clearance(carrying, points, _ON_BED) < 0 or not all(carries(under, rest) for rest in beside_it):
             continue
         return np.concatenate([carrying, beside if box_clearance(beside, points, 0.02) >= 0 else NO_BOXES])
     return None
@@ -445,7 +438,7 @@ def fitted(
     places: list[Rest] = []
     for rest in rests:
         apart = all(np.linalg.norm(rest.position - other.position) > _ONE_SEAT for other in places)
-        on_bed = any(found is not None and _carried(found, rest) for _, found in pieces)
+        on_bed = any(found is not None and carries(found, rest) for _, found in pieces)
         if apart and rest.position[2] > _ON_THE_FLOOR and not on_bed:
             places.append(rest)
     pieces += [("seat", _seat_under(rng, bank, place, points)) for place in places]

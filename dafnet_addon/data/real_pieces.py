@@ -7,12 +7,13 @@ sinks in belongs to the piece and is never drawn anew. It is turned and shifted 
 import numpy as np
 
 from ..core.root import RootPath
-from .flesh import Furnishing, clearance, pressed
+from ..core.skeleton import SEAT_TO_PELVIS
+from .flesh import Furnishing, clearance, nearest_box, pressed
 from .rests import Rest
 from .shapes import STRETCH, Seat, ShapeBank
 from .uses import Use
 
-__all__ = ["LIES_OVER", "bed_shape_for", "seat_shape_for", "stray_shape"]
+__all__ = ["LIES_OVER", "bed_shape_for", "carries", "seat_shape_for", "stray_shape"]
 
 LIES_OVER = 0.01
 """Metres by which the pelvis joint of one that lies is over the undeformed surface of a bed or sofa."""
@@ -24,7 +25,6 @@ _SHARES = {
 _TRIES = 10
 _FORWARD = 0.14  # metres by which one sits nearer the front edge at the last try than at the first
 _TURNED = 0.08  # radians
-_HARD = 0.12  # metres over a surface from which on the body does not sink into it
 _GIVES = pressed(0.03, hip=0.08, thigh=0.08, trunk=0.05, shoulder=0.05, elbow=0.045, wrist=0.045, hand=0.08)
 _SINKS = pressed(0.3, hip=1.0, thigh=1.0)
 _GIVES_LYING = pressed(0.10, hip=0.2, thigh=0.2, trunk=0.2, head=0.2, shoulder=0.2, elbow=0.2, wrist=0.2, hand=0.2)
@@ -73,7 +73,7 @@ def seat_shape_for(rng: np.random.Generator, bank: ShapeBank, rest: Rest, points
         row = np.array([[number, *(-spot), 0.0, _stretch(seat, pelvis)]])
         yaw = rest.yaw - seat.yaw + rng.normal(0.0, _TURNED)
         found = Furnishing(shapes=row, bank=bank).moved(rest.position[:2], yaw)
-        sunk = max(0.0, _HARD - (seat.pelvis - seat.height))
+        sunk = max(0.0, SEAT_TO_PELVIS - (seat.pelvis - seat.height))
         if clearance(found, points, _GIVES + sunk * _SINKS) >= 0.0:
             return found
     return None
@@ -109,17 +109,18 @@ def bed_shape_for(
         head = 0.0 if long_axis == 1 else -side * np.pi / 2
         row = np.array([[number, *(-spot), 0.0, top / shape.seat.height]])
         found = Furnishing(shapes=row, bank=bank).moved(middle[:2], use.yaw - head + rng.normal(0.0, 0.05))
-        under = use.points - np.array([0.0, 0.0, _HARD])
+        under = use.points - np.array([0.0, 0.0, SEAT_TO_PELVIS])
         lies_on_it = bool((found.bank.distances(found.shapes, under) < 0.03).all())
-        if lies_on_it and clearance(found, points, _GIVES_LYING) >= 0.0 and all(_carries(found, rest) for rest in rests):
+        if lies_on_it and clearance(found, points, _GIVES_LYING) >= 0.0 and all(carries(found, rest) for rest in rests):
             return found
     return None
 
 
-def _carries(found: Furnishing, rest: Rest) -> bool:
-    """Whether furniture is under a resting pelvis, as far under it as one sits on an edge."""
-    under = rest.position - np.array([0.0, 0.0, _HARD])
-    return float(found.bank.distances(found.shapes, under[None])[0]) < 0.1
+def carries(found: Furnishing, rest: Rest) -> bool:
+    """Whether furniture is the seat of this rest as well: one sits down on a bed's edge, a little higher than one lies."""
+    under = (rest.position - np.array([0.0, 0.0, SEAT_TO_PELVIS]))[None]
+    on_box = len(found.boxes) > 0 and float(nearest_box(found.boxes, under)[0]) < 0.1
+    return on_box or (len(found.shapes) > 0 and float(found.bank.distances(found.shapes, under)[0]) < 0.1)
 
 
 def stray_shape(rng: np.random.Generator, bank: ShapeBank, points: np.ndarray, path: RootPath) -> Furnishing:

@@ -93,12 +93,6 @@ class Shape:
         values = (DEEPEST + _STEP * self.values).astype(np.float32)
         return DistanceGrid(self.origin, self.spacing, values, FARTHEST)
 
-    @property
-    def top(self) -> float:
-        """Height of its highest part (metres)."""
-        inside = np.flatnonzero((self.values <= -DEEPEST / _STEP).any((0, 1)))
-        return float(self.origin[2] + self.spacing * inside[-1]) if len(inside) else 0.0
-
 
 @dataclass(frozen=True)
 class ShapeBank:
