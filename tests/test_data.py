@@ -1,11 +1,11 @@
 """Composing training data: boxes, fitted furniture, retargeted heights, windows; and the real motion files where they are."""
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from motion_files import write_compact
 
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.occupancy import occupancy as sensor_occupancy
@@ -19,9 +19,6 @@ from dafnet_addon.data.mocap import Clip, read_clips
 from dafnet_addon.data.motions import read_motions, write_motions
 from dafnet_addon.data.rests import resting
 from dafnet_addon.data.windows import draw, mirrored, motion_of
-
-sys.path.insert(0, str(Path(__file__).parent))
-from motion_files import write_compact
 
 MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
 BONES = np.linalg.norm(OFFSETS[1:], axis=1)

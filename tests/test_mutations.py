@@ -7,7 +7,6 @@ too. 100 of each are tried; 1,000 with ``--hypothesis-profile=full``.
 
 import json
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from io import BytesIO
@@ -17,6 +16,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pytest
+from bounds import bounded
 
 from dafnet_addon import Box, CleanUp, Controls, DafnetError, Mesh, Scene, Take, generate, load_weights
 from dafnet_addon.core import distance, storage
@@ -27,9 +27,6 @@ from dafnet_addon.core.skeleton import END_EFFECTORS, OFFSETS, UPPER
 from dafnet_addon.core.storage import packed, unpacked
 from dafnet_addon.core.take import MODES
 from dafnet_addon.core.weights import FORMAT, Weights, read_safetensors, write_safetensors
-
-sys.path.insert(0, str(Path(__file__).parent))
-from bounds import bounded
 
 hypothesis = pytest.importorskip("hypothesis")
 st = pytest.importorskip("hypothesis.strategies")

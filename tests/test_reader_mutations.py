@@ -7,7 +7,6 @@ the processor's time and 200 MB. A third of the mutations at least gets past the
 import json
 import re
 import shutil
-import sys
 import tracemalloc
 from collections.abc import Callable
 from io import BytesIO
@@ -17,7 +16,9 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 import hypothesis
 import numpy as np
 import pytest
+from bounds import bounded
 from hypothesis import strategies as st
+from motion_files import walk, write_amc, write_asf, write_bvh, write_compact
 
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.skeleton import JOINTS
@@ -25,10 +26,6 @@ from dafnet_addon.data.canonical import calibrate, canonical
 from dafnet_addon.data.mocap import Clip, read_clips
 from dafnet_addon.data.stated import Stated
 from dafnet_addon.data.windows import motion_of
-
-sys.path.insert(0, str(Path(__file__).parent))
-from bounds import bounded
-from motion_files import walk, write_amc, write_asf, write_bvh, write_compact
 
 RAW = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap" / "raw_samples"
 FRAMES = 12

@@ -2,7 +2,6 @@
 
 import json
 import os
-import sys
 import tracemalloc
 from io import BytesIO
 from pathlib import Path
@@ -10,6 +9,7 @@ from zipfile import ZIP_DEFLATED, ZIP_LZMA, ZipFile
 
 import numpy as np
 import pytest
+from motion_files import MIXAMO, VICON, Y_UP, walk, write_amc, write_asf, write_bvh, write_compact
 
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.rotations import rotate
@@ -27,9 +27,6 @@ from dafnet_addon.data.rigs import mapped, rigs
 from dafnet_addon.data.sheet import sheet
 from dafnet_addon.data.summary import summary
 from dafnet_addon.data.world import at_model_rate, floor_height, unit_of
-
-sys.path.insert(0, str(Path(__file__).parent))
-from motion_files import MIXAMO, VICON, Y_UP, walk, write_amc, write_asf, write_bvh, write_compact
 
 MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
 RAW = MOCAP / "raw_samples"
