@@ -20,6 +20,7 @@ test: lint .venv-4.2/.test .venv-5.0/.test
 
 lint: .venv/.test
 	.venv/bin/python -m ruff check .
+	.venv/bin/python -m ruff format --check .
 	scripts/typecheck.sh .venv/bin/python
 
 zip: setup

@@ -11,7 +11,9 @@ _FILES = str(Path(__file__).parent / "dafnet_addon" / "blender")
 
 
 def register() -> None:
-    """Add the settings, operators, panels and the command ``blender --command dafnet`` to Blender."""
+    """Add the settings, operators, panels and the command ``blender --command dafnet`` to
+    Blender.
+    """
     import bpy
 
     from . import operators, panels
@@ -25,7 +27,11 @@ def register() -> None:
     for cls in operators.CLASSES + panels.CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.VIEW3D_MT_add.append(panels.add_menu)
-    _commands.append(bpy.utils.register_cli_command("dafnet", lambda arguments: cli.main(arguments, in_blender=True)))
+    _commands.append(
+        bpy.utils.register_cli_command(
+            "dafnet", lambda arguments: cli.main(arguments, in_blender=True)
+        )
+    )
 
 
 def unregister() -> None:

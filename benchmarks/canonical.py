@@ -1,7 +1,8 @@
-"""What fitting to the canonical body does to each source of motion: a table of distances and a picture of poses.
+"""What fitting to the canonical body does to each source of motion: a table of distances and a
+picture of poses.
 
-Run as ``PYTHONPATH=. python benchmarks/canonical.py FOLDER PICTURE.png``; FOLDER holds motion capture, as
-``dafnet_addon.data.mocap`` reads it.
+Run as ``PYTHONPATH=. python benchmarks/canonical.py FOLDER PICTURE.png``; FOLDER holds motion
+capture, as ``dafnet_addon.data.mocap`` reads it.
 """
 
 import sys
@@ -20,14 +21,25 @@ from dafnet_addon.data.mocap import Clip, read_clips
 
 _FPS = 30.0
 _PLANTED, _STILL = 0.25, 0.04  # metres a second: of a toe on the floor, of a hand that rests
-_TOES, _WRISTS = (joint("left_foot"), joint("right_foot")), (joint("left_wrist"), joint("right_wrist"))
-_SLIDE, _TOE, _ANKLE, _WRIST, _SEAT = "toe slide", "toe moved", "ankle moved", "wrist wander", "seat wander"
+_TOES, _WRISTS = (
+    (joint("left_foot"), joint("right_foot")),
+    (joint("left_wrist"), joint("right_wrist")),
+)
+_SLIDE, _TOE, _ANKLE, _WRIST, _SEAT = (
+    "toe slide",
+    "toe moved",
+    "ankle moved",
+    "wrist wander",
+    "seat wander",
+)
 
 Pair = tuple[np.ndarray, np.ndarray]
 
 
 def bodies(clips: list[Clip]) -> list[tuple[Calibration, list[Clip]]]:
-    """Clips of one source by body; those of bodies that never stand upright are fitted with the rest of their source."""
+    """Clips of one source by body; those of bodies that never stand upright are fitted with the
+    rest of their source.
+    """
     by_subject: dict[str, list[Clip]] = defaultdict(list)
     for clip in clips:
         by_subject[clip.subject].append(clip)
@@ -67,11 +79,12 @@ def _wander(joints: np.ndarray) -> float:
 
 
 def measured(found: list[Pair]) -> dict[str, tuple[float, float, int]]:
-    """Mean before and after (millimetres) of each figure of a source, and how many frames or episodes it is of.
+    """Mean before and after (millimetres) of each figure of a source, and how many frames or
+    episodes it is of.
 
-    Slide: how far a toe base that stands moves along the floor in a frame. Moved: how far from its place before fitting (before
-    is zero). Wander: how far a joint that rests for 0.7 s or more strays from its mean, of hands while the chest moves by 4 cm,
-    and of the seated pelvis.
+    Slide: how far a toe base that stands moves along the floor in a frame. Moved: how far from its
+    place before fitting (before is zero). Wander: how far a joint that rests for 0.7 s or more
+    strays from its mean, of hands while the chest moves by 4 cm, and of the seated pelvis.
     """
     values: dict[str, list[tuple[float, float]]] = defaultdict(list)
     for before, after in found:
@@ -79,15 +92,24 @@ def measured(found: list[Pair]) -> dict[str, tuple[float, float, int]]:
             continue
         for toe in _TOES:
             planted = (before[:-1, toe, 2] < 0.05) & (_speed(before[:, toe]) < _PLANTED)
-            steps = [np.linalg.norm(np.diff(j[:, toe, :2], axis=0), axis=-1)[planted] for j in (before, after)]
+            steps = [
+                np.linalg.norm(np.diff(j[:, toe, :2], axis=0), axis=-1)[planted]
+                for j in (before, after)
+            ]
             values[_SLIDE] += list(zip(*steps, strict=True))
-            values[_TOE] += [(0.0, d) for d in np.linalg.norm(after[:, toe] - before[:, toe], axis=-1)]
-            values[_ANKLE] += [(0.0, d) for d in np.linalg.norm(after[:, toe - 3] - before[:, toe - 3], axis=-1)]
+            values[_TOE] += [
+                (0.0, d) for d in np.linalg.norm(after[:, toe] - before[:, toe], axis=-1)
+            ]
+            values[_ANKLE] += [
+                (0.0, d) for d in np.linalg.norm(after[:, toe - 3] - before[:, toe - 3], axis=-1)
+            ]
         for wrist in _WRISTS:
             for a, b in _runs(_speed(before[:, wrist]) < _STILL, 20):
                 if _wander(before[a:b, joint("spine3")]) > 0.04:
                     values[_WRIST].append((_wander(before[a:b, wrist]), _wander(after[a:b, wrist])))
-        for a, b in _runs((_speed(before[:, 0]) < 0.1) & (before[:-1, 0, 2] < 0.7) & (before[:-1, 0, 2] > 0.3), 20):
+        for a, b in _runs(
+            (_speed(before[:, 0]) < 0.1) & (before[:-1, 0, 2] < 0.7) & (before[:-1, 0, 2] > 0.3), 20
+        ):
             values[_SEAT].append((_wander(before[a:b, 0]), _wander(after[a:b, 0])))
     return {name: (*(1000 * np.array(v).mean(0)).tolist(), len(v)) for name, v in values.items()}
 
@@ -95,7 +117,14 @@ def measured(found: list[Pair]) -> dict[str, tuple[float, float, int]]:
 def table(sources: dict[str, list[Pair]]) -> str:
     """The figures of each source as text, "before → after" in millimetres, episodes in brackets."""
     names = (_SLIDE, _TOE, _ANKLE, _WRIST, _SEAT)
-    heads = ("source", "toe slide, mm/frame", "toe moved", "ankle moved", "resting hand wanders", "seated pelvis wanders")
+    heads = (
+        "source",
+        "toe slide, mm/frame",
+        "toe moved",
+        "ankle moved",
+        "resting hand wanders",
+        "seated pelvis wanders",
+    )
     rows: list[tuple[str, ...]] = [heads]
     for source, found in sources.items():
         figures = measured(found)
@@ -109,19 +138,31 @@ def table(sources: dict[str, list[Pair]]) -> str:
             cells.append(f"{text} ({count})" if name in (_WRIST, _SEAT) else text)
         rows.append(tuple(cells))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows)
+    return "\n".join(
+        "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    )
 
 
 def _poses(found: list[Pair]) -> list[Pair]:
-    """A standing, a striding and a low pose of a source, before and after, seen from the body's right front, (22, 2)."""
+    """A standing, a striding and a low pose of a source, before and after, seen from the body's
+    right front, (22, 2).
+    """
     good = [(b, a, ~np.any(list(bad_frames(b).values()), axis=0)) for b, a in found if len(b) > 2]
 
     def kinds(joints: np.ndarray) -> list[np.ndarray]:
-        """How far each frame is from each kind of pose, metres: feet so far apart under a high pelvis, and a pelvis so low."""
-        stride = np.linalg.norm(joints[:, joint("left_ankle")] - joints[:, joint("right_ankle")], axis=-1)
+        """How far each frame is from each kind of pose, metres: feet so far apart under a high
+        pelvis, and a pelvis so low.
+        """
+        stride = np.linalg.norm(
+            joints[:, joint("left_ankle")] - joints[:, joint("right_ankle")], axis=-1
+        )
         height = joints[:, 0, 2]
         unfit = (height < 0.85) | (joints[:, _TOES, 2].min(1) > 0.04)
-        return [*(np.abs(stride - apart) + 9.0 * unfit for apart in (0.2, 0.65)), np.abs(height - 0.55)]
+        return [
+            *(np.abs(stride - apart) + 9.0 * unfit for apart in (0.2, 0.65)),
+            np.abs(height - 0.55),
+        ]
 
     shown = []
     for kind in range(3):
@@ -141,7 +182,9 @@ def _poses(found: list[Pair]) -> list[Pair]:
 
 
 def picture(sources: dict[str, list[Pair]], file: Path) -> None:
-    """Poses of each source before (grey) and after fitting (blue the left, orange the right) in one picture."""
+    """Poses of each source before (grey) and after fitting (blue the left, orange the right) in one
+    picture.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -163,7 +206,12 @@ def picture(sources: dict[str, list[Pair]], file: Path) -> None:
                     side = "#1f6fb4" if j in (1, 4, 7, 10, 13, 16, 18, 20) else "#3a3a3a"
                     colour = "#e0701a" if j in (2, 5, 8, 11, 14, 17, 19, 21) else side
                     ends = pose[[parent, j]] + shift
-                    ax.plot(*ends.T, color=colour if fitted else "#b4b4b4", lw=1.4 if fitted else 3.0, solid_capstyle="round")
+                    ax.plot(
+                        *ends.T,
+                        color=colour if fitted else "#b4b4b4",
+                        lw=1.4 if fitted else 3.0,
+                        solid_capstyle="round",
+                    )
     key = "grey: as captured,\nscaled to our legs\ncoloured: fitted\n(blue left, orange right)"
     axes[-1].text(0.02, 0.5, key, fontsize=8, va="center")
     figure.savefig(file)

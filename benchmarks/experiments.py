@@ -1,17 +1,19 @@
-"""The paper's comparisons on open data: every system trained alike from nothing, then Tables 1 and 2 (docs/experiments.md).
+"""The paper's comparisons on open data: every system trained alike from nothing, then Tables 1 and
+2 (docs/experiments.md).
 
     python benchmarks/experiments.py train DATASET -o RUNS --minutes 20
     python benchmarks/experiments.py table1 FOLDER -o RUNS
     python benchmarks/experiments.py table2 FOLDER -o RUNS
     python benchmarks/experiments.py paired FOLDER -o RUNS
 
-``DATASET`` is made by ``dafnet prepare``, ``FOLDER`` holds its motion files. All systems have the width of the weights that
-ship, the same windows, batches, learning rates, modes and sensor dropout, and the likelihood alone (SAMP: its own loss): what
-this project adds (the way ahead, the free run) is left out, so that the systems differ by what the paper says they differ by.
-There are three budgets: equal processor time for a whole system, as many steps as MoGlow, the dearest, takes in that time, and
-three times the time.
-What is finished is kept; a killed command goes on where it was. ``paired`` compares AP-P with DAFNet clip by clip, in EE: clips
-differ more from each other than the two systems do, so that the tables' intervals cannot tell them apart.
+``DATASET`` is made by ``dafnet prepare``, ``FOLDER`` holds its motion files. All systems have the
+width of the weights that ship, the same windows, batches, learning rates, modes and sensor dropout,
+and the likelihood alone (SAMP: its own loss): what this project adds (the way ahead, the free run)
+is left out, so that the systems differ by what the paper says they differ by. There are three
+budgets: equal processor time for a whole system, as many steps as MoGlow, the dearest, takes in
+that time, and three times the time. What is finished is kept; a killed command goes on where it
+was. ``paired`` compares AP-P with DAFNet clip by clip, in EE: clips differ more from each other
+than the two systems do, so that the tables' intervals cannot tell them apart.
 """
 
 import argparse
@@ -47,26 +49,45 @@ from dafnet_addon.training.train import Run, TrainingConfig, dataset_pool, train
 MODEL = SMALL
 TRAINING = TrainingConfig(batch=40, peak=1e-3, mixed=True, minutes_predictor=2.0)
 FLOWS: dict[str, dict[str, Any]] = {
-    "MoGlow": {"system": "moglow", "steps_whole": 16}, "AP-P": {"system": "ap-p", "steps_whole": 6},
-    "DAFNet": {"system": "dafnet"}, "Lower body first": {"system": "lower-first"},
+    "MoGlow": {"system": "moglow", "steps_whole": 16},
+    "AP-P": {"system": "ap-p", "steps_whole": 6},
+    "DAFNet": {"system": "dafnet"},
+    "Lower body first": {"system": "lower-first"},
 }
-"""The likelihood models of Table 2, as the paper sizes them, and DAFNet the other way round (the paper's section 7)."""
+"""The likelihood models of Table 2, as the paper sizes them, and DAFNet the other way round (the
+paper's section 7).
+"""
 STEPPED = ("AP-P", "DAFNet")
 """Those that get further runs: of as many steps as MoGlow's, and of three times the time."""
-SAMP = {"SAMP": ("samp", "samp"), "SAMP-A": ("samp", "samp-a"), "SAMP on our input": ("samp-ob", "samp-ob")}
+SAMP = {
+    "SAMP": ("samp", "samp"),
+    "SAMP-A": ("samp", "samp-a"),
+    "SAMP on our input": ("samp-ob", "samp-ob"),
+}
 """By system, the network that it runs, and how (``baselines.samp``)."""
 NETWORKS = ("samp", "samp-ob")
 BUDGETS = ("equal time", "equal steps", "triple time")
 SHIPPED = "the weights that ship"
 
-_FIGURES = {"fs": "foot_sliding_per_frame", "eed": "end_effector_error", "bcc": "bad_collisions_per_frame"}
+_FIGURES = {
+    "fs": "foot_sliding_per_frame",
+    "eed": "end_effector_error",
+    "bcc": "bad_collisions_per_frame",
+}
 _SEATS = {"sits": "sits_within_6cm", "stands": "stands_when_it_should"}
 TABLES: dict[str, tuple[tuple[str, ...], dict[str, tuple[float, ...]]]] = {
-    "table1": (("fs free", "bcc free"), {"SAMP": (5701, 9617), "SAMP-A": (5427, 9846), "DAFNet": (5170, 8129)}),
-    "table2": (("fs free", "fs ee", "eed ee", "bcc free", "bcc ee"), {
-        "MoGlow": (5495, 5361, 0.230, 1328, 609), "AP-P": (2623, 2344, 0.106, 561, 289),
-        "DAFNet": (2528, 2050, 0.026, 289, 385),
-    }),
+    "table1": (
+        ("fs free", "bcc free"),
+        {"SAMP": (5701, 9617), "SAMP-A": (5427, 9846), "DAFNet": (5170, 8129)},
+    ),
+    "table2": (
+        ("fs free", "fs ee", "eed ee", "bcc free", "bcc ee"),
+        {
+            "MoGlow": (5495, 5361, 0.230, 1328, 609),
+            "AP-P": (2623, 2344, 0.106, 561, 289),
+            "DAFNet": (2528, 2050, 0.026, 289, 385),
+        },
+    ),
 }
 """The paper's tables: what is measured, and its figures (sums over 5,359 and 4,135 frames)."""
 
@@ -88,7 +109,13 @@ def _at(runs: Path, budget: str) -> Path:
 
 def _train(dataset: Path, samp: SampConfig, job: Job) -> None:
     if job.part in NETWORKS:
-        train_samp(job.part, samp, dataset, checkpoint_file(job.folder, job.part), replace(job.training, batch=32))
+        train_samp(
+            job.part,
+            samp,
+            dataset,
+            checkpoint_file(job.folder, job.part),
+            replace(job.training, batch=32),
+        )
     else:
         train_part(job.part, dataset, job.folder, job.model, job.training, threads=1)
 
@@ -109,17 +136,26 @@ def _jobs(runs: Path, budget: str, model: ModelConfig, training: TrainingConfig)
 
 
 def train(
-    dataset: Path, runs: Path, minutes: float, processes: int | None = None, model: ModelConfig = MODEL,
-    training: TrainingConfig = TRAINING, samp: SampConfig = SMALL_SAMP,
+    dataset: Path,
+    runs: Path,
+    minutes: float,
+    processes: int | None = None,
+    model: ModelConfig = MODEL,
+    training: TrainingConfig = TRAINING,
+    samp: SampConfig = SMALL_SAMP,
 ) -> None:
-    """Train every system with its budgets; ``minutes`` of one core for each whole system, the shared predictor not counted."""
+    """Train every system with its budgets; ``minutes`` of one core for each whole system, the
+    shared predictor not counted.
+    """
     first = runs / "predictor"
     if not checkpoint_file(first, "predictor").exists():
         train_part("predictor", dataset, first, model, training)
     for budget in BUDGETS:
         spent = replace(training, minutes_flow=minutes)
         if budget == "equal steps":
-            spent = replace(spent, steps_flow=Run.load("whole", _at(runs, BUDGETS[0]) / "moglow").step)
+            spent = replace(
+                spent, steps_flow=Run.load("whole", _at(runs, BUDGETS[0]) / "moglow").step
+            )
         elif budget == "triple time":
             spent = replace(spent, minutes_flow=3.0 * minutes)
         jobs = list(_jobs(runs, budget, model, spent))
@@ -145,11 +181,15 @@ Measuring = Callable[[Sequence[HeldClip]], list[Measured]]
 
 
 def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
-    """The table's systems by name and budget: the steps that they were trained, and what measures them."""
+    """The table's systems by name and budget: the steps that they were trained, and what measures
+    them.
+    """
 
     def flow(file: Path | None) -> Measuring:
         if file is not None and not file.exists():
-            raise InputError(f"'{file}' is not there yet; run 'experiments.py train' to its end first.")
+            raise InputError(
+                f"'{file}' is not there yet; run 'experiments.py train' to its end first."
+            )
         return lambda clips: measured(load_weights(file), clips, modes=("FREE", "EE"), clean=False)
 
     out: dict[str, tuple[str, Measuring]] = {}
@@ -160,7 +200,10 @@ def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
             file = checkpoint_file(at / network, network)
             out[f"{name}, {budget}"] = steps_of(file.parent), partial(measured_samp, file, kind)
         for name, changed in compared.items():
-            if budget != BUDGETS[0] and name not in (*(("MoGlow",) if budget == BUDGETS[1] else ()), *STEPPED):
+            if budget != BUDGETS[0] and name not in (
+                *(("MoGlow",) if budget == BUDGETS[1] else ()),
+                *STEPPED,
+            ):
                 continue
             # MoGlow's run with equal time is that with equal steps too.
             folder = (_at(runs, BUDGETS[0]) if name == "MoGlow" else at) / changed["system"]
@@ -169,9 +212,11 @@ def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
     return out
 
 
-def measure(table: str, clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path) -> dict[str, Any]:
-    """Every system of a table on every group of clips. ``output``/measured.json is written as figures come; what is there is
-    kept, for either table.
+def measure(
+    table: str, clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path
+) -> dict[str, Any]:
+    """Every system of a table on every group of clips. ``output``/measured.json is written as
+    figures come; what is there is kept, for either table.
     """
     file = output / "measured.json"
     known: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
@@ -188,7 +233,9 @@ def measure(table: str, clips: Mapping[str, Sequence[HeldClip]], runs: Path, out
         for group, members in clips.items():
             chosen, at = results[at : at + len(members)], at + len(members)
             settings = [key for key in results[0].runs if key != "legs"]
-            known[name]["groups"][group] = {key: row([each.runs[key] for each in chosen]) for key in settings}
+            known[name]["groups"][group] = {
+                key: row([each.runs[key] for each in chosen]) for key in settings
+            }
         output.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(known, indent=1), encoding="utf-8")
     found = {name: known[name] for name in systems}
@@ -198,26 +245,38 @@ def measure(table: str, clips: Mapping[str, Sequence[HeldClip]], runs: Path, out
 
 
 def _ratio(worse: np.ndarray, better: np.ndarray) -> float:
-    """Ratio of two systems' figures over clips, (N, 2) totals and weights; NaN where the second has none."""
+    """Ratio of two systems' figures over clips, (N, 2) totals and weights; NaN where the second has
+    none.
+    """
     (a, m), (b, n) = worse.sum(0), better.sum(0)
     return float((a / m) / (b / n)) if b else float("nan")
 
 
-def paired(clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path, draws: int = 4000) -> str:
-    """AP-P's figures over DAFNet's in EE on the same clips, for each budget, with the 95 % interval of the ratio over pairs
-    drawn anew, and in how many clips AP-P is the worse; writes ``output``/paired.md. What is measured is kept in paired.json.
+def paired(
+    clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path, draws: int = 4000
+) -> str:
+    """AP-P's figures over DAFNet's in EE on the same clips, for each budget, with the 95 % interval
+    of the ratio over pairs drawn anew, and in how many clips AP-P is the worse; writes
+    ``output``/paired.md. What is measured is kept in paired.json.
     """
     file = output / "paired.json"
     known: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     every = [clip for group in clips.values() for clip in group]
-    rows = ["| budget | clips | EED, z = 0 | EED, temperature 1 | FS, z = 0 | FS, temperature 1 |", "|---" * 6 + "|"]
+    rows = [
+        "| budget | clips | EED, z = 0 | EED, temperature 1 | FS, z = 0 | FS, temperature 1 |",
+        "|---" * 6 + "|",
+    ]
     rng = np.random.default_rng(0)
     for budget in BUDGETS:
         for name in STEPPED:
             if f"{name}, {budget}" not in known:
-                weights = load_weights(_at(runs, budget) / FLOWS[name]["system"] / "weights.safetensors")
+                weights = load_weights(
+                    _at(runs, budget) / FLOWS[name]["system"] / "weights.safetensors"
+                )
                 results = measured(weights, every, modes=("EE",), clean=False)
-                known[f"{name}, {budget}"] = [{key: each.runs[key].sums for key in ("ee_t0", "ee_t1")} for each in results]
+                known[f"{name}, {budget}"] = [
+                    {key: each.runs[key].sums for key in ("ee_t0", "ee_t1")} for each in results
+                ]
                 file.write_text(json.dumps(known), encoding="utf-8")
         at = 0
         for group, members in clips.items():
@@ -225,9 +284,13 @@ def paired(clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path, dr
             cells = []
             for figure, heat in product(("eed", "fs"), ("ee_t0", "ee_t1")):
                 sums = [known[f"{name}, {budget}"][chosen] for name in STEPPED]
-                pair = [np.array([clip[heat][_FIGURES[figure]] for clip in system]) for system in sums]
+                pair = [
+                    np.array([clip[heat][_FIGURES[figure]] for clip in system]) for system in sums
+                ]
                 drawn = rng.integers(len(members), size=(draws, len(members)))
-                low, high = np.percentile([_ratio(*(each[k] for each in pair)) for k in drawn], [2.5, 97.5])
+                low, high = np.percentile(
+                    [_ratio(*(each[k] for each in pair)) for k in drawn], [2.5, 97.5]
+                )
                 worse, better = (each[:, 0] / each[:, 1] for each in pair)
                 count = f"{int((worse > better).sum())} of {len(members)}"
                 cells.append(f"×{_ratio(*pair):.2f} ({low:.2f} to {high:.2f}), {count}")
@@ -237,23 +300,32 @@ def paired(clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path, dr
     return text
 
 
-def _cell(values: Mapping[str, Any], figure: str, ours: float | None = None, paper: float | None = None) -> str:
+def _cell(
+    values: Mapping[str, Any], figure: str, ours: float | None = None, paper: float | None = None
+) -> str:
     """A figure and its interval; its ratio to ``ours``, and beside it the paper's."""
     if values.get(figure) is None:
         return "–"
     low, high = values["intervals"][figure]
     ratio = f", ×{values[figure] / ours:.2f}" if ours else ""
-    return f"{values[figure]:.3g} ({low:.2g} to {high:.2g}){ratio}" + (f" [×{paper:.2f}]" if paper else "")
+    return f"{values[figure]:.3g} ({low:.2g} to {high:.2g}){ratio}" + (
+        f" [×{paper:.2f}]" if paper else ""
+    )
 
 
-def _row(table: str, system: str, found: Mapping[str, Any], group: str, heat: str, columns: Sequence[str]) -> str:
+def _row(
+    table: str, system: str, found: Mapping[str, Any], group: str, heat: str, columns: Sequence[str]
+) -> str:
     name, budget = system.split(", ", 1)
     printed, paper = TABLES[table]
     cells = []
     for column in columns:
         what, mode = column.split()
         figure = {**_FIGURES, **_SEATS}[what]
-        values, ours = (found[s]["groups"][group].get(f"{mode}_{heat}", {}) for s in (system, f"DAFNet, {budget}"))
+        values, ours = (
+            found[s]["groups"][group].get(f"{mode}_{heat}", {})
+            for s in (system, f"DAFNet, {budget}")
+        )
         compared = name != "DAFNet" and what in _FIGURES
         theirs = None
         if name in paper and compared:
@@ -263,8 +335,9 @@ def _row(table: str, system: str, found: Mapping[str, Any], group: str, heat: st
 
 
 def markdown(table: str, found: Mapping[str, Any]) -> str:
-    """The table, a section for each group of clips and temperature: figures (95 % interval over clips), then the ratio to the
-    two-part flow's of the same budget, and in brackets the paper's ratio.
+    """The table, a section for each group of clips and temperature: figures (95 % interval over
+    clips), then the ratio to the two-part flow's of the same budget, and in brackets the paper's
+    ratio.
     """
     modes = ("free",) if table == "table1" else ("free", "ee")
     columns = [*TABLES[table][0], *(f"{what} {mode}" for what in _SEATS for mode in modes)]
@@ -272,24 +345,34 @@ def markdown(table: str, found: Mapping[str, Any]) -> str:
     groups = next(iter(found.values()))["groups"]
     for group, heat in product(groups, ("t0", "t1")):
         truth = groups[group]["ground_truth"]
-        real = " | ".join(_cell(truth, {**_FIGURES, **_SEATS}[column.split()[0]]) for column in columns)
+        real = " | ".join(
+            _cell(truth, {**_FIGURES, **_SEATS}[column.split()[0]]) for column in columns
+        )
         parts += [
-            f"### {group}, temperature {heat[1]} ({truth['clips']} clips, {truth['seat_episodes']} seat episodes)",
-            "\n".join([
-                "| | steps | " + " | ".join(column.upper() for column in columns) + " |", "|---" * (len(columns) + 2) + "|",
-                f"| **ground truth** | – | {real} |",
-                *(_row(table, system, found, group, heat, columns) for system in found),
-            ]),
+            f"### {group}, temperature {heat[1]} ({truth['clips']} clips, "
+            f"{truth['seat_episodes']} seat episodes)",
+            "\n".join(
+                [
+                    "| | steps | " + " | ".join(column.upper() for column in columns) + " |",
+                    "|---" * (len(columns) + 2) + "|",
+                    f"| **ground truth** | – | {real} |",
+                    *(_row(table, system, found, group, heat, columns) for system in found),
+                ]
+            ),
         ]
     return "\n\n".join(parts) + "\n"
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     commands = parser.add_subparsers(dest="command", required=True)
     training = commands.add_parser("train")
     training.add_argument("dataset", type=Path)
-    training.add_argument("--minutes", type=float, default=20.0, help="of one core, for each system")
+    training.add_argument(
+        "--minutes", type=float, default=20.0, help="of one core, for each system"
+    )
     training.add_argument("--processes", type=int, default=None, help="else one a core")
     for name in (*TABLES, "paired"):
         commands.add_parser(name).add_argument("folder", type=Path)

@@ -1,11 +1,13 @@
-"""Milliseconds per pose of every system in one run, at batch 1 and 64, beside what the machine's memory allows.
+"""Milliseconds per pose of every system in one run, at batch 1 and 64, beside what the machine's
+memory allows.
 
     dafnet bench speed
 
-Random weights of the paper's sizes (width 512, environment code 512; MoGlow of 16 steps, AP-P of 6, DAFNet of 3 + 3; of SAMP's
-the decoder alone, without the features that it is fed), and the weights that ship, on one thread. At batch 1 every frame reads
-all recurrent matrices once, so their bytes over the bandwidth of a matrix-vector product is the time that no implementation
-goes under; where they fit a cache, they may.
+Random weights of the paper's sizes (width 512, environment code 512; MoGlow of 16 steps, AP-P of 6,
+DAFNet of 3 + 3; of SAMP's the decoder alone, without the features that it is fed), and the weights
+that ship, on one thread. At batch 1 every frame reads all recurrent matrices once, so their bytes
+over the bandwidth of a matrix-vector product is the time that no implementation goes under; where
+they fit a cache, they may.
 """
 
 from collections.abc import Callable
@@ -29,7 +31,8 @@ from dafnet_addon.model.predictor import ActionPredictor
 from dafnet_addon.training.batches import Statistics
 from dafnet_addon.training.export import tensors_of
 
-_LARGE = 8192  # rows and columns of the matrix that bandwidth is measured with: 256 MB, more than any cache
+# rows and columns of the matrix that bandwidth is measured with: 256 MB, more than any cache
+_LARGE = 8192
 _REPEATS = 3
 
 
@@ -44,7 +47,9 @@ def random_weights(config: ModelConfig) -> Weights:
 
 
 def bandwidth() -> float:
-    """Bytes a second that one thread reads in a matrix-vector product out of memory, the best of a few."""
+    """Bytes a second that one thread reads in a matrix-vector product out of memory, the best of a
+    few.
+    """
     matrix, vector = np.ones((_LARGE, _LARGE), np.float32), np.ones(_LARGE, np.float32)
     best = np.inf
     with one_thread():
@@ -57,15 +62,27 @@ def bandwidth() -> float:
 
 def recurrent_bytes(sampler: Sampler) -> int:
     """Bytes of the matrices that each frame multiplies with."""
-    arrays = [m for part in sampler._parts for step in part.steps for m in (step.inverse, step.coupling.out)]
-    arrays += [layer.matrix for part in sampler._parts for step in part.steps for layer in step.coupling.layers]
+    arrays = [
+        m
+        for part in sampler._parts
+        for step in part.steps
+        for m in (step.inverse, step.coupling.out)
+    ]
+    arrays += [
+        layer.matrix
+        for part in sampler._parts
+        for step in part.steps
+        for layer in step.coupling.layers
+    ]
     if sampler.actions:
         arrays += [sampler._predictor_past, sampler._predictor_second[0], sampler._predictor_out[0]]
     return sum(int(a.nbytes) for a in arrays)
 
 
 def per_pose(sampler: Sampler, batch: int, frames: int) -> float:
-    """Milliseconds a pose, frame by frame, what is known in advance not counted; the best of a few."""
+    """Milliseconds a pose, frame by frame, what is known in advance not counted; the best of a
+    few.
+    """
     nothing = {"velocity": 3, "ahead": 18, "occupancy": 2640, "observation": 66, "given": 22}
     conditions = Conditions(**{name: np.zeros((frames, size)) for name, size in nothing.items()})
     noise = sampler._to(np.zeros((batch, 66)))
@@ -89,7 +106,10 @@ def samp_row(config: SampConfig, frames: int, speed: float) -> dict[str, Any]:
     row: dict[str, Any] = {"system": "SAMP", "library": "torch", "megabytes": round(size / 1e6, 2)}
     row["floor_ms"] = round(1e3 * size / speed, 3)
     for batch in (1, 64):
-        state, sensor = torch.zeros(batch, len(network.in_mean)), torch.zeros(batch, len(network.sensor_mean))
+        state, sensor = (
+            torch.zeros(batch, len(network.in_mean)),
+            torch.zeros(batch, len(network.sensor_mean)),
+        )
         z, best = torch.zeros(batch, config.latent), np.inf
         with torch.no_grad():
             for _ in range(_REPEATS):
@@ -103,15 +123,21 @@ def samp_row(config: SampConfig, frames: int, speed: float) -> dict[str, Any]:
 
 
 def measure(
-    file: Path | None, progress: Callable[[float], None], paper: ModelConfig = PAPER, frames: int = 60,
+    file: Path | None,
+    progress: Callable[[float], None],
+    paper: ModelConfig = PAPER,
+    frames: int = 60,
     samp: SampConfig = PAPER_SAMP,
 ) -> tuple[dict[str, Any], str]:
-    """Run the benchmark; ``file``: weights to time beside the paper's sizes (None: those that ship)."""
+    """Run the benchmark; ``file``: weights to time beside the paper's sizes (None: those that
+    ship).
+    """
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     speed = bandwidth()
     models = {
-        "DAFNet": paper, "AP-P": replace(paper, system="ap-p", steps_whole=6),
+        "DAFNet": paper,
+        "AP-P": replace(paper, system="ap-p", steps_whole=6),
         "MoGlow": replace(paper, system="moglow", steps_whole=16),
     }
     timed: list[tuple[str, str, Weights, str | None]] = []
@@ -124,10 +150,16 @@ def measure(
         progress(done / len(timed))
         sampler = sampler_of(weights, device)
         size = recurrent_bytes(sampler)
-        row: dict[str, Any] = {"system": name, "library": library, "megabytes": round(size / 1e6, 2)}
+        row: dict[str, Any] = {
+            "system": name,
+            "library": library,
+            "megabytes": round(size / 1e6, 2),
+        }
         row["floor_ms"] = round(1e3 * size / speed, 3)
         for batch in (1, 64):
-            row[f"ms_{batch}"] = round(per_pose(sampler, batch, frames if batch == 1 else max(frames // 4, 2)), 3)
+            row[f"ms_{batch}"] = round(
+                per_pose(sampler, batch, frames if batch == 1 else max(frames // 4, 2)), 3
+            )
         row["over_floor"] = round(row["ms_1"] / row["floor_ms"], 2)
         rows.append(row)
     rows.insert(-1, samp_row(samp, frames, speed))
@@ -135,14 +167,27 @@ def measure(
     progress(1.0)
     ours = rows[0]["ms_1"]
     report = {
-        "gigabytes_a_second": round(speed / 1e9, 2), "rows": rows,
-        "moglow_over_dafnet": {row["library"]: round(row["ms_1"] / ours, 2) for row in rows if row["system"] == "MoGlow"},
+        "gigabytes_a_second": round(speed / 1e9, 2),
+        "rows": rows,
+        "moglow_over_dafnet": {
+            row["library"]: round(row["ms_1"] / ours, 2)
+            for row in rows
+            if row["system"] == "MoGlow"
+        },
     }
     columns = {
-        "system": "", "library": "library", "megabytes": "recurrent MB", "floor_ms": "floor, ms", "ms_1": "batch 1, ms a pose",
-        "over_floor": "over the floor", "ms_64": "batch 64, ms a pose",
+        "system": "",
+        "library": "library",
+        "megabytes": "recurrent MB",
+        "floor_ms": "floor, ms",
+        "ms_1": "batch 1, ms a pose",
+        "over_floor": "over the floor",
+        "ms_64": "batch 64, ms a pose",
     }
     lines = ["| " + " | ".join(columns.values()) + " |", "|---" * len(columns) + "|"]
     lines += ["| " + " | ".join(str(row[name]) for name in columns) + " |" for row in rows]
-    head = f"One thread; matrix-vector products read {report['gigabytes_a_second']} GB a second from memory."
+    head = (
+        f"One thread; matrix-vector products read {report['gigabytes_a_second']} GB a second from "
+        "memory."
+    )
     return report, "\n".join([head, "", *lines])

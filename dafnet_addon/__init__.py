@@ -1,7 +1,8 @@
-"""DAFNet: a character that walks up to furniture and uses it, driven by an animated root; NumPy only, without Blender.
+"""DAFNet: a character that walks up to furniture and uses it, driven by an animated root; NumPy
+only, without Blender.
 
-``generate(Scene(…), Controls(…), load_weights())`` gives a ``Take``; ``generate_steps`` does the same and yields its
-progress on the way.
+``generate(Scene(…), Controls(…), load_weights())`` gives a ``Take``; ``generate_steps`` does the
+same and yields its progress on the way.
 """
 
 from importlib import import_module
@@ -16,15 +17,27 @@ if TYPE_CHECKING:
     from .core.weights import load_weights
 
 __all__ = [
-    "Box", "CleanUp", "Controls", "DafnetError", "InputError", "Mesh", "Scene", "Take", "WeightsError", "generate",
-    "generate_steps", "load_weights",
+    "Box",
+    "CleanUp",
+    "Controls",
+    "DafnetError",
+    "InputError",
+    "Mesh",
+    "Scene",
+    "Take",
+    "WeightsError",
+    "generate",
+    "generate_steps",
+    "load_weights",
 ]
 
 _MODULES = ("errors", "take", "solids", "cleanup", "weights", "generate")
 
 
 def __getattr__(name: str) -> Any:
-    """What the core offers, which is loaded when it is asked for: the command has to be there for Ctrl-C before NumPy is."""
+    """What the core offers, which is loaded when it is asked for: the command has to be there for
+    Ctrl-C before NumPy is.
+    """
     for module in _MODULES if name in __all__ else ():
         if name in (found := import_module(f".core.{module}", __name__)).__all__:
             return getattr(found, name)

@@ -1,7 +1,9 @@
-"""The command ``dafnet``: one parser behind ``python -m dafnet_addon …`` and ``blender [file] --command dafnet …``.
+"""The command ``dafnet``: one parser behind ``python -m dafnet_addon …`` and ``blender [file]
+--command dafnet …``.
 
-Results go to standard output, for machines with ``--json``; progress and errors go to standard error. Exit codes: 0
-done, 1 an error said in one sentence, 2 a wrong command line, 128 and its number for a signal: 130 for Ctrl-C.
+Results go to standard output, for machines with ``--json``; progress and errors go to standard
+error. Exit codes: 0 done, 1 an error said in one sentence, 2 a wrong command line, 128 and its
+number for a signal: 130 for Ctrl-C.
 """
 
 import argparse
@@ -41,14 +43,18 @@ _PACKAGES = {"PIL": "pillow"}
 _SHOWN = 2000  # characters of each thing out of a file that is printed; --json gives all
 
 
-def main(argv: Sequence[str] | None = None, in_blender: bool = False, loading: Stop | None = None) -> int:
+def main(
+    argv: Sequence[str] | None = None, in_blender: bool = False, loading: Stop | None = None
+) -> int:
     """Run one command and return its exit code.
 
-    ``in_blender``: the file that Blender has open is the scene. ``loading``: remembers whether to stop was asked before.
+    ``in_blender``: the file that Blender has open is the scene. ``loading``: remembers whether to
+    stop was asked before.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # a name that the terminal has no letters for is no reason to fail
+            # a name that the terminal has no letters for is no reason to fail
+            stream.reconfigure(errors="backslashreplace")
     try:
         if loading:
             loading.now()
@@ -69,7 +75,10 @@ def main(argv: Sequence[str] | None = None, in_blender: bool = False, loading: S
         _complain(f"dafnet: {error}")
         return 1
     except OSError as error:
-        _complain(f"dafnet: {error.filename or 'A file'} cannot be used ({error.strerror}); check its path.")
+        _complain(
+            f"dafnet: {error.filename or 'A file'} cannot be used ({error.strerror}); check its "
+            "path."
+        )
         return 1
     except KeyboardInterrupt as stop:
         _complain("dafnet: stopped.")
@@ -86,13 +95,16 @@ def run(loading: Stop | None = None) -> None:
         except OSError:
             _nowhere(stream)
     if "bpy" in sys.modules:
-        # The module of Blender 4.2 crashes at exit once a property with a poll function was registered, unregistered or not.
+        # The module of Blender 4.2 crashes at exit once a property with a poll function was
+        # registered, unregistered or not.
         os._exit(code)
     sys.exit(code)
 
 
 def _open_streams() -> None:
-    """Lead standard streams that were closed to nowhere, before a file gets their number and what is printed."""
+    """Lead standard streams that were closed to nowhere, before a file gets their number and what
+    is printed.
+    """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)
@@ -102,13 +114,17 @@ def _open_streams() -> None:
 
 
 def _nowhere(stream: TextIO) -> None:
-    """Lead a stream that cannot be written to nowhere: what it still holds would fail again at exit."""
+    """Lead a stream that cannot be written to nowhere: what it still holds would fail again at
+    exit.
+    """
     with open(os.devnull, "wb") as nowhere:
         os.dup2(nowhere.fileno(), stream.fileno())
 
 
 def _say(text: str) -> None:
-    """Print on standard output what was asked for; a reader who has read enough, as ``head`` has, is no error."""
+    """Print on standard output what was asked for; a reader who has read enough, as ``head`` has,
+    is no error.
+    """
     try:
         if text:
             print(text)
@@ -116,7 +132,9 @@ def _say(text: str) -> None:
     except OSError as error:
         _nowhere(sys.stdout)
         if not isinstance(error, BrokenPipeError):
-            raise InputError(f"The result cannot be written to standard output ({error.strerror}).") from error
+            raise InputError(
+                f"The result cannot be written to standard output ({error.strerror})."
+            ) from error
 
 
 def _complain(text: str, end: str = "\n") -> None:
@@ -131,116 +149,247 @@ def _never() -> None:
 
 def _parser(in_blender: bool) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="dafnet", description="A character that walks up to furniture and uses it, from an animated root."
+        prog="dafnet",
+        description="A character that walks up to furniture and uses it, from an animated root.",
     )
     commands = parser.add_subparsers(metavar="command", required=True)
 
     def command(
-        name: str, action: Callable[[argparse.Namespace, "_Bar"], _Result], text: str, *, part: str = "",
+        name: str,
+        action: Callable[[argparse.Namespace, "_Bar"], _Result],
+        text: str,
+        *,
+        part: str = "",
         needs: Callable[[argparse.Namespace], Sequence[str]] = lambda _: (),
     ) -> argparse.ArgumentParser:
-        """A subcommand that needs a ``part`` of the checkout, and modules besides NumPy that may depend on its options."""
+        """A subcommand that needs a ``part`` of the checkout, and modules besides NumPy that may
+        depend on its options.
+        """
         added = commands.add_parser(name, help=text, description=text)
         added.set_defaults(run=action, in_blender=in_blender, part=part, needs=needs)
-        added.add_argument("--json", action="store_true", help="print the result as JSON on standard output")
+        added.add_argument(
+            "--json", action="store_true", help="print the result as JSON on standard output"
+        )
         return added
 
     def sampling(added: argparse.ArgumentParser, temperature: float | None) -> None:
         default = None if temperature is None else 0
-        added.add_argument("--seed", type=_number(int, 0, MOST_SEED), default=default, help="seed of the noise")
         added.add_argument(
-            "--temperature", type=_number(float, 0.0), default=temperature, help="0 is the calm take, 1 as lively as real"
+            "--seed", type=_number(int, 0, MOST_SEED), default=default, help="seed of the noise"
         )
-        added.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
+        added.add_argument(
+            "--temperature",
+            type=_number(float, 0.0),
+            default=temperature,
+            help="0 is the calm take, 1 as lively as real",
+        )
+        added.add_argument(
+            "--weights", type=Path, metavar="FILE", help="trained weights; else those that ship"
+        )
 
     demo = command(
-        "demo", _demo, "build the example room, generate, bake, render a preview and report", needs=lambda _: ("bpy",)
+        "demo",
+        _demo,
+        "build the example room, generate, bake, render a preview and report",
+        needs=lambda _: ("bpy",),
     )
     demo.add_argument("-o", "--output", type=Path, default=Path("out/demo"), metavar="FOLDER")
-    demo.add_argument("--no-preview", action="store_true", help="leave out the film and the contact sheet")
+    demo.add_argument(
+        "--no-preview", action="store_true", help="leave out the film and the contact sheet"
+    )
     sampling(demo, 0.0)
 
     bake = command(
-        "bake", _bake, "generate a character of a scene and save the scene with its keys", needs=lambda _: ("bpy",)
+        "bake",
+        _bake,
+        "generate a character of a scene and save the scene with its keys",
+        needs=lambda _: ("bpy",),
     )
     bake.add_argument("file", type=Path, nargs="?" if in_blender else None, metavar="FILE.blend")
     written = bake.add_mutually_exclusive_group(required=True)
     written.add_argument("-o", "--output", type=Path, metavar="OUT.blend")
     written.add_argument("--in-place", action="store_true", help="write FILE.blend itself anew")
-    bake.add_argument("--scene", metavar="NAME", help="another scene than the one that is active in the file")
-    bake.add_argument("--character", metavar="ARMATURE", help="needed where the scene has several characters")
+    bake.add_argument(
+        "--scene", metavar="NAME", help="another scene than the one that is active in the file"
+    )
+    bake.add_argument(
+        "--character", metavar="ARMATURE", help="needed where the scene has several characters"
+    )
     for name in ("root", "furniture", "head", "hand-left", "hand-right", "upper-body"):
         bake.add_argument(f"--{name}", metavar="NAME", help="overrules the character's own setting")
     bake.add_argument("--mode", choices=MODES, help="one mode for all frames")
-    bake.add_argument("--frames", type=_frames, metavar="A:B", help="first and last frame; --frames=A:B where A is negative")
+    bake.add_argument(
+        "--frames",
+        type=_frames,
+        metavar="A:B",
+        help="first and last frame; --frames=A:B where A is negative",
+    )
     share = _number(float, 0.0, 1.0)
-    bake.add_argument("--plant-feet", type=share, metavar="SHARE", help="0 leaves feet as generated, 1 holds those that stand")
-    bake.add_argument("--rest-on-seats", type=share, metavar="SHARE", help="0 leaves who sinks into a seat there")
-    bake.add_argument("--reach-targets", type=share, metavar="SHARE", help="0 leaves hands as generated, 1 is exact")
-    bake.add_argument("--clear-furniture", type=share, metavar="SHARE", help="1 brings hands and feet out of furniture")
+    bake.add_argument(
+        "--plant-feet",
+        type=share,
+        metavar="SHARE",
+        help="0 leaves feet as generated, 1 holds those that stand",
+    )
+    bake.add_argument(
+        "--rest-on-seats", type=share, metavar="SHARE", help="0 leaves who sinks into a seat there"
+    )
+    bake.add_argument(
+        "--reach-targets",
+        type=share,
+        metavar="SHARE",
+        help="0 leaves hands as generated, 1 is exact",
+    )
+    bake.add_argument(
+        "--clear-furniture",
+        type=share,
+        metavar="SHARE",
+        help="1 brings hands and feet out of furniture",
+    )
     bake.add_argument("--smooth", type=share, metavar="SHARE", help="1 evens out quick changes")
-    bake.add_argument("--takes", type=_number(int, 1), default=1, metavar="N", help="how many takes; the first one plays")
+    bake.add_argument(
+        "--takes",
+        type=_number(int, 1),
+        default=1,
+        metavar="N",
+        help="how many takes; the first one plays",
+    )
     sampling(bake, None)
 
     info = command("info", _info, "say what a weights file is")
-    info.add_argument("weights", type=Path, nargs="?", metavar="WEIGHTS", help="else the weights that ship")
+    info.add_argument(
+        "weights", type=Path, nargs="?", metavar="WEIGHTS", help="else the weights that ship"
+    )
 
     prepare = command(
-        "prepare", _prepare, "make a training set from motion files, or go on making it", part="data",
+        "prepare",
+        _prepare,
+        "make a training set from motion files, or go on making it",
+        part="data",
         needs=lambda _: ("matplotlib",),
     )
     prepare.add_argument("folder", type=Path, metavar="FOLDER", help="holds the motion files")
     prepare.add_argument("-o", "--output", type=Path, required=True, metavar="DATASET")
-    prepare.add_argument("--furniture", type=Path, metavar="LIBRARY", help="folder of real pieces to stand among the boxes")
-    prepare.add_argument("--windows", type=_number(int, 1), default=12000, help="how many training windows")
+    prepare.add_argument(
+        "--furniture",
+        type=Path,
+        metavar="LIBRARY",
+        help="folder of real pieces to stand among the boxes",
+    )
+    prepare.add_argument(
+        "--windows", type=_number(int, 1), default=12000, help="how many training windows"
+    )
     prepare.add_argument("--processes", type=_number(int, 1, _MOST_PROCESSES), default=cores())
     prepare.add_argument("--seed", type=_number(int, 0, MOST_SEED), default=0)
 
     train = command(
-        "train", _train, "train a model, or go on with a run, and write its weights", part="training",
+        "train",
+        _train,
+        "train a model, or go on with a run, and write its weights",
+        part="training",
         needs=lambda _: ("torch", "tensorboard", "safetensors"),
     )
-    train.add_argument("config", type=Path, metavar="CONFIG.toml", help="sizes and budgets; see configs/")
+    train.add_argument(
+        "config", type=Path, metavar="CONFIG.toml", help="sizes and budgets; see configs/"
+    )
     train.add_argument("dataset", type=Path, metavar="DATASET", help="made by 'prepare'")
-    train.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="folder of the run")
-    train.add_argument("--minutes", type=_number(float, 0.0), help="of the flow's training, instead of the configuration's")
-    train.add_argument("--from", dest="begin_with", type=Path, metavar="WEIGHTS", help="weights that a new run begins with")
-    train.add_argument("--device", default="cpu", help="'cpu', or 'cuda'; several GPUs through torchrun")
+    train.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="RUN", help="folder of the run"
+    )
+    train.add_argument(
+        "--minutes",
+        type=_number(float, 0.0),
+        help="of the flow's training, instead of the configuration's",
+    )
+    train.add_argument(
+        "--from",
+        dest="begin_with",
+        type=Path,
+        metavar="WEIGHTS",
+        help="weights that a new run begins with",
+    )
+    train.add_argument(
+        "--device", default="cpu", help="'cpu', or 'cuda'; several GPUs through torchrun"
+    )
 
     evaluate = command(
-        "evaluate", _evaluate, "measure weights on held-out clips, beside the clips themselves", part="training",
+        "evaluate",
+        _evaluate,
+        "measure weights on held-out clips, beside the clips themselves",
+        part="training",
         needs=lambda o: (
-            "torch", *(("safetensors",) if _is_samp(o.weights) else ()),
-            *(("matplotlib",) if o.output or o.sheets else ()), *(("PIL",) if o.sheets else ()),
+            "torch",
+            *(("safetensors",) if _is_samp(o.weights) else ()),
+            *(("matplotlib",) if o.output or o.sheets else ()),
+            *(("PIL",) if o.sheets else ()),
         ),
     )
     evaluate.add_argument("folder", type=Path, metavar="FOLDER", help="holds the motion files")
-    evaluate.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
-    evaluate.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="write evaluation.json, .md and .png there")
-    evaluate.add_argument("--save", action="store_true", help="write the figures into the weights' metadata")
-    evaluate.add_argument("--sheets", type=Path, metavar="FOLDER", help="also draw twenty clips, real beside generated")
-    evaluate.add_argument("--furniture", type=Path, metavar="LIBRARY", help="measure among these real pieces instead")
-    evaluate.add_argument("--role", choices=["choose", "tell"], default="choose", help="whose bodies and makers, then")
+    evaluate.add_argument(
+        "--weights", type=Path, metavar="FILE", help="trained weights; else those that ship"
+    )
+    evaluate.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FOLDER",
+        help="write evaluation.json, .md and .png there",
+    )
+    evaluate.add_argument(
+        "--save", action="store_true", help="write the figures into the weights' metadata"
+    )
+    evaluate.add_argument(
+        "--sheets",
+        type=Path,
+        metavar="FOLDER",
+        help="also draw twenty clips, real beside generated",
+    )
+    evaluate.add_argument(
+        "--furniture", type=Path, metavar="LIBRARY", help="measure among these real pieces instead"
+    )
+    evaluate.add_argument(
+        "--role", choices=["choose", "tell"], default="choose", help="whose bodies and makers, then"
+    )
 
     bench = command(
-        "bench", _bench, "measure: 'seats' sits on ten heights from three sides; 'speed' times every system",
-        part="../benchmarks", needs=lambda o: ("torch",) if o.name == "speed" else (),
+        "bench",
+        _bench,
+        "measure: 'seats' sits on ten heights from three sides; 'speed' times every system",
+        part="../benchmarks",
+        needs=lambda o: ("torch",) if o.name == "speed" else (),
     )
     bench.add_argument("name", choices=["seats", "speed"])
-    bench.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
+    bench.add_argument(
+        "--weights", type=Path, metavar="FILE", help="trained weights; else those that ship"
+    )
 
     figures = command(
-        "figures", _figures, "draw the paper's figures with these weights", part="../benchmarks",
+        "figures",
+        _figures,
+        "draw the paper's figures with these weights",
+        part="../benchmarks",
         needs=lambda _: ("bpy", "PIL"),
     )
     figures.add_argument("-o", "--output", type=Path, default=Path("out/figures"), metavar="FOLDER")
-    figures.add_argument("--weights", type=Path, metavar="FILE", help="trained weights; else those that ship")
-    figures.add_argument("--other", action="append", default=[], metavar="NAME=FILE", help="weights of another system")
-    figures.add_argument("--only", nargs="+", metavar="NUMBER", help="the paper's numbers of the figures; else all")
+    figures.add_argument(
+        "--weights", type=Path, metavar="FILE", help="trained weights; else those that ship"
+    )
+    figures.add_argument(
+        "--other",
+        action="append",
+        default=[],
+        metavar="NAME=FILE",
+        help="weights of another system",
+    )
+    figures.add_argument(
+        "--only", nargs="+", metavar="NUMBER", help="the paper's numbers of the figures; else all"
+    )
     return parser
 
 
-def _number(kind: type[int] | type[float], low: float, high: float = math.inf) -> Callable[[str], float]:
+def _number(
+    kind: type[int] | type[float], low: float, high: float = math.inf
+) -> Callable[[str], float]:
     """What reads an option: a finite number of this kind, from ``low`` to ``high``."""
     what = "whole number" if kind is int else "number"
     limits = f"from {low:g} to {high:.10g}" if high < math.inf else f"of at least {low:g}"
@@ -269,8 +418,12 @@ def _demo(options: argparse.Namespace, bar: "_Bar") -> _Result:
     from .blender.demo_room import run_demo
 
     report = run_demo(
-        options.output, seed=options.seed, temperature=options.temperature,
-        weights=options.weights, preview=not options.no_preview, progress=bar,
+        options.output,
+        seed=options.seed,
+        temperature=options.temperature,
+        weights=options.weights,
+        preview=not options.no_preview,
+        progress=bar,
     )
     seats = (
         f"{seat['name']}: seat {seat['seat_height']:.2f} m, pelvis {seat['pelvis_height']:.3f} m, "
@@ -286,24 +439,44 @@ def _bake(options: argparse.Namespace, bar: "_Bar") -> _Result:
 
     weights = load_weights(options.weights) if options.weights else None
     changes = {
-        "root": options.root, "furniture": options.furniture, "head": options.head, "hand_left": options.hand_left,
-        "hand_right": options.hand_right, "upper_body_source": options.upper_body, "mode": options.mode,
-        "temperature": options.temperature, "seed": options.seed,
-        "plant_feet": options.plant_feet, "rest_on_seats": options.rest_on_seats, "reach_targets": options.reach_targets,
-        "clear_furniture": options.clear_furniture, "smooth": options.smooth,
+        "root": options.root,
+        "furniture": options.furniture,
+        "head": options.head,
+        "hand_left": options.hand_left,
+        "hand_right": options.hand_right,
+        "upper_body_source": options.upper_body,
+        "mode": options.mode,
+        "temperature": options.temperature,
+        "seed": options.seed,
+        "plant_feet": options.plant_feet,
+        "rest_on_seats": options.rest_on_seats,
+        "reach_targets": options.reach_targets,
+        "clear_furniture": options.clear_furniture,
+        "smooth": options.smooth,
     }
     if options.frames:
         changes["frame_start"], changes["frame_end"] = options.frames
     output, result = bake_takes(
-        options.file, options.output, scene=options.scene, character=options.character, takes=options.takes,
-        weights=weights, progress=bar, changes={name: value for name, value in changes.items() if value is not None},
+        options.file,
+        options.output,
+        scene=options.scene,
+        character=options.character,
+        takes=options.takes,
+        weights=weights,
+        progress=bar,
+        changes={name: value for name, value in changes.items() if value is not None},
     )
     report: dict[str, Any] = {
         "output": str(output),
         "takes": [
             {
-                "action": action.name, "seed": draw.seed, "temperature": draw.temperature, "frames": len(take),
-                "log_likelihood": round(take.log_likelihood, 3), "metrics": take.metrics, "raw_metrics": take.raw_metrics,
+                "action": action.name,
+                "seed": draw.seed,
+                "temperature": draw.temperature,
+                "frames": len(take),
+                "log_likelihood": round(take.log_likelihood, 3),
+                "metrics": take.metrics,
+                "raw_metrics": take.raw_metrics,
             }
             for action, draw, take in zip(result.actions, result.draws, result.takes, strict=True)
         ],
@@ -313,8 +486,12 @@ def _bake(options: argparse.Namespace, bar: "_Bar") -> _Result:
     lines = [f"Warning: {printable(warning, _SHOWN)}" for warning in report["warnings"]]
     for take in report["takes"]:
         slides = f"{take['metrics']['foot_sliding_per_frame']:.2f} feet slide a frame"
-        lines.append(f"{printable(take['action'])}: {take['frames']} frames, seed {take['seed']}, {slides}")
-    lines.append(", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in report["seconds"].items()))
+        lines.append(
+            f"{printable(take['action'])}: {take['frames']} frames, seed {take['seed']}, {slides}"
+        )
+    lines.append(
+        ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in report["seconds"].items())
+    )
     return report, "\n".join((*lines, f"Written to {output}"))
 
 
@@ -323,12 +500,16 @@ def _info(options: argparse.Namespace, _bar: "_Bar") -> _Result:
 
     weights = load_weights(options.weights)
     described: dict[str, Any] = {
-        "file": str(weights.path), "bytes": weights.path.stat().st_size,
+        "file": str(weights.path),
+        "bytes": weights.path.stat().st_size,
         "parameters": sum(int(tensor.size) for tensor in weights.tensors.values()),
     }
-    described |= {key: weights.says(key) for key in sorted(weights.metadata) if key not in described}
+    described |= {
+        key: weights.says(key) for key in sorted(weights.metadata) if key not in described
+    }
     return described, "\n".join(
-        f"{printable(key)}: {printable(value if isinstance(value, str) else json.dumps(value), _SHOWN)}"
+        f"{printable(key)}: "
+        f"{printable(value if isinstance(value, str) else json.dumps(value), _SHOWN)}"
         for key, value in described.items()
     )
 
@@ -337,11 +518,22 @@ def _prepare(options: argparse.Namespace, bar: "_Bar") -> _Result:
     from .data.prepare import prepare
 
     require_writable(options.output / "dataset.json")
-    prepare(options.folder, options.output, options.windows, options.processes, options.seed, bar, options.furniture)
-    described, *told = (
-        (options.output / name).read_text(encoding="utf-8") for name in ("dataset.json", "summary.txt", "fits.txt")
+    prepare(
+        options.folder,
+        options.output,
+        options.windows,
+        options.processes,
+        options.seed,
+        bar,
+        options.furniture,
     )
-    return json.loads(described), "".join(told) + f"Written to {options.output}; look at its preview.png"
+    described, *told = (
+        (options.output / name).read_text(encoding="utf-8")
+        for name in ("dataset.json", "summary.txt", "fits.txt")
+    )
+    return json.loads(described), "".join(
+        told
+    ) + f"Written to {options.output}; look at its preview.png"
 
 
 def _train(options: argparse.Namespace, bar: "_Bar") -> _Result:
@@ -387,7 +579,10 @@ def _evaluate(options: argparse.Namespace, bar: "_Bar") -> _Result:
     found = report(weights, clips, bar)
     if options.save:
         rows = found["rows"]
-        annotate(weights.path, {"ground_truth": json.dumps(rows["ground_truth"]), "held_out": json.dumps(rows)})
+        annotate(
+            weights.path,
+            {"ground_truth": json.dumps(rows["ground_truth"]), "held_out": json.dumps(rows)},
+        )
     if options.output:
         save_text(options.output / "evaluation.json", json.dumps(found, indent=2))
         save_text(options.output / "evaluation.md", text(found))
@@ -408,7 +603,10 @@ def _evaluate_among_real(options: argparse.Namespace, bar: "_Bar") -> _Result:
     from .training.real_report import real_report, real_text
 
     if options.save or options.sheets:
-        raise InputError("Of the test among real furniture only the tables are made; leave out --save and --sheets.")
+        raise InputError(
+            "Of the test among real furniture only the tables are made; leave out --save and "
+            "--sheets."
+        )
     weights = load_weights(options.weights)
     found = real_report(weights, real_test(options.folder, options.furniture, options.role), bar)
     if options.output:
@@ -424,7 +622,10 @@ def _evaluate_samp(options: argparse.Namespace, clips: "list[HeldClip]", bar: "_
     from .training.evaluate import rows, table
 
     if options.save or options.sheets or options.output:
-        raise InputError("Of a checkpoint of SAMP's only the table is made; leave out --save, --sheets and --output.")
+        raise InputError(
+            "Of a checkpoint of SAMP's only the table is made; leave out --save, --sheets and "
+            "--output."
+        )
     kind, _ = load_samp(options.weights)
     found = {}
     for each in ("samp", "samp-a") if kind == "samp" else (kind,):
@@ -445,7 +646,12 @@ def _figures(options: argparse.Namespace, bar: "_Bar") -> _Result:
             raise InputError(f"'{each}' names no weights; write it as NAME=FILE.")
         others[name] = Path(file)
     require_writable(options.output / "figure.png")
-    files = [str(file) for file in _benchmark("figures")["draw"](options.output, options.weights, others, options.only, bar)]
+    files = [
+        str(file)
+        for file in _benchmark("figures")["draw"](
+            options.output, options.weights, others, options.only, bar
+        )
+    ]
     return files, "\n".join(files)
 
 
@@ -455,13 +661,20 @@ def _benchmark(name: str) -> dict[str, Any]:
 
 
 def _require(options: argparse.Namespace) -> None:
-    """Raise InputError where the command is no part of this installation, or needs modules that are not there."""
+    """Raise InputError where the command is no part of this installation, or needs modules that are
+    not there.
+    """
     if not (Path(__file__).parent / options.part).is_dir():
-        raise InputError("This command is not part of the extension; run it from a checkout of the project.")
+        raise InputError(
+            "This command is not part of the extension; run it from a checkout of the project."
+        )
     missing = [_PACKAGES.get(name, name) for name in options.needs(options) if not _is_there(name)]
     if missing:
         inside = ", or run it inside Blender" if missing == ["bpy"] else ""
-        raise InputError(f"This command needs what this Python does not have, {' and '.join(missing)}; install it{inside}.")
+        raise InputError(
+            f"This command needs what this Python does not have, {' and '.join(missing)}; install "
+            f"it{inside}."
+        )
 
 
 def _is_there(module: str) -> bool:
@@ -472,7 +685,9 @@ def _is_there(module: str) -> bool:
 
 
 class _Bar:
-    """Progress for people, on standard error: a bar on a terminal, ten dots elsewhere. ``stop`` is called at every step."""
+    """Progress for people, on standard error: a bar on a terminal, ten dots elsewhere. ``stop`` is
+    called at every step.
+    """
 
     def __init__(self, stop: Callable[[], None]) -> None:
         self.stop, self.dots, self.shown = stop, 0, False
@@ -499,7 +714,9 @@ class _Bar:
 
 @contextmanager
 def _only_our_output() -> Iterator[None]:
-    """Send what Blender itself prints on standard output to standard error, so that JSON stays JSON."""
+    """Send what Blender itself prints on standard output to standard error, so that JSON stays
+    JSON.
+    """
     sys.stdout.flush()
     kept = os.dup(1)
     os.dup2(2, 1)

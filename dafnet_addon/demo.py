@@ -1,4 +1,6 @@
-"""The demo's plan, without Blender: where its furniture stands, how its character walks, and what its report says."""
+"""The demo's plan, without Blender: where its furniture stands, how its character walks, and what
+its report says.
+"""
 
 import json
 from dataclasses import dataclass
@@ -22,7 +24,9 @@ FPS = 30
 
 @dataclass(frozen=True)
 class Place:
-    """Where a piece of furniture stands: ``position`` (x, y) and the ``yaw`` that its front looks along."""
+    """Where a piece of furniture stands: ``position`` (x, y) and the ``yaw`` that its front looks
+    along.
+    """
 
     position: Point
     yaw: float
@@ -36,7 +40,8 @@ PLACES = {
     "Sofa": Place((-2.55, -0.55), facing((1.0, 0.0))),
 }
 SEATS = tuple(
-    Seat(name, np.array([*PLACES[name].position, height])) for name, height in (("Chair", 0.45), ("Stool", 0.63))
+    Seat(name, np.array([*PLACES[name].position, height]))
+    for name, height in (("Chair", 0.45), ("Stool", 0.63))
 )
 """The seats that the character sits on."""
 
@@ -51,39 +56,61 @@ def _seat(name: str, seconds: float) -> Stop:
 def demo_route() -> Route:
     """Walks in, sits on the chair, draws on the whiteboard, sits on the stool."""
     return route(
-        Stop((2.2, -1.35), facing((-1.0, 0.25)), 0.5), (0.8, -0.80), _seat("Chair", 2.8),
-        (0.25, 0.35), _BOARD,
-        (1.05, 0.35), _seat("Stool", 3.0), fps=FPS,
+        Stop((2.2, -1.35), facing((-1.0, 0.25)), 0.5),
+        (0.8, -0.80),
+        _seat("Chair", 2.8),
+        (0.25, 0.35),
+        _BOARD,
+        (1.05, 0.35),
+        _seat("Stool", 3.0),
+        fps=FPS,
     )
 
 
 def hand_target(rest: Rest, frames: np.ndarray) -> np.ndarray:
-    """World positions (N, 3) of the right wrist that draws a wave on the whiteboard during ``rest``."""
+    """World positions (N, 3) of the right wrist that draws a wave on the whiteboard during
+    ``rest``.
+    """
     u = np.clip((frames - rest.first) / max(rest.last - rest.first, 1), 0.0, 1.0)
     x = rest.stop.position[0] + 0.08 + 0.30 * u
-    return np.stack([x, np.full(len(u), rest.stop.position[1] + 0.36), 1.25 + 0.07 * np.sin(4 * np.pi * u)], axis=1)
+    return np.stack(
+        [x, np.full(len(u), rest.stop.position[1] + 0.36), 1.25 + 0.07 * np.sin(4 * np.pi * u)],
+        axis=1,
+    )
 
 
 def demo_report(
     take: Take, scene: Scene, controls: Controls, weights: Weights, seconds: dict[str, float]
 ) -> dict[str, Any]:
-    """What ``report.json`` holds: how the character sits, stands and moves, beside real motion, and the time taken."""
+    """What ``report.json`` holds: how the character sits, stands and moves, beside real motion, and
+    the time taken.
+    """
     path, _ = root_from_matrices(take.root)
     floor = path.position[:, 2]
     reaching = np.broadcast_to(np.asarray(controls.mode) == "EE", len(controls))
     targets = {
         name: np.where(reaching[:, None], target, np.nan)
-        for name in END_EFFECTORS if (target := getattr(controls, name)) is not None
+        for name in END_EFFECTORS
+        if (target := getattr(controls, name)) is not None
     }
     generated = summary(
-        take.joints, take.fps, floor=floor, targets=targets, distance=lambda points: distance(scene, points, floor)
+        take.joints,
+        take.fps,
+        floor=floor,
+        targets=targets,
+        distance=lambda points: distance(scene, points, floor),
     )
     report = {
         "seats": seat_report(take.joints, path, take.fps, SEATS),
         "standing_pelvis_height": standing_pelvis_height(take.joints, path, take.fps),
         "metrics": {"generated": generated, "ground_truth": weights.says("ground_truth") or {}},
-        "note": "ground_truth was measured on held-out motion capture with the same code; the weights file carries it.",
+        "note": (
+            "ground_truth was measured on held-out motion capture with the same code; the weights "
+            "file carries it."
+        ),
         "seconds": seconds,
     }
-    rounded: dict[str, Any] = json.loads(json.dumps(report), parse_float=lambda digits: round(float(digits), 5))
+    rounded: dict[str, Any] = json.loads(
+        json.dumps(report), parse_float=lambda digits: round(float(digits), 5)
+    )
     return rounded

@@ -1,4 +1,6 @@
-"""What the animator can do. Operators translate between Blender and the add-on and compute nothing themselves."""
+"""What the animator can do. Operators translate between Blender and the add-on and compute nothing
+themselves.
+"""
 
 from .add_character import DAFNET_OT_add_character
 from .add_example import DAFNET_OT_add_example
@@ -6,21 +8,45 @@ from .add_root import DAFNET_OT_add_root
 from .add_targets import DAFNET_OT_add_targets
 from .bake_to_rig import DAFNET_OT_bake_to_rig
 from .find_furniture import DAFNET_OT_find_furniture
-from .follow_path import DAFNET_OT_root_from_object, DAFNET_OT_walk_along_curve, DAFNET_OT_walk_through_points
+from .follow_path import (
+    DAFNET_OT_root_from_object,
+    DAFNET_OT_walk_along_curve,
+    DAFNET_OT_walk_through_points,
+)
 from .generate import DAFNET_OT_cancel, DAFNET_OT_generate
 from .map_rig import DAFNET_OT_detect_rig, DAFNET_OT_load_rig_map, DAFNET_OT_save_rig_map
 from .mark_frames import DAFNET_OT_mark_frames
 from .presets import DAFNET_OT_add_preset
-from .takes import DAFNET_OT_clean_again, DAFNET_OT_keep_accepted, DAFNET_OT_play_take, DAFNET_OT_reject_take
+from .takes import (
+    DAFNET_OT_clean_again,
+    DAFNET_OT_keep_accepted,
+    DAFNET_OT_play_take,
+    DAFNET_OT_reject_take,
+)
 from .walk_to import DAFNET_OT_walk_to
 
 __all__ = ["CLASSES"]
 
 CLASSES = (
-    DAFNET_OT_add_character, DAFNET_OT_generate, DAFNET_OT_cancel, DAFNET_OT_walk_to,
-    DAFNET_OT_play_take, DAFNET_OT_reject_take, DAFNET_OT_keep_accepted, DAFNET_OT_clean_again,
-    DAFNET_OT_mark_frames, DAFNET_OT_add_preset,
-    DAFNET_OT_walk_along_curve, DAFNET_OT_walk_through_points, DAFNET_OT_root_from_object, DAFNET_OT_find_furniture,
-    DAFNET_OT_add_root, DAFNET_OT_add_targets, DAFNET_OT_add_example,
-    DAFNET_OT_detect_rig, DAFNET_OT_load_rig_map, DAFNET_OT_save_rig_map, DAFNET_OT_bake_to_rig,
+    DAFNET_OT_add_character,
+    DAFNET_OT_generate,
+    DAFNET_OT_cancel,
+    DAFNET_OT_walk_to,
+    DAFNET_OT_play_take,
+    DAFNET_OT_reject_take,
+    DAFNET_OT_keep_accepted,
+    DAFNET_OT_clean_again,
+    DAFNET_OT_mark_frames,
+    DAFNET_OT_add_preset,
+    DAFNET_OT_walk_along_curve,
+    DAFNET_OT_walk_through_points,
+    DAFNET_OT_root_from_object,
+    DAFNET_OT_find_furniture,
+    DAFNET_OT_add_root,
+    DAFNET_OT_add_targets,
+    DAFNET_OT_add_example,
+    DAFNET_OT_detect_rig,
+    DAFNET_OT_load_rig_map,
+    DAFNET_OT_save_rig_map,
+    DAFNET_OT_bake_to_rig,
 )

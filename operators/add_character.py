@@ -17,14 +17,26 @@ class DAFNET_OT_add_character(bpy.types.Operator):
     bl_label = "Add Character"
     bl_options = {"REGISTER", "UNDO"}
 
-    name: StringProperty(name="Name", default="Character", description="Name of the character and of its collection")
+    name: StringProperty(
+        name="Name", default="Character", description="Name of the character and of its collection"
+    )
     height: FloatProperty(
-        name="Height", default=STATURE, min=0.5, soft_min=1.4, soft_max=2.1, max=4.0,
+        name="Height",
+        default=STATURE,
+        min=0.5,
+        soft_min=1.4,
+        soft_max=2.1,
+        max=4.0,
         description="Crown to sole, in metres",
     )
 
     build: FloatProperty(
-        name="Build", default=1.0, min=0.5, soft_min=0.7, soft_max=1.4, max=2.0,
+        name="Build",
+        default=1.0,
+        min=0.5,
+        soft_min=0.7,
+        soft_max=1.4,
+        max=2.0,
         description="How stout the body is; the motion is the same",
     )
 

@@ -20,13 +20,17 @@ class DAFNET_OT_add_example(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     kind: EnumProperty(
-        name="Example", items=[(kind, example.label, example.description) for kind, example in EXAMPLES.items()],
+        name="Example",
+        items=[(kind, example.label, example.description) for kind, example in EXAMPLES.items()],
     )
 
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: Any) -> str:
         """The example's own tooltip."""
-        return f"{EXAMPLES[properties.kind].description}: furniture at the 3D cursor and a character, ready to generate"
+        return (
+            f"{EXAMPLES[properties.kind].description}: furniture at the 3D cursor and a "
+            "character, ready to generate"
+        )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -40,6 +44,8 @@ class DAFNET_OT_add_example(bpy.types.Operator):
         """Add it."""
         with reported(self):
             made = add_example(context, self.kind)
-            self.report({"INFO"}, f"'{made.name}' is ready: press Generate in the sidebar's tab DAFNet.")
+            self.report(
+                {"INFO"}, f"'{made.name}' is ready: press Generate in the sidebar's tab DAFNet."
+            )
             return {"FINISHED"}
         return {"CANCELLED"}

@@ -11,7 +11,9 @@ __all__ = ["DAFNET_OT_add_targets"]
 
 
 class DAFNET_OT_add_targets(bpy.types.Operator):
-    """Add empties for head and hands where the character has none, where they are now; mode EE follows them"""
+    """Add empties for head and hands where the character has none, where they are now; mode EE
+    follows them
+    """
 
     bl_idname = "dafnet.add_targets"
     bl_label = "Add Targets"

@@ -16,7 +16,9 @@ _FAR, _TURNED = 0.02, 8.0
 
 
 class DAFNET_OT_bake_to_rig(bpy.types.Operator):
-    """Bake the motion that the character plays, your edits included, into a new action on this armature"""
+    """Bake the motion that the character plays, your edits included, into a new action on this
+    armature
+    """
 
     bl_idname = "dafnet.bake_to_rig"
     bl_label = "Bake to Rig"
@@ -36,14 +38,28 @@ class DAFNET_OT_bake_to_rig(bpy.types.Operator):
         own = rig.dafnet_rig
         with reported(self):
             baked = bake_onto_rig(
-                context, character_for(context, rig), rig, map_of(rig), root_motion=own.root_motion, limbs=own.limbs,
+                context,
+                character_for(context, rig),
+                rig,
+                map_of(rig),
+                root_motion=own.root_motion,
+                limbs=own.limbs,
             )
             if off := _off(baked):
                 bones = ", ".join(f"'{bone}'" for bone in baked.overruled[:3])
-                why = f"mute the constraints and drivers of {bones} and bake again" if bones else "its proportions are others"
+                why = (
+                    f"mute the constraints and drivers of {bones} and bake again"
+                    if bones
+                    else "its proportions are others"
+                )
                 self.report({"WARNING"}, f"The rig is off the character's motion, {off}: {why}")
-            places = ", ".join(f"{part} {100 * mean:.1f} ({100 * most:.1f})" for part, (mean, most) in baked.errors.items())
-            limbs = ", ".join(f"{limb} {mean:.0f} ({most:.0f})" for limb, (mean, most) in baked.angles.items())
+            places = ", ".join(
+                f"{part} {100 * mean:.1f} ({100 * most:.1f})"
+                for part, (mean, most) in baked.errors.items()
+            )
+            limbs = ", ".join(
+                f"{limb} {mean:.0f} ({most:.0f})" for limb, (mean, most) in baked.angles.items()
+            )
             size = "" if baked.ratio == 1.0 else f", motion scaled by {baked.ratio:.2f}"
             told = f"off by cm, mean (largest): {places}; by degrees: {limbs}{size}"
             self.report({"INFO"}, f"'{baked.action.name}': {told}")
@@ -52,7 +68,15 @@ class DAFNET_OT_bake_to_rig(bpy.types.Operator):
 
 
 def _off(baked: Baked) -> str:
-    """What of a bake is off by so much that it is seen, with its mean error; empty where nothing is."""
-    places = [f"{part} by {100 * mean:.0f} cm" for part, (mean, _) in baked.errors.items() if mean > _FAR]
-    limbs = [f"{limb} by {mean:.0f} degrees" for limb, (mean, _) in baked.angles.items() if mean > _TURNED]
+    """What of a bake is off by so much that it is seen, with its mean error; empty where nothing
+    is.
+    """
+    places = [
+        f"{part} by {100 * mean:.0f} cm" for part, (mean, _) in baked.errors.items() if mean > _FAR
+    ]
+    limbs = [
+        f"{limb} by {mean:.0f} degrees"
+        for limb, (mean, _) in baked.angles.items()
+        if mean > _TURNED
+    ]
     return ", ".join(limbs + places)

@@ -13,7 +13,9 @@ _NAMED = 6
 
 
 class DAFNET_OT_find_furniture(bpy.types.Operator):
-    """Link the visible meshes within 1.5 m of the root's path into a collection of the character's own, as its furniture"""
+    """Link the visible meshes within 1.5 m of the root's path into a collection of the character's
+    own, as its furniture
+    """
 
     bl_idname = "dafnet.find_furniture"
     bl_label = "Find Furniture"

@@ -19,13 +19,20 @@ from ..dafnet_addon.core.trails import FASTEST, SLOWEST
 from .generate import idle
 from .reporting import keyed, reported
 
-__all__ = ["DAFNET_OT_root_from_object", "DAFNET_OT_walk_along_curve", "DAFNET_OT_walk_through_points", "may_direct"]
+__all__ = [
+    "DAFNET_OT_root_from_object",
+    "DAFNET_OT_walk_along_curve",
+    "DAFNET_OT_walk_through_points",
+    "may_direct",
+]
 
 _SPEED = "Of walking, in metres a second for a body of 1.75 m"
 
 
 def may_direct(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Whether there is a character to direct in object mode and none is being generated; says what is missing."""
+    """Whether there is a character to direct in object mode and none is being generated; says what
+    is missing.
+    """
     if not idle(cls):
         return False
     if context.mode != "OBJECT":
@@ -40,7 +47,10 @@ def may_direct(cls: type[bpy.types.Operator], context: bpy.types.Context) -> boo
 
 
 def _has(
-    cls: type[bpy.types.Operator], context: bpy.types.Context, fits: Callable[[bpy.types.Object], bool], missing: str
+    cls: type[bpy.types.Operator],
+    context: bpy.types.Context,
+    fits: Callable[[bpy.types.Object], bool],
+    missing: str,
 ) -> bool:
     if not may_direct(cls, context):
         return False
@@ -49,7 +59,9 @@ def _has(
 
 
 class DAFNET_OT_walk_along_curve(bpy.types.Operator):
-    """Key the character's root along the selected curve from the current frame on; keys after that are replaced"""
+    """Key the character's root along the selected curve from the current frame on; keys after that
+    are replaced
+    """
 
     bl_idname = "dafnet.walk_along_curve"
     bl_label = "Walk along Curve"
@@ -57,29 +69,53 @@ class DAFNET_OT_walk_along_curve(bpy.types.Operator):
 
     speed: FloatProperty(name="Speed", default=1.1, min=SLOWEST, max=FASTEST, description=_SPEED)
     seconds: FloatProperty(
-        name="Stay", default=1.0, min=0.0, max=600.0, subtype="TIME_ABSOLUTE", description="Seconds of rest at the end",
+        name="Stay",
+        default=1.0,
+        min=0.0,
+        max=600.0,
+        subtype="TIME_ABSOLUTE",
+        description="Seconds of rest at the end",
     )
-    keep_facing: BoolProperty(name="Keep Facing", description="Look where it looks now all the way, not along the curve")
-    backwards: BoolProperty(name="Backwards", description="Walk from the curve's end to its beginning")
+    keep_facing: BoolProperty(
+        name="Keep Facing", description="Look where it looks now all the way, not along the curve"
+    )
+    backwards: BoolProperty(
+        name="Backwards", description="Walk from the curve's end to its beginning"
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a character to send, and a curve."""
-        return _has(cls, context, is_curve, "Select the one curve to walk along, with the character or alone")
+        return _has(
+            cls,
+            context,
+            is_curve,
+            "Select the one curve to walk along, with the character or alone",
+        )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Key the walk."""
         character, curve = chosen(context, is_curve)
         with reported(self):
-            return keyed(self, along_curve(
-                context, character, curve, speed=self.speed, seconds=self.seconds, keep_facing=self.keep_facing,
-                backwards=self.backwards,
-            ))
+            return keyed(
+                self,
+                along_curve(
+                    context,
+                    character,
+                    curve,
+                    speed=self.speed,
+                    seconds=self.seconds,
+                    keep_facing=self.keep_facing,
+                    backwards=self.backwards,
+                ),
+            )
         return {"CANCELLED"}
 
 
 class DAFNET_OT_walk_through_points(bpy.types.Operator):
-    """Key the root on through the selected empties in the order of their names; where none is selected, to the 3D cursor"""
+    """Key the root on through the selected empties in the order of their names; where none is
+    selected, to the 3D cursor
+    """
 
     bl_idname = "dafnet.walk_through_points"
     bl_label = "Walk through Points"
@@ -87,9 +123,16 @@ class DAFNET_OT_walk_through_points(bpy.types.Operator):
 
     speed: FloatProperty(name="Speed", default=1.1, min=SLOWEST, max=FASTEST, description=_SPEED)
     seconds: FloatProperty(
-        name="Stay", default=1.0, min=0.0, max=600.0, subtype="TIME_ABSOLUTE", description="Seconds of rest at the last one",
+        name="Stay",
+        default=1.0,
+        min=0.0,
+        max=600.0,
+        subtype="TIME_ABSOLUTE",
+        description="Seconds of rest at the last one",
     )
-    to_cursor: BoolProperty(name="On to Cursor", description="Walk on from the last empty to the 3D cursor")
+    to_cursor: BoolProperty(
+        name="On to Cursor", description="Walk on from the last empty to the 3D cursor"
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -99,15 +142,24 @@ class DAFNET_OT_walk_through_points(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Key the walk."""
         with reported(self):
-            return keyed(self, through_points(
-                context, sent(context)[0], floor_points(context), speed=self.speed, seconds=self.seconds,
-                to_cursor=self.to_cursor,
-            ))
+            return keyed(
+                self,
+                through_points(
+                    context,
+                    sent(context)[0],
+                    floor_points(context),
+                    speed=self.speed,
+                    seconds=self.seconds,
+                    to_cursor=self.to_cursor,
+                ),
+            )
         return {"CANCELLED"}
 
 
 class DAFNET_OT_root_from_object(bpy.types.Operator):
-    """Key the root where the selected moving object goes, in the same frames; keys from there on are replaced"""
+    """Key the root where the selected moving object goes, in the same frames; keys from there on
+    are replaced
+    """
 
     bl_idname = "dafnet.root_from_object"
     bl_label = "Root from Object"
@@ -116,7 +168,12 @@ class DAFNET_OT_root_from_object(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a character to send, and something that moves."""
-        return _has(cls, context, may_move, "Select the one animated object to follow, with the character or alone")
+        return _has(
+            cls,
+            context,
+            may_move,
+            "Select the one animated object to follow, with the character or alone",
+        )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Key what it does."""

@@ -21,25 +21,43 @@ _TICK = 0.02
 _CALM_LEGS = 1.0
 """Temperature of the legs of a take whose legs are varied though it is calm."""
 _LOOKING = {
-    "MOUSEMOVE", "INBETWEEN_MOUSEMOVE", "MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "NDOF_MOTION",
-    "TRACKPADPAN", "TRACKPADZOOM",
+    "MOUSEMOVE",
+    "INBETWEEN_MOUSEMOVE",
+    "MIDDLEMOUSE",
+    "WHEELUPMOUSE",
+    "WHEELDOWNMOUSE",
+    "NDOF_MOTION",
+    "TRACKPADPAN",
+    "TRACKPADZOOM",
 }
 """Events that cannot change the scene."""
 
 
 class DAFNET_OT_generate(bpy.types.Operator):
-    """Generate the character's motion from its root, targets and furniture, and bake it into new actions"""
+    """Generate the character's motion from its root, targets and furniture, and bake it into new
+    actions
+    """
 
     bl_idname = "dafnet.generate"
     bl_label = "Generate"
     bl_options = {"UNDO"}
 
     task: EnumProperty(
-        name="Task", default="NEW", options={"SKIP_SAVE"},
+        name="Task",
+        default="NEW",
+        options={"SKIP_SAVE"},
         items=[
             ("NEW", "Generate", "Generate new takes"),
-            ("LEGS", "Vary the Legs", "Generate another lower body under the upper body of the chosen take"),
-            ("ONWARD", "From Here On", "Keep the chosen take up to the current frame, and generate what follows anew"),
+            (
+                "LEGS",
+                "Vary the Legs",
+                "Generate another lower body under the upper body of the chosen take",
+            ),
+            (
+                "ONWARD",
+                "From Here On",
+                "Keep the chosen take up to the current frame, and generate what follows anew",
+            ),
         ],
     )
 
@@ -75,7 +93,11 @@ class DAFNET_OT_generate(bpy.types.Operator):
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: Any) -> str:
         """The task's own tooltip."""
-        return "" if properties.task == "NEW" else cls.bl_rna.properties["task"].enum_items[properties.task].description
+        return (
+            ""
+            if properties.task == "NEW"
+            else cls.bl_rna.properties["task"].enum_items[properties.task].description
+        )
 
     def _settings(self, context: bpy.types.Context) -> job.Settings:
         """The character's settings, and what the task changes in them."""
@@ -88,12 +110,23 @@ class DAFNET_OT_generate(bpy.types.Operator):
         first, last = frames_of(take)
         if self.task == "ONWARD":
             return job.settings_of(
-                character, context.scene, kept=take.name_full, kept_until=context.scene.frame_current, frame_start=first,
+                character,
+                context.scene,
+                kept=take.name_full,
+                kept_until=context.scene.frame_current,
+                frame_start=first,
             )
         draw = draw_of(take)
         return job.settings_of(
-            character, context.scene, take_count=1, seed=draw.seed, temperature=draw.temperature, frame_start=first,
-            frame_end=last, lower_seed=(draw.lower_seed or 0) + 1, lower_temperature=draw.lower_temperature or _CALM_LEGS,
+            character,
+            context.scene,
+            take_count=1,
+            seed=draw.seed,
+            temperature=draw.temperature,
+            frame_start=first,
+            frame_end=last,
+            lower_seed=(draw.lower_seed or 0) + 1,
+            lower_temperature=draw.lower_temperature or _CALM_LEGS,
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -128,7 +161,9 @@ class DAFNET_OT_generate(bpy.types.Operator):
             self.report({"INFO"}, "Cancelled; the scene is as it was")
             return {"CANCELLED"}
         if event.type != "TIMER":
-            allowed = event.type in _LOOKING or (event.type == "LEFTMOUSE" and _over_sidebar(context, event))
+            allowed = event.type in _LOOKING or (
+                event.type == "LEFTMOUSE" and _over_sidebar(context, event)
+            )
             return {"PASS_THROUGH"} if allowed else {"RUNNING_MODAL"}
         result = None
         running = False
@@ -165,7 +200,8 @@ class DAFNET_OT_generate(bpy.types.Operator):
         """Work for a tick; the result once it is there."""
         now = perf_counter()
         until, step = now + _TICK, 0.0
-        while now < until and step < _TICK / 2:  # after a long step another one is likely, which had better have its own tick
+        # after a long step another one is likely, which had better have its own tick
+        while now < until and step < _TICK / 2:
             try:
                 type(self).progress = next(self._steps)
             except StopIteration as done:
@@ -174,7 +210,9 @@ class DAFNET_OT_generate(bpy.types.Operator):
         share, spent = self.progress or 0.0, perf_counter() - self._started
         type(self).left = spent * (1.0 - share) / max(share, 0.01)
         context.window_manager.progress_update(100 * share)
-        context.workspace.status_text_set(f"DAFNet: {100 * share:.0f} %, {self.left:.0f} s left. Esc cancels")
+        context.workspace.status_text_set(
+            f"DAFNet: {100 * share:.0f} %, {self.left:.0f} s left. Esc cancels"
+        )
         _redraw(context)
         return None
 
@@ -182,7 +220,9 @@ class DAFNET_OT_generate(bpy.types.Operator):
         for warning in result.warnings:
             self.report({"WARNING"}, warning)
         seconds = sum(result.seconds.values())
-        takes = f"'{result.action.name}'" if len(result.takes) == 1 else f"{len(result.takes)} takes"
+        takes = (
+            f"'{result.action.name}'" if len(result.takes) == 1 else f"{len(result.takes)} takes"
+        )
         self.report({"INFO"}, f"{len(result.take)} frames in {seconds:.1f} s: {takes}")
 
 
@@ -216,8 +256,12 @@ class DAFNET_OT_cancel(bpy.types.Operator):
 def _over_sidebar(context: bpy.types.Context, event: bpy.types.Event) -> bool:
     """Whether the mouse is over a 3D view's sidebar, where Cancel is."""
     return any(
-        region.type == "UI" and 0 <= event.mouse_x - region.x < region.width and 0 <= event.mouse_y - region.y < region.height
-        for area in context.screen.areas if area.type == "VIEW_3D" for region in area.regions
+        region.type == "UI"
+        and 0 <= event.mouse_x - region.x < region.width
+        and 0 <= event.mouse_y - region.y < region.height
+        for area in context.screen.areas
+        if area.type == "VIEW_3D"
+        for region in area.regions
     )
 
 

@@ -1,4 +1,6 @@
-"""Which bones of the animator's own rig are which joints: detected, saved as a preset, loaded from one."""
+"""Which bones of the animator's own rig are which joints: detected, saved as a preset, loaded from
+one.
+"""
 
 from typing import Any
 
@@ -6,7 +8,15 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ..dafnet_addon.blender.rig_properties import map_of, presets, rig_of, show_map
-from ..dafnet_addon.blender.rigs import NEEDED, detected, in_names_of, load_map, map_files, required, save_map
+from ..dafnet_addon.blender.rigs import (
+    NEEDED,
+    detected,
+    in_names_of,
+    load_map,
+    map_files,
+    required,
+    save_map,
+)
 from .reporting import reported
 
 __all__ = ["DAFNET_OT_detect_rig", "DAFNET_OT_load_rig_map", "DAFNET_OT_save_rig_map"]

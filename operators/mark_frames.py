@@ -13,7 +13,9 @@ __all__ = ["DAFNET_OT_mark_frames"]
 
 
 class DAFNET_OT_mark_frames(bpy.types.Operator):
-    """Show in the timeline where feet slide (yellow) and joints touch furniture (red) in the take that plays, or hide it"""
+    """Show in the timeline where feet slide (yellow) and joints touch furniture (red) in the take
+    that plays, or hide it
+    """
 
     bl_idname = "dafnet.mark_frames"
     bl_label = "Mark Frames"
@@ -37,12 +39,21 @@ class DAFNET_OT_mark_frames(bpy.types.Operator):
             overlays.hide_faults()
             return {"FINISHED"}
         with reported(self):
-            takes = dict.fromkeys([plays, *(action for action in takes_of(character) if PACKED in action)])
-            found = faults_of(context, character, (action for action in takes if action is not None))
+            takes = dict.fromkeys(
+                [plays, *(action for action in takes_of(character) if PACKED in action)]
+            )
+            found = faults_of(
+                context, character, (action for action in takes if action is not None)
+            )
             overlays.show_faults(found)
             faults = found[plays.session_uid] if plays is not None else None
             if faults is not None:
-                sliding, touching = (int((counts > 0).sum()) for counts in (faults.sliding, faults.collisions))
-                self.report({"INFO"}, f"Feet slide in {sliding} frames, joints touch furniture in {touching}.")
+                sliding, touching = (
+                    int((counts > 0).sum()) for counts in (faults.sliding, faults.collisions)
+                )
+                self.report(
+                    {"INFO"},
+                    f"Feet slide in {sliding} frames, joints touch furniture in {touching}.",
+                )
             return {"FINISHED"}
         return {"CANCELLED"}

@@ -21,4 +21,6 @@ class DAFNET_OT_add_preset(AddPresetBase, bpy.types.Operator):
     preset_menu = "DAFNET_MT_presets"
     preset_subdir = PRESETS
     preset_defines: ClassVar[list[str]] = ["own = bpy.context.object.dafnet"]
-    preset_values: ClassVar[list[str]] = [f"own.{name}" for name in ("temperature", "take_count", *CLEAN_UP)]
+    preset_values: ClassVar[list[str]] = [
+        f"own.{name}" for name in ("temperature", "take_count", *CLEAN_UP)
+    ]

@@ -13,7 +13,9 @@ __all__ = ["keyed", "reported"]
 
 @contextmanager
 def reported(operator: bpy.types.Operator) -> Iterator[None]:
-    """Show an error of the add-on to the user and go on behind the block; any other exception passes."""
+    """Show an error of the add-on to the user and go on behind the block; any other exception
+    passes.
+    """
     try:
         yield
     except DafnetError as error:

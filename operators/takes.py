@@ -1,4 +1,6 @@
-"""What is done with the takes in a character's list; each of these is one line of ``blender.takes`` or ``blender.job``."""
+"""What is done with the takes in a character's list; each of these is one line of ``blender.takes``
+or ``blender.job``.
+"""
 
 from typing import Any
 
@@ -11,7 +13,12 @@ from ..dafnet_addon.blender.takes import active_take, drop_take, play_take, take
 from .generate import idle
 from .reporting import reported
 
-__all__ = ["DAFNET_OT_clean_again", "DAFNET_OT_keep_accepted", "DAFNET_OT_play_take", "DAFNET_OT_reject_take"]
+__all__ = [
+    "DAFNET_OT_clean_again",
+    "DAFNET_OT_keep_accepted",
+    "DAFNET_OT_play_take",
+    "DAFNET_OT_reject_take",
+]
 
 
 def _character(context: bpy.types.Context) -> Any:
@@ -41,9 +48,12 @@ class DAFNET_OT_play_take(_OfTakes, bpy.types.Operator):
 
     index: IntProperty(name="Row", options={"SKIP_SAVE"})
     step: EnumProperty(
-        name="Step", default="NONE", options={"SKIP_SAVE"},
+        name="Step",
+        default="NONE",
+        options={"SKIP_SAVE"},
         items=[
-            ("NONE", "This", "The take of the row"), ("NEXT", "Next", "The take below the one that plays"),
+            ("NONE", "This", "The take of the row"),
+            ("NEXT", "Next", "The take below the one that plays"),
             ("PREVIOUS", "Previous", "The take above the one that plays"),
         ],
     )
@@ -65,7 +75,9 @@ class DAFNET_OT_play_take(_OfTakes, bpy.types.Operator):
 
 
 class DAFNET_OT_reject_take(_OfTakes, bpy.types.Operator):
-    """Take the chosen take out of the list; its action goes when the file is saved and opened again, unless it is used"""
+    """Take the chosen take out of the list; its action goes when the file is saved and opened
+    again, unless it is used
+    """
 
     bl_idname = "dafnet.reject_take"
     bl_label = "Reject Take"
@@ -106,7 +118,9 @@ class DAFNET_OT_keep_accepted(_OfTakes, bpy.types.Operator):
 
 
 class DAFNET_OT_clean_again(_OfTakes, bpy.types.Operator):
-    """Make a new take of the chosen one with the clean-up as it is set now, without generating again"""
+    """Make a new take of the chosen one with the clean-up as it is set now, without generating
+    again
+    """
 
     bl_idname = "dafnet.clean_again"
     bl_label = "Clean Up Again"

@@ -12,22 +12,40 @@ __all__ = ["DAFNET_OT_walk_to"]
 
 
 class DAFNET_OT_walk_to(bpy.types.Operator):
-    """Key the character's root on from its last key: it walks round the furniture and sits down, or stands at the 3D cursor"""
+    """Key the character's root on from its last key: it walks round the furniture and sits down, or
+    stands at the 3D cursor
+    """
 
     bl_idname = "dafnet.walk_to"
     bl_label = "Walk To"
     bl_options = {"REGISTER", "UNDO"}
 
     goal: EnumProperty(
-        name="To", default="SEAT",
+        name="To",
+        default="SEAT",
         items=[
-            ("SEAT", "Sit on Selected", "Walk to the selected piece of furniture and sit down on it"),
+            (
+                "SEAT",
+                "Sit on Selected",
+                "Walk to the selected piece of furniture and sit down on it",
+            ),
             ("CURSOR", "Walk to Cursor", "Walk to the 3D cursor and stand there"),
         ],
     )
-    seconds: FloatProperty(name="Stay", default=3.0, min=0.0, max=600.0, subtype="TIME_ABSOLUTE", description="Seconds of rest")
+    seconds: FloatProperty(
+        name="Stay",
+        default=3.0,
+        min=0.0,
+        max=600.0,
+        subtype="TIME_ABSOLUTE",
+        description="Seconds of rest",
+    )
     speed: FloatProperty(
-        name="Speed", default=1.1, min=0.4, max=3.0, description="Of walking, in metres a second for a body of 1.75 m",
+        name="Speed",
+        default=1.1,
+        min=0.4,
+        max=3.0,
+        description="Of walking, in metres a second for a body of 1.75 m",
     )
 
     @classmethod
@@ -45,6 +63,8 @@ class DAFNET_OT_walk_to(bpy.types.Operator):
             self.report({"ERROR"}, "Select the one object to sit on, with the character or alone.")
             return {"CANCELLED"}
         with reported(self):
-            made = walk(context, character, seat if self.goal == "SEAT" else None, self.seconds, self.speed)
+            made = walk(
+                context, character, seat if self.goal == "SEAT" else None, self.seconds, self.speed
+            )
             return keyed(self, made)
         return {"CANCELLED"}

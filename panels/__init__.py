@@ -10,8 +10,15 @@ from .takes import DAFNET_PT_clean_up, DAFNET_PT_takes, DAFNET_UL_takes
 __all__ = ["CLASSES", "add_menu"]
 
 CLASSES = (
-    DAFNET_MT_presets, DAFNET_PT_presets, DAFNET_PT_character, DAFNET_PT_setup, DAFNET_MT_add,
-    DAFNET_UL_takes, DAFNET_PT_takes, DAFNET_PT_clean_up,
+    DAFNET_MT_presets,
+    DAFNET_PT_presets,
+    DAFNET_PT_character,
+    DAFNET_PT_setup,
+    DAFNET_MT_add,
+    DAFNET_UL_takes,
+    DAFNET_PT_takes,
+    DAFNET_PT_clean_up,
     DAFNET_PT_overlays,
-    DAFNET_UL_rig, DAFNET_PT_rig,
+    DAFNET_UL_rig,
+    DAFNET_PT_rig,
 )

@@ -1,4 +1,6 @@
-"""The head of the one tab in the 3D view's sidebar: the active character, its mode and targets, and Generate."""
+"""The head of the one tab in the 3D view's sidebar: the active character, its mode and targets, and
+Generate.
+"""
 
 import bpy
 
@@ -50,7 +52,10 @@ class DAFNET_PT_character(bpy.types.Panel):
         if DAFNET_OT_generate.progress is not None:
             layout.progress(
                 factor=DAFNET_OT_generate.progress,
-                text=f"{100 * DAFNET_OT_generate.progress:.0f} %, {DAFNET_OT_generate.left:.0f} s left",
+                text=(
+                    f"{100 * DAFNET_OT_generate.progress:.0f} %, {DAFNET_OT_generate.left:.0f} s "
+                    "left"
+                ),
             )
             layout.operator(DAFNET_OT_cancel.bl_idname, icon="CANCEL")
             return
@@ -59,7 +64,11 @@ class DAFNET_PT_character(bpy.types.Panel):
             directed, goal = sent(context)
             if directed is not None and goal is not None:
                 layout.label(text=f"{directed.name}: {goal.name}", icon="ARMATURE_DATA")
-                layout.operator(DAFNET_OT_walk_to.bl_idname, text=f"Sit on {goal.name}", icon="TRACKING_FORWARDS").goal = "SEAT"
+                layout.operator(
+                    DAFNET_OT_walk_to.bl_idname,
+                    text=f"Sit on {goal.name}",
+                    icon="TRACKING_FORWARDS",
+                ).goal = "SEAT"
                 return
             layout.label(text="No character is selected", icon="INFO")
             layout.operator(DAFNET_OT_add_character.bl_idname, icon="ARMATURE_DATA")

@@ -19,10 +19,20 @@ class DAFNET_UL_rig(bpy.types.UIList):
     bl_idname = "DAFNET_UL_rig"
 
     def draw_item(
-        self, _context: bpy.types.Context, layout: bpy.types.UILayout, data: Any, item: Any, _icon: int, _active: Any,
-        _name: str, _index: int = 0, _flag: int = 0,
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        data: Any,
+        item: Any,
+        _icon: int,
+        _active: Any,
+        _name: str,
+        _index: int = 0,
+        _flag: int = 0,
     ) -> None:
-        """A row: the joint, and a search among the bones; red where a needed one is missing or gone."""
+        """A row: the joint, and a search among the bones; red where a needed one is missing or
+        gone.
+        """
         rig = data.id_data
         row = layout.split(factor=0.4)
         row.label(text=item.name.replace("_", " ").capitalize())
@@ -58,7 +68,9 @@ class DAFNET_PT_rig(bpy.types.Panel):
         row.operator_menu_enum(DAFNET_OT_load_rig_map.bl_idname, "preset", text="", icon="PRESET")
         row.operator(DAFNET_OT_save_rig_map.bl_idname, text="", icon="ADD")
         if len(own.rows):
-            layout.template_list(DAFNET_UL_rig.bl_idname, "", own, "rows", own, "active_row", rows=8)
+            layout.template_list(
+                DAFNET_UL_rig.bl_idname, "", own, "rows", own, "active_row", rows=8
+            )
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()

@@ -29,7 +29,9 @@ class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There is a character to direct: the active one, one that is selected beside its goal, or the only one."""
+        """There is a character to direct: the active one, one that is selected beside its goal, or
+        the only one.
+        """
         return DAFNET_OT_generate.progress is None and sent(context)[0] is not None
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -42,10 +44,16 @@ class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
         row.enabled = seat is not None
         text = f"Sit on {seat.name}" if seat else "Sit on Selected"
         row.operator(DAFNET_OT_walk_to.bl_idname, text=text, icon="TRACKING_FORWARDS").goal = "SEAT"
-        column.operator(DAFNET_OT_walk_to.bl_idname, text="Walk to Cursor", icon="PIVOT_CURSOR").goal = "CURSOR"
+        column.operator(
+            DAFNET_OT_walk_to.bl_idname, text="Walk to Cursor", icon="PIVOT_CURSOR"
+        ).goal = "CURSOR"
         text = f"Walk along {curve.name}" if curve else DAFNET_OT_walk_along_curve.bl_label
         column.operator(DAFNET_OT_walk_along_curve.bl_idname, text=text, icon="CURVE_DATA")
-        text = f"Walk through {len(points)} Points" if len(points) > 1 else DAFNET_OT_walk_through_points.bl_label
+        text = (
+            f"Walk through {len(points)} Points"
+            if len(points) > 1
+            else DAFNET_OT_walk_through_points.bl_label
+        )
         column.operator(DAFNET_OT_walk_through_points.bl_idname, text=text, icon="EMPTY_AXIS")
         text = f"Root from {source.name}" if source else DAFNET_OT_root_from_object.bl_label
         column.operator(DAFNET_OT_root_from_object.bl_idname, text=text, icon="CON_FOLLOWPATH")

@@ -41,8 +41,16 @@ class DAFNET_UL_takes(bpy.types.UIList):
     bl_idname = "DAFNET_UL_takes"
 
     def draw_item(
-        self, _context: bpy.types.Context, layout: bpy.types.UILayout, data: Any, item: Any, _icon: int, _active: Any,
-        _name: str, index: int = 0, _flag: int = 0,
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        data: Any,
+        item: Any,
+        _icon: int,
+        _active: Any,
+        _name: str,
+        index: int = 0,
+        _flag: int = 0,
     ) -> None:
         """A row: play, name, sliding feet and collisions a frame, ghost, accepted."""
         action = item.action
@@ -52,15 +60,31 @@ class DAFNET_UL_takes(bpy.types.UIList):
         animation = data.id_data.animation_data
         plays = animation is not None and animation.action == action
         row = layout.row(align=True)
-        row.operator(DAFNET_OT_play_take.bl_idname, text="", icon="PAUSE" if plays else "PLAY", emboss=False).index = index
+        row.operator(
+            DAFNET_OT_play_take.bl_idname, text="", icon="PAUSE" if plays else "PLAY", emboss=False
+        ).index = index
         split = row.split(factor=0.55, align=True)
         split.prop(action, "name", text="", emboss=False)
         figures = split.row(align=True)
         figures.label(text=f"{action.dafnet.sliding:.1f}")
-        figures.label(text="–" if action.dafnet.collisions < 0 else f"{action.dafnet.collisions:.1f}")
+        figures.label(
+            text="–" if action.dafnet.collisions < 0 else f"{action.dafnet.collisions:.1f}"
+        )
         own = action.dafnet
-        row.prop(own, "ghost", text="", icon="GHOST_ENABLED" if own.ghost else "GHOST_DISABLED", emboss=False)
-        row.prop(own, "accepted", text="", icon="CHECKBOX_HLT" if own.accepted else "CHECKBOX_DEHLT", emboss=False)
+        row.prop(
+            own,
+            "ghost",
+            text="",
+            icon="GHOST_ENABLED" if own.ghost else "GHOST_DISABLED",
+            emboss=False,
+        )
+        row.prop(
+            own,
+            "accepted",
+            text="",
+            icon="CHECKBOX_HLT" if own.accepted else "CHECKBOX_DEHLT",
+            emboss=False,
+        )
 
 
 class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
@@ -90,7 +114,12 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
         if take is None:
             return
         figures = take.dafnet
-        layout.label(text=f"Seed {figures.seed}, legs {figures.lower_seed}, temperature {figures.temperature:.2f}")
+        layout.label(
+            text=(
+                f"Seed {figures.seed}, legs {figures.lower_seed}, temperature "
+                f"{figures.temperature:.2f}"
+            )
+        )
         layout.label(text=f"Likelihood {figures.log_likelihood:.0f} nats a frame")
         table = layout.column(align=True)
         _tell(table, "", "Raw", "Cleaned")
@@ -99,8 +128,12 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
         _tell(table, "Miss, cm", _said(figures.raw_miss, 100), _said(figures.miss, 100))
         _tell(table, "Jerk, m/s³", _said(figures.raw_jerk), _said(figures.jerk))
         row = layout.row(align=True)
-        row.operator(DAFNET_OT_generate.bl_idname, text="Vary the Legs", icon="MOD_DYNAMICPAINT").task = "LEGS"
-        row.operator(DAFNET_OT_generate.bl_idname, text="From Here On", icon="FRAME_NEXT").task = "ONWARD"
+        row.operator(
+            DAFNET_OT_generate.bl_idname, text="Vary the Legs", icon="MOD_DYNAMICPAINT"
+        ).task = "LEGS"
+        row.operator(
+            DAFNET_OT_generate.bl_idname, text="From Here On", icon="FRAME_NEXT"
+        ).task = "ONWARD"
 
 
 class DAFNET_PT_clean_up(CharacterPanel, bpy.types.Panel):

@@ -9,12 +9,15 @@ SECONDS, MEGABYTES = 5.0, 200
 
 
 class TooLong(BaseException):
-    """The attempt took more than ``SECONDS`` of the processor's time, which a busy machine does not lengthen."""
+    """The attempt took more than ``SECONDS`` of the processor's time, which a busy machine does not
+    lengthen.
+    """
 
 
 @contextmanager
 def bounded() -> Iterator[None]:
     """Fails where what is done within takes too long or too much memory."""
+
     def late(*_: object) -> None:
         raise TooLong
 

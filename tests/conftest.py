@@ -1,8 +1,8 @@
 """Paths for all tests, and a real Blender with the extension enabled for those that ask for it.
 
-Core tests need NumPy alone. Tests of the Blender side use the fixture ``blender``, which enables this working tree as
-an extension in a fresh user profile, and an empty scene for each test; they are skipped where no ``bpy`` module is
-installed.
+Core tests need NumPy alone. Tests of the Blender side use the fixture ``blender``, which enables
+this working tree as an extension in a fresh user profile, and an empty scene for each test; they
+are skipped where no ``bpy`` module is installed.
 """
 
 import importlib
@@ -27,14 +27,20 @@ if "bpy" not in sys.modules:
     os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="dafnet_tests_")
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    # Started in the background of a shell that ignores Ctrl-C for it: what is tested here is what Ctrl-C does.
+    # Started in the background of a shell that ignores Ctrl-C for it: what is tested here is what
+    # Ctrl-C does.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 if importlib.util.find_spec("hypothesis"):
     from hypothesis import HealthCheck, Phase, settings
 
     settings.register_profile(
-        "tenth", max_examples=100, derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck),
+        "tenth",
+        max_examples=100,
+        derandomize=True,
+        database=None,
+        deadline=None,
+        suppress_health_check=list(HealthCheck),
         phases=(Phase.generate, Phase.shrink),
     )
     settings.register_profile("full", settings.get_profile("tenth"), max_examples=1000)
@@ -70,13 +76,17 @@ def blender(extension: str) -> ModuleType:
 
 @pytest.fixture
 def addon(extension: str):
-    """Import a module of the extension by its path in the repository, as ``addon("dafnet_addon.blender.baker")``."""
+    """Import a module of the extension by its path in the repository, as
+    ``addon("dafnet_addon.blender.baker")``.
+    """
     return lambda name: importlib.import_module(f"{extension}.{name}")
 
 
 @pytest.fixture
 def dataset(tmp_path: Path) -> Path:
-    """A small training set of swaying bodies, each window at a height of its own that the sensor shows."""
+    """A small training set of swaying bodies, each window at a height of its own that the sensor
+    shows.
+    """
     import numpy as np
 
     from dafnet_addon.data import boxes as boxes_module
@@ -86,11 +96,18 @@ def dataset(tmp_path: Path) -> Path:
     rng, windows = np.random.default_rng(0), 12
     sway = np.sin(np.linspace(0, 6, 80))[None, :, None] * rng.uniform(0.05, 0.2, (windows, 1, 66))
     poses = rng.uniform(-1.0, 1.0, size=66) + sway
-    rows = rng.uniform((-1, -1, 0.1, 0.1, 0.1, 0.1, -3), (1, 1, 0.6, 0.5, 0.5, 0.5, 3), (windows, boxes_module.MOST, 7))
+    rows = rng.uniform(
+        (-1, -1, 0.1, 0.1, 0.1, 0.1, -3),
+        (1, 1, 0.6, 0.5, 0.5, 0.5, 3),
+        (windows, boxes_module.MOST, 7),
+    )
     rows[:, 3:] = boxes_module.ABSENT
     pool = {
-        "poses": np.round(poses / POSE_UNIT).astype(np.int16), "velocity": rng.normal(scale=0.01, size=(windows, 80, 3)),
-        "ahead": rng.normal(size=(windows, 70, 18)), "root": rng.normal(scale=0.1, size=(windows, 70, 3)), "boxes": rows,
+        "poses": np.round(poses / POSE_UNIT).astype(np.int16),
+        "velocity": rng.normal(scale=0.01, size=(windows, 80, 3)),
+        "ahead": rng.normal(size=(windows, 70, 18)),
+        "root": rng.normal(scale=0.1, size=(windows, 70, 3)),
+        "boxes": rows,
         "shapes": np.tile(ABSENT_SHAPE, (windows, SHAPES, 1)),
     }
     pool = {name: a if a.dtype == np.int16 else a.astype(np.float32) for name, a in pool.items()}
@@ -108,7 +125,9 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Blender may crash or hang when Python ends with its module loaded: leave at once, with pytest's own status."""
+    """Blender may crash or hang when Python ends with its module loaded: leave at once, with
+    pytest's own status.
+    """
     if "bpy" in sys.modules and _state["enabled"]:
         sys.stdout.flush()
         sys.stderr.flush()

@@ -1,4 +1,6 @@
-"""Writers of motion files whose joints are known: BVH, ASF/AMC, the compact form; and a made-up walk."""
+"""Writers of motion files whose joints are known: BVH, ASF/AMC, the compact form; and a made-up
+walk.
+"""
 
 import json
 from pathlib import Path
@@ -8,11 +10,36 @@ import numpy as np
 from dafnet_addon.core.skeleton import JOINTS, PARENTS, REST
 from dafnet_addon.data.recording import rotation_about
 
-MIXAMO = dict(zip(JOINTS, (
-    "Hips", "LeftUpLeg", "RightUpLeg", "Spine", "LeftLeg", "RightLeg", "Spine1", "LeftFoot", "RightFoot", "Spine2",
-    "LeftToeBase", "RightToeBase", "Neck", "LeftShoulder", "RightShoulder", "Head", "LeftArm", "RightArm", "LeftForeArm",
-    "RightForeArm", "LeftHand", "RightHand",
-), strict=True))
+MIXAMO = dict(
+    zip(
+        JOINTS,
+        (
+            "Hips",
+            "LeftUpLeg",
+            "RightUpLeg",
+            "Spine",
+            "LeftLeg",
+            "RightLeg",
+            "Spine1",
+            "LeftFoot",
+            "RightFoot",
+            "Spine2",
+            "LeftToeBase",
+            "RightToeBase",
+            "Neck",
+            "LeftShoulder",
+            "RightShoulder",
+            "Head",
+            "LeftArm",
+            "RightArm",
+            "LeftForeArm",
+            "RightForeArm",
+            "LeftHand",
+            "RightHand",
+        ),
+        strict=True,
+    )
+)
 Y_UP = [0, 2, 1], (1.0, 1.0, -1.0)  # a body in z-up axes as one in y-up axes that looks along -z
 
 
@@ -21,11 +48,17 @@ def _children(parent: int) -> list[int]:
 
 
 def write_bvh(
-    file: Path, angles: np.ndarray, way: np.ndarray, order: str = "ZXY", fps: float = 30.0, unit: float = 0.01, up: str = "y",
+    file: Path,
+    angles: np.ndarray,
+    way: np.ndarray,
+    order: str = "ZXY",
+    fps: float = 30.0,
+    unit: float = 0.01,
+    up: str = "y",
     names: dict[str, str] = MIXAMO,
 ) -> np.ndarray:
-    """Write a BVH of our rest skeleton, joints turned by ``angles`` (T, 22, 3) degrees about x, y, z in ``order``; its joints
-    (T, 22, 3) in metres and the file's axes, by plain recursion.
+    """Write a BVH of our rest skeleton, joints turned by ``angles`` (T, 22, 3) degrees about x, y,
+    z in ``order``; its joints (T, 22, 3) in metres and the file's axes, by plain recursion.
     """
     rest = REST if up == "z" else REST[:, Y_UP[0]] * Y_UP[1]
     lines = ["HIERARCHY"]
@@ -61,9 +94,15 @@ def write_bvh(
         for j in range(22):
             turn = np.eye(3)
             for axis in order:
-                turn = turn @ rotation_about(axis.lower(), np.radians(angles[t, j, "XYZ".index(axis)]))
+                turn = turn @ rotation_about(
+                    axis.lower(), np.radians(angles[t, j, "XYZ".index(axis)])
+                )
             frames.append(turn if j == 0 else frames[PARENTS[j]] @ turn)
-            out[t, j] = way[t] if j == 0 else out[t, PARENTS[j]] + frames[PARENTS[j]] @ (rest[j] - rest[PARENTS[j]])
+            out[t, j] = (
+                way[t]
+                if j == 0
+                else out[t, PARENTS[j]] + frames[PARENTS[j]] @ (rest[j] - rest[PARENTS[j]])
+            )
     return out
 
 
@@ -96,18 +135,35 @@ ASF = """# made by a test
   end
 """
 VICON = {
-    "left_hip": "lfemur", "right_hip": "rfemur", "spine1": "upperback", "left_knee": "ltibia", "right_knee": "rtibia",
-    "spine2": "thorax", "left_ankle": "lfoot", "right_ankle": "rfoot", "spine3": "lowerneck", "left_foot": "ltoes",
-    "right_foot": "rtoes", "neck": "upperneck", "left_collar": "lclavicle", "right_collar": "rclavicle", "head": "head",
-    "left_shoulder": "lhumerus", "right_shoulder": "rhumerus", "left_elbow": "lradius", "right_elbow": "rradius",
-    "left_wrist": "lhand", "right_wrist": "rhand",
+    "left_hip": "lfemur",
+    "right_hip": "rfemur",
+    "spine1": "upperback",
+    "left_knee": "ltibia",
+    "right_knee": "rtibia",
+    "spine2": "thorax",
+    "left_ankle": "lfoot",
+    "right_ankle": "rfoot",
+    "spine3": "lowerneck",
+    "left_foot": "ltoes",
+    "right_foot": "rtoes",
+    "neck": "upperneck",
+    "left_collar": "lclavicle",
+    "right_collar": "rclavicle",
+    "head": "head",
+    "left_shoulder": "lhumerus",
+    "right_shoulder": "rhumerus",
+    "left_elbow": "lradius",
+    "right_elbow": "rradius",
+    "left_wrist": "lhand",
+    "right_wrist": "rhand",
 }
 
 
 def write_asf(file: Path) -> np.ndarray:
     """Write our rest skeleton as an .asf; its joints (22, 3) in the file's units and axes.
 
-    A bone of .asf has one end only: a fixed one leads to each joint, at which one without length turns.
+    A bone of .asf has one end only: a fixed one leads to each joint, at which one without length
+    turns.
     """
     rest = REST[:, Y_UP[0]] * Y_UP[1] / (0.0254 / 0.45)
     fixed = {"left_hip": "lhipjoint", "right_hip": "rhipjoint", "spine1": "lowerback"}
@@ -119,8 +175,10 @@ def write_asf(file: Path) -> np.ndarray:
         length = float(np.linalg.norm(offset))
         direction = " ".join(f"{x:.12g}" for x in offset / length)
         bones += (
-            f"  begin\n id {j}\n name {link}\n direction {direction}\n length {length:.12g}\n axis 0 0 0 XYZ\n  end\n"
-            f"  begin\n id {j + 50}\n name {VICON[JOINTS[j]]}\n direction 0 1 0\n length 0\n axis 20 -30 40 XYZ\n"
+            f"  begin\n id {j}\n name {link}\n direction {direction}\n length {length:.12g}\n "
+            "axis 0 0 0 XYZ\n  end\n"
+            f"  begin\n id {j + 50}\n name {VICON[JOINTS[j]]}\n direction 0 1 0\n length 0\n axis "
+            "20 -30 40 XYZ\n"
             "dof rx ry rz\n limits (-180 180)\n (-180 180)\n (-180 180)\n  end\n"
         )
         lines += [f"    {parent} {link}", f"    {link} {VICON[JOINTS[j]]}"]
@@ -132,15 +190,21 @@ def write_amc(file: Path, angles: np.ndarray, way: np.ndarray) -> None:
     lines = [":FULLY-SPECIFIED", ":DEGREES"]
     for t, turned in enumerate(angles):
         lines.append(f"{t + 1}\nroot {' '.join(f'{x:.9f}' for x in [*way[t], *turned[0]])}")
-        lines += [f"{VICON[JOINTS[j]]} {' '.join(f'{x:.9f}' for x in turned[j])}" for j in range(1, 22)]
+        lines += [
+            f"{VICON[JOINTS[j]]} {' '.join(f'{x:.9f}' for x in turned[j])}" for j in range(1, 22)
+        ]
     file.write_text("\n".join(lines), encoding="utf-8")
 
 
 def write_compact(file: Path, clips: list[tuple[dict[str, str], np.ndarray]]) -> None:
-    """Write clips of the compact form, each with what is known of it and its joints (T, 22, 3) in metres, z up, 30 fps."""
+    """Write clips of the compact form, each with what is known of it and its joints (T, 22, 3) in
+    metres, z up, 30 fps.
+    """
     millimetres = [np.round(joints * 1000).astype(np.int32) for _, joints in clips]
     np.savez(
-        file, clips=json.dumps([info for info, _ in clips]), first_mm=np.stack([mm[0] for mm in millimetres]),
+        file,
+        clips=json.dumps([info for info, _ in clips]),
+        first_mm=np.stack([mm[0] for mm in millimetres]),
         delta_mm=np.concatenate([np.diff(mm, axis=0) for mm in millimetres]).astype(np.int16),
         frames=[len(mm) for mm in millimetres],
     )

@@ -2,7 +2,8 @@
 
 __all__ = ["without_blenders"]
 
-_BLENDERS = "ould not get a list of mounted file-systems"  # where /etc/mtab is missing; 5.0 begins otherwise than 4.5
+# where /etc/mtab is missing; 5.0 begins otherwise than 4.5
+_BLENDERS = "ould not get a list of mounted file-systems"
 
 
 def without_blenders(text: str) -> str:

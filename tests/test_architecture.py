@@ -42,10 +42,14 @@ def test_there_is_something_to_check() -> None:
 def test_core_needs_numpy_only(file: Path) -> None:
     allowed = {"numpy", *sys.stdlib_module_names}
     assert outside(file, top_level_only=True) <= allowed
-    assert outside(file) <= allowed | {"torch"}, "torch may run the sampler where it is installed, nothing else may"
+    assert outside(file) <= allowed | {"torch"}, (
+        "torch may run the sampler where it is installed, nothing else may"
+    )
 
 
-@pytest.mark.parametrize("file", sources(*FOLDERS), ids=lambda file: file.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize(
+    "file", sources(*FOLDERS), ids=lambda file: file.relative_to(ROOT).as_posix()
+)
 def test_only_the_blender_side_imports_bpy(file: Path) -> None:
     host = {"bpy", "bmesh", "mathutils", "addon_utils"} & outside(file)
     place = file.relative_to(ROOT).parts
@@ -56,7 +60,11 @@ def test_only_the_blender_side_imports_bpy(file: Path) -> None:
 
 @pytest.mark.parametrize(
     "file",
-    [f for f in sources("dafnet_addon", "operators", "panels") if f.parent.name not in ("model", "training", "baselines")],
+    [
+        f
+        for f in sources("dafnet_addon", "operators", "panels")
+        if f.parent.name not in ("model", "training", "baselines")
+    ],
     ids=lambda file: file.relative_to(ROOT).as_posix(),
 )
 def test_what_runs_inside_blender_needs_no_torch(file: Path) -> None:
@@ -64,12 +72,16 @@ def test_what_runs_inside_blender_needs_no_torch(file: Path) -> None:
     assert not heavy & outside(file, top_level_only=True)
 
 
-@pytest.mark.parametrize("file", sources("dafnet_addon"), ids=lambda file: file.relative_to(PACKAGE).as_posix())
+@pytest.mark.parametrize(
+    "file", sources("dafnet_addon"), ids=lambda file: file.relative_to(PACKAGE).as_posix()
+)
 def test_the_package_imports_relatively_and_never_upward(file: Path) -> None:
     depth = len(file.relative_to(PACKAGE).parts)
     for level, module in imports(file):
         assert level <= depth, f"{module} is outside the package"
-        assert not (level == 0 and module.split(".")[0] == "dafnet_addon"), f"import {module} relatively"
+        assert not (level == 0 and module.split(".")[0] == "dafnet_addon"), (
+            f"import {module} relatively"
+        )
 
 
 def test_core_does_not_know_its_users() -> None:
@@ -78,14 +90,21 @@ def test_core_does_not_know_its_users() -> None:
             assert level < 2, f"{file.name} imports {module} from outside the core"
 
 
-@pytest.mark.parametrize("file", sources(*FOLDERS), ids=lambda file: file.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize(
+    "file", sources(*FOLDERS), ids=lambda file: file.relative_to(ROOT).as_posix()
+)
 def test_blender_classes_keep_real_annotations(file: Path) -> None:
     if "bpy" in outside(file):
         assert (0, "__future__") not in set(imports(file))
 
 
 def test_nothing_names_the_data_beside_the_repository() -> None:
-    for file in [*sources(*FOLDERS), *(ROOT / "scripts").glob("*"), ROOT / "Makefile", ROOT / "README.md"]:
+    for file in [
+        *sources(*FOLDERS),
+        *(ROOT / "scripts").glob("*"),
+        ROOT / "Makefile",
+        ROOT / "README.md",
+    ]:
         assert "../shared" not in file.read_text(encoding="utf-8"), file
 
 
@@ -98,40 +117,76 @@ def _opens_text(call: ast.Call) -> bool:
         return False
     if name != "open":
         return True
-    # open(file, mode), Path.open(mode); a method that is told of a file is another, such as ZipFile.open.
+    # open(file, mode), Path.open(mode); a method that is told of a file is another, such as
+    # ZipFile.open.
     modes = [*call.args[0 if is_method else 1 :], *([given["mode"]] if "mode" in given else [])]
-    words = [mode.value for mode in modes if isinstance(mode, ast.Constant) and isinstance(mode.value, str)]
+    words = [
+        mode.value
+        for mode in modes
+        if isinstance(mode, ast.Constant) and isinstance(mode.value, str)
+    ]
     if is_method and len(words) < len(modes):
         return False
     return not any("b" in word for word in words)
 
 
-@pytest.mark.parametrize("file", sources(*FOLDERS, "tests"), ids=lambda file: file.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize(
+    "file", sources(*FOLDERS, "tests"), ids=lambda file: file.relative_to(ROOT).as_posix()
+)
 def test_text_is_read_and_written_in_one_encoding_everywhere(file: Path) -> None:
-    calls = [node for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if isinstance(node, ast.Call)]
+    calls = [
+        node
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call)
+    ]
     lines = [call.lineno for call in calls if _opens_text(call)]
-    assert not lines, f"{file.name}: say encoding=\"utf-8\" in line {lines}"
+    assert not lines, f'{file.name}: say encoding="utf-8" in line {lines}'
 
 
-@pytest.mark.parametrize("file", sources("dafnet_addon"), ids=lambda file: file.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize(
+    "file", sources("dafnet_addon"), ids=lambda file: file.relative_to(ROOT).as_posix()
+)
 def test_what_users_keep_is_written_whole(file: Path) -> None:
-    """That is, to the ``part`` of ``core.files.whole_file``, by which weights are written in ``training.export``."""
-    calls = [node for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if isinstance(node, ast.Call)]
-    written = {"write_text": lambda call: call.func.value, "write_bytes": lambda call: call.func.value}
-    written |= dict.fromkeys(("savefig", "save_as_mainfile"), lambda call: [*call.args, *(k.value for k in call.keywords)][0])
-    to = {ast.unparse(written[c.func.attr](c)) for c in calls if getattr(c.func, "attr", "") in written}
+    """That is, to the ``part`` of ``core.files.whole_file``, by which weights are written in
+    ``training.export``.
+    """
+    calls = [
+        node
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call)
+    ]
+    written = {
+        "write_text": lambda call: call.func.value,
+        "write_bytes": lambda call: call.func.value,
+    }
+    written |= dict.fromkeys(
+        ("savefig", "save_as_mainfile"),
+        lambda call: [*call.args, *(k.value for k in call.keywords)][0],
+    )
+    to = {
+        ast.unparse(written[c.func.attr](c))
+        for c in calls
+        if getattr(c.func, "attr", "") in written
+    }
     the_projects_own = file.name in ("paper_test.py", "real_test.py")
     assert to <= {"part", "str(part)"} or file.name == "weights.py" or the_projects_own
 
 
 def test_importing_the_package_loads_its_core_and_numpy_alone() -> None:
     code = (
-        "import sys, numpy; before = set(sys.modules); import dafnet_addon; assert callable(dafnet_addon.generate);"
+        "import sys, numpy; before = set(sys.modules); import dafnet_addon; assert "
+        "callable(dafnet_addon.generate);"
         "print(*sorted(set(sys.modules) - before))"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     loaded = done.stdout.split()
-    assert {name.split(".")[0] for name in loaded} <= {"dafnet_addon", "numpy", *sys.stdlib_module_names}
+    assert {name.split(".")[0] for name in loaded} <= {
+        "dafnet_addon",
+        "numpy",
+        *sys.stdlib_module_names,
+    }
     ours = {".".join(name.split(".")[:2]) for name in loaded if name.startswith("dafnet_addon")}
     assert ours == {"dafnet_addon", "dafnet_addon.core"}, "what is not asked for is not loaded"

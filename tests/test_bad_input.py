@@ -1,7 +1,9 @@
-"""Bad input through every door: the operator and the command say the same sentence, and the scene stays as it was.
+"""Bad input through every door: the operator and the command say the same sentence, and the scene
+stays as it was.
 
-What is in order but strange goes on, with a warning where the result is not what was meant; and what is none of the
-animator's faults makes no difference. The core's own refusals are tested in ``test_generate`` and ``test_weights``.
+What is in order but strange goes on, with a warning where the result is not what was meant; and
+what is none of the animator's faults makes no difference. The core's own refusals are tested in
+``test_generate`` and ``test_weights``.
 """
 
 import json
@@ -22,9 +24,13 @@ NAN = float("nan")
 
 
 class Shot:
-    """A character that walks half a metre towards a chair in 12 frames; ``unit``: metres in a Blender unit."""
+    """A character that walks half a metre towards a chair in 12 frames; ``unit``: metres in a
+    Blender unit.
+    """
 
-    def __init__(self, bpy: ModuleType, addon: Callable[[str], Any], tmp_path: Path, unit: float = 1.0) -> None:
+    def __init__(
+        self, bpy: ModuleType, addon: Callable[[str], Any], tmp_path: Path, unit: float = 1.0
+    ) -> None:
         self.bpy, self.addon, self.tmp_path = bpy, addon, tmp_path
         self.scene = bpy.context.scene
         self.scene.unit_settings.scale_length = unit
@@ -80,12 +86,23 @@ class Shot:
         data, layer = self.bpy.data, self.bpy.context.view_layer
         layer.update()
         return {
-            "data": [sorted(b.name for b in kind) for kind in (data.actions, data.objects, data.meshes, data.curves)],
-            "keys": {o.name: [len(c.keyframe_points) for c in self.curves(o)] for o in data.objects},
+            "data": [
+                sorted(b.name for b in kind)
+                for kind in (data.actions, data.objects, data.meshes, data.curves)
+            ],
+            "keys": {
+                o.name: [len(c.keyframe_points) for c in self.curves(o)] for o in data.objects
+            },
             "frame": (self.scene.frame_current, self.scene.frame_subframe),
-            "selected": (sorted(o.name for o in layer.objects.selected), layer.objects.active, self.bpy.context.mode),
+            "selected": (
+                sorted(o.name for o in layer.objects.selected),
+                layer.objects.active,
+                self.bpy.context.mode,
+            ),
             "places": repr([[tuple(row) for row in o.matrix_world] for o in data.objects]),
-            "pose": repr([tuple(v for row in b.matrix_basis for v in row) for b in self.ann.pose.bones]),
+            "pose": repr(
+                [tuple(v for row in b.matrix_basis for v in row) for b in self.ann.pose.bones]
+            ),
         }
 
     def refused(self) -> str:
@@ -107,7 +124,9 @@ class Shot:
         return str(caught.value)
 
     def command(self, capfd: pytest.CaptureFixture[str], *options: str) -> tuple[int, str, str]:
-        """Save the scene and bake it with the command: exit code, standard output, last line of standard error."""
+        """Save the scene and bake it with the command: exit code, standard output, last line of
+        standard error.
+        """
         file = self.tmp_path / "scene.blend"
         self.bpy.ops.wm.save_as_mainfile(filepath=str(file))
         capfd.readouterr()
@@ -161,28 +180,56 @@ def _tweaked(shot: Shot) -> None:
 
 
 ERRORS: dict[str, tuple[Change, str]] = {
-    "empty collection": (lambda s: setattr(s.own, "furniture", s.collection("Empty")), "'Empty' has no visible mesh"),
+    "empty collection": (
+        lambda s: setattr(s.own, "furniture", s.collection("Empty")),
+        "'Empty' has no visible mesh",
+    ),
     "meshes without faces": (lambda s: s.chair.data.clear_geometry(), "have no faces"),
     "disabled furniture": (lambda s: setattr(s.chair, "hide_viewport", True), "no visible mesh"),
     "the character's own meshes only": (
-        lambda s: setattr(s.own, "furniture", s.bpy.data.collections["Ann"]), "no visible mesh besides the character's",
+        lambda s: setattr(s.own, "furniture", s.bpy.data.collections["Ann"]),
+        "no visible mesh besides the character's",
     ),
-    "excluded furniture": (lambda s: setattr(s.shown("Furniture"), "exclude", True), "no visible mesh"),
-    "furniture behind a closed eye": (lambda s: setattr(s.shown("Furniture"), "hide_viewport", True), "no visible mesh"),
-    "NaN in the root": (lambda s: setattr(s.own.root, "rotation_euler", (0, 0, NAN)), "root.*not a number"),
+    "excluded furniture": (
+        lambda s: setattr(s.shown("Furniture"), "exclude", True),
+        "no visible mesh",
+    ),
+    "furniture behind a closed eye": (
+        lambda s: setattr(s.shown("Furniture"), "hide_viewport", True),
+        "no visible mesh",
+    ),
+    "NaN in the root": (
+        lambda s: setattr(s.own.root, "rotation_euler", (0, 0, NAN)),
+        "root.*not a number",
+    ),
     "NaN in a key of the root": (lambda s: _spoil_key(s, s.own.root), "root.*not a number"),
     "NaN in furniture": (lambda s: setattr(s.chair, "scale", (NAN, 1, 1)), "'Chair'.*not a number"),
     "NaN in a key of furniture": (lambda s: _spoil_key(s, s.chair), "'Chair'.*not a number"),
-    "NaN in a vertex": (lambda s: setattr(s.chair.data.vertices[0], "co", (NAN, 0, 0)), "'Chair'.*not a number"),
-    "NaN in a target": (lambda s: setattr(s.own.hand_left, "location", (0, NAN, 0)), "left hand target.*not a number"),
-    "root scaled to zero": (lambda s: setattr(s.own.root, "scale", (0, 0, 0)), "root.*scaled to zero"),
+    "NaN in a vertex": (
+        lambda s: setattr(s.chair.data.vertices[0], "co", (NAN, 0, 0)),
+        "'Chair'.*not a number",
+    ),
+    "NaN in a target": (
+        lambda s: setattr(s.own.hand_left, "location", (0, NAN, 0)),
+        "left hand target.*not a number",
+    ),
+    "root scaled to zero": (
+        lambda s: setattr(s.own.root, "scale", (0, 0, 0)),
+        "root.*scaled to zero",
+    ),
     "reversed range": (
-        lambda s: [setattr(s.own, *pair) for pair in (("use_scene_range", False), ("frame_start", 9), ("frame_end", 8))],
+        lambda s: [
+            setattr(s.own, *pair)
+            for pair in (("use_scene_range", False), ("frame_start", 9), ("frame_end", 8))
+        ],
         "before its start",
     ),
     "stretched time": (lambda s: setattr(s.scene.render, "frame_map_new", 200), "stretches time"),
     "the character as its root": (lambda s: setattr(s.own, "root", s.ann), "follows the character"),
-    "root on the character": (lambda s: setattr(s.own.root, "parent", s.ann), "follows the character"),
+    "root on the character": (
+        lambda s: setattr(s.own.root, "parent", s.ann),
+        "follows the character",
+    ),
     "hand on what follows the character": (
         lambda s: [
             setattr(s.own.hand_left, "parent", s.chair),
@@ -193,7 +240,8 @@ ERRORS: dict[str, tuple[Change, str]] = {
     "uneven scale": (lambda s: setattr(s.ann, "scale", (1, 1, 2)), "scaled unevenly"),
     "bones parented anew": (lambda s: s.edit_bones(_edited_parent), "other parents"),
     "bones that do not inherit": (
-        lambda s: setattr(s.ann.data.bones["left_knee"], "use_inherit_rotation", False), "other parents or inheritance",
+        lambda s: setattr(s.ann.data.bones["left_knee"], "use_inherit_rotation", False),
+        "other parents or inheritance",
     ),
     "driven armature": (lambda s: s.ann.driver_add("location", 0), "drivers"),
     "rest position": (lambda s: setattr(s.ann.data, "pose_position", "REST"), "rest position"),
@@ -203,7 +251,9 @@ ERRORS: dict[str, tuple[Change, str]] = {
 
 
 @pytest.mark.parametrize("case", ERRORS)
-def test_errors_are_the_same_sentence_at_both_doors(shot: Shot, capfd: pytest.CaptureFixture[str], case: str) -> None:
+def test_errors_are_the_same_sentence_at_both_doors(
+    shot: Shot, capfd: pytest.CaptureFixture[str], case: str
+) -> None:
     change, words = ERRORS[case]
     change(shot)
     said = shot.refused()
@@ -223,7 +273,9 @@ def test_no_root(shot: Shot, capfd: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("active", ["nothing", "the chair", "edit mode"])
 def test_where_the_button_is_grey_the_command_still_works(
-    shot: Shot, capfd: pytest.CaptureFixture[str], active: str,
+    shot: Shot,
+    capfd: pytest.CaptureFixture[str],
+    active: str,
 ) -> None:
     objects = shot.bpy.context.view_layer.objects
     objects.active = {"nothing": None, "the chair": shot.chair, "edit mode": shot.chair}[active]
@@ -236,7 +288,9 @@ def test_where_the_button_is_grey_the_command_still_works(
 
 @pytest.mark.parametrize("override", [False, True])
 def test_linked_and_overridden_characters(
-    shot: Shot, capfd: pytest.CaptureFixture[str], override: bool,
+    shot: Shot,
+    capfd: pytest.CaptureFixture[str],
+    override: bool,
 ) -> None:
     bpy = shot.bpy
     library = str(shot.tmp_path / "library.blend")
@@ -249,7 +303,11 @@ def test_linked_and_overridden_characters(
         shot.scene.collection.children.link(collection)
     if override:
         wanted.collections[0].override_hierarchy_create(shot.scene, bpy.context.view_layer)
-    shot.ann = next(o for o in shot.scene.objects if o.type == "ARMATURE" and bool(o.override_library) == override)
+    shot.ann = next(
+        o
+        for o in shot.scene.objects
+        if o.type == "ARMATURE" and bool(o.override_library) == override
+    )
     bpy.context.view_layer.objects.active = shot.ann
     said = shot.refused()
     assert "is linked or a library override; make it local" in said
@@ -271,10 +329,18 @@ def _hostile(raw: bytes) -> bytes:
 
 @pytest.mark.parametrize(
     ("spoilt", "words"),
-    [(None, "cannot be read"), (_shortened, "damaged"), (_of_another_version, "another version"), (_hostile, "damaged")],
+    [
+        (None, "cannot be read"),
+        (_shortened, "damaged"),
+        (_of_another_version, "another version"),
+        (_hostile, "damaged"),
+    ],
 )
 def test_weights_that_cannot_be_used(
-    shot: Shot, capfd: pytest.CaptureFixture[str], spoilt: Callable[[bytes], bytes] | None, words: str,
+    shot: Shot,
+    capfd: pytest.CaptureFixture[str],
+    spoilt: Callable[[bytes], bytes] | None,
+    words: str,
 ) -> None:
     file = shot.tmp_path / "weights.safetensors"
     if spoilt:
@@ -298,15 +364,22 @@ def _delete(shot: Shot, made: Any) -> None:
 
 
 DELETED: dict[str, Callable[[Shot], Any]] = {
-    "root": lambda s: s.own.root, "armature": lambda s: s.ann, "chair": lambda s: s.chair, "hand": lambda s: s.own.hand_left,
+    "root": lambda s: s.own.root,
+    "armature": lambda s: s.ann,
+    "chair": lambda s: s.chair,
+    "hand": lambda s: s.own.hand_left,
 }
 
 
 @pytest.mark.parametrize("until", [0.01, 0.5])
 @pytest.mark.parametrize("removed", [False, True])
 @pytest.mark.parametrize("which", DELETED)
-def test_what_is_deleted_while_a_take_is_made(shot: Shot, which: str, removed: bool, until: float) -> None:
-    """While the scene is read and while poses are made; deleted in the scene or gone from the file."""
+def test_what_is_deleted_while_a_take_is_made(
+    shot: Shot, which: str, removed: bool, until: float
+) -> None:
+    """While the scene is read and while poses are made; deleted in the scene or gone from the
+    file.
+    """
     job = shot.addon("dafnet_addon.blender.job")
     made = DELETED[which](shot)
     shot.scene.frame_end = 40
@@ -321,7 +394,9 @@ def test_what_is_deleted_while_a_take_is_made(shot: Shot, which: str, removed: b
     with pytest.raises(shot.addon("dafnet_addon.core.errors").InputError, match="generate again"):
         for _ in steps:
             pass
-    assert [action.name for action in shot.bpy.data.actions] == actions and shot.scene.frame_current == 5
+    assert [
+        action.name for action in shot.bpy.data.actions
+    ] == actions and shot.scene.frame_current == 5
 
 
 def test_the_furniture_collection_is_removed_while_a_take_is_made(shot: Shot) -> None:
@@ -330,7 +405,9 @@ def test_the_furniture_collection_is_removed_while_a_take_is_made(shot: Shot) ->
     while next(steps) < 0.5:
         pass
     shot.bpy.data.collections.remove(shot.furniture)
-    with pytest.raises(shot.addon("dafnet_addon.core.errors").InputError, match="is not in the scene any more"):
+    with pytest.raises(
+        shot.addon("dafnet_addon.core.errors").InputError, match="is not in the scene any more"
+    ):
         for _ in steps:
             pass
 
@@ -353,31 +430,46 @@ def _jump(shot: Shot) -> None:
 WARNINGS: dict[str, tuple[Change, str]] = {
     "no furniture": (lambda s: setattr(s.own, "furniture", None), "no furniture"),
     "a still root": (lambda s: s.own.root.animation_data_clear(), "does not move"),
-    "a tilted root": (lambda s: setattr(s.own.root, "rotation_euler", (np.pi / 2, 0, 0)), "tilts by up to 90"),
+    "a tilted root": (
+        lambda s: setattr(s.own.root, "rotation_euler", (np.pi / 2, 0, 0)),
+        "tilts by up to 90",
+    ),
     "a jump of 5 m": (_jump, "jumps"),
     "a room full of furniture": (_crowd, "runs through furniture.*more than the sensor can tell"),
     "targets 10 m away": (_far_targets, "'hand left' is up to 10.*reached for"),
     "a single frame": (lambda s: setattr(s.scene, "frame_end", 1), "only one frame"),
-    "furniture scaled to zero": (lambda s: setattr(s.chair, "scale", (0, 0, 0)), "'Chair' is scaled to zero"),
+    "furniture scaled to zero": (
+        lambda s: setattr(s.chair, "scale", (0, 0, 0)),
+        "'Chair' is scaled to zero",
+    ),
     "furniture that grows from nothing": (
-        lambda s: [s.key(s.chair, 1, scale=(0, 0, 0)), s.key(s.chair, 9, scale=(1, 1, 1))], "scale of 'Chair' is animated",
+        lambda s: [s.key(s.chair, 1, scale=(0, 0, 0)), s.key(s.chair, 9, scale=(1, 1, 1))],
+        "scale of 'Chair' is animated",
     ),
     "bone constraints": (
-        lambda s: s.ann.pose.bones["left_knee"].constraints.new("LIMIT_ROTATION"), "constraints or drivers",
+        lambda s: s.ann.pose.bones["left_knee"].constraints.new("LIMIT_ROTATION"),
+        "constraints or drivers",
     ),
     "bone drivers": (
-        lambda s: s.ann.pose.bones["left_knee"].driver_add("location", 0), "constraints or drivers",
+        lambda s: s.ann.pose.bones["left_knee"].driver_add("location", 0),
+        "constraints or drivers",
     ),
 }
 
 
 @pytest.mark.parametrize("case", WARNINGS)
-def test_warnings_are_the_same_at_both_doors(shot: Shot, capfd: pytest.CaptureFixture[str], case: str) -> None:
+def test_warnings_are_the_same_at_both_doors(
+    shot: Shot, capfd: pytest.CaptureFixture[str], case: str
+) -> None:
     change, words = WARNINGS[case]
     change(shot)
     capfd.readouterr()
     assert shot.bpy.ops.dafnet.generate() == {"FINISHED"}
-    reported = [line.removeprefix("Warning: ") for line in capfd.readouterr().out.splitlines() if "Warning: " in line]
+    reported = [
+        line.removeprefix("Warning: ")
+        for line in capfd.readouterr().out.splitlines()
+        if "Warning: " in line
+    ]
     assert re.search(words, " ".join(reported)), reported
     assert shot.scene.frame_current == 5
     values = [point.co for curve in shot.curves(shot.ann) for point in curve.keyframe_points]
@@ -393,7 +485,9 @@ def _own_things_in_furniture(shot: Shot) -> None:
 
 def _nested_and_unseen(shot: Shot) -> None:
     for name in ("Excluded", "Closed Eye"):
-        shot.mesh(name, location=(0.3, 0.3, 0)).users_collection[0].objects.unlink(shot.bpy.data.objects[name])
+        shot.mesh(name, location=(0.3, 0.3, 0)).users_collection[0].objects.unlink(
+            shot.bpy.data.objects[name]
+        )
         shot.collection(name, shot.furniture).objects.link(shot.bpy.data.objects[name])
     shot.shown("Furniture", "Excluded").exclude = True
     shot.shown("Furniture", "Closed Eye").hide_viewport = True
@@ -403,10 +497,16 @@ def _nested_and_unseen(shot: Shot) -> None:
 def _nothing_solid(shot: Shot) -> None:
     shot.mesh("Edges", faces=[], edges=[(0, 1)])
     shot.mesh("Nothing", corners=[], faces=[])
-    shot.mesh("Sliver", corners=[(0, 0.5, 0), (0, 0.5, 1), (0, 0.5, 1)], faces=[(0, 1, 2)]).location = (9, 9, 0)
+    shot.mesh(
+        "Sliver", corners=[(0, 0.5, 0), (0, 0.5, 1), (0, 0.5, 1)], faces=[(0, 1, 2)]
+    ).location = (9, 9, 0)
     curve = shot.bpy.data.curves.new("Line", "CURVE")
     curve.splines.new("POLY").points.add(3)
-    for data in (curve, shot.bpy.data.lights.new("Lamp", "POINT"), shot.bpy.data.volumes.new("Smoke")):
+    for data in (
+        curve,
+        shot.bpy.data.lights.new("Lamp", "POINT"),
+        shot.bpy.data.volumes.new("Smoke"),
+    ):
         shot.put(data.name, data)
 
 
@@ -429,7 +529,10 @@ UNHARMED: dict[str, Change] = {
     "furniture without any solid": _nothing_solid,
     "a pose by hand": _posed_by_hand,
     "NLA strips and an action that adds": _nla_below_an_added_action,
-    "a hidden armature": lambda s: [s.ann.hide_set(True), setattr(s.shown("Ann"), "hide_viewport", True)],
+    "a hidden armature": lambda s: [
+        s.ann.hide_set(True),
+        setattr(s.shown("Ann"), "hide_viewport", True),
+    ],
     "a disabled armature": lambda s: setattr(s.ann, "hide_viewport", True),
     "pose mode": lambda s: s.bpy.ops.object.mode_set(mode="POSE"),
     "a scaled, mirrored root": lambda s: setattr(s.own.root, "scale", (-3, 0.5, 2)),
@@ -439,7 +542,9 @@ UNHARMED: dict[str, Change] = {
 }
 
 
-def test_what_makes_no_difference(shot: Shot, blender: ModuleType, addon: Callable[[str], Any], tmp_path: Path) -> None:
+def test_what_makes_no_difference(
+    shot: Shot, blender: ModuleType, addon: Callable[[str], Any], tmp_path: Path
+) -> None:
     job = addon("dafnet_addon.blender.job")
     assert blender.ops.dafnet.generate() == {"FINISHED"}
     expected = shot.heads()
@@ -454,7 +559,12 @@ def test_what_makes_no_difference(shot: Shot, blender: ModuleType, addon: Callab
 
 
 def test_one_empty_for_root_and_hand_crouches(shot: Shot) -> None:
-    shot.own.mode, shot.own.hand_left, shot.own.head, shot.own.hand_right = "EE", shot.own.root, None, None
+    shot.own.mode, shot.own.hand_left, shot.own.head, shot.own.hand_right = (
+        "EE",
+        shot.own.root,
+        None,
+        None,
+    )
     assert shot.bpy.ops.dafnet.generate() == {"FINISHED"}
     heads = shot.heads()
     assert np.isfinite(heads).all() and heads[..., 0, 2].min() > 0.2
@@ -482,7 +592,9 @@ def test_whatever_becomes_a_mesh_is_read_and_moves(shot: Shot) -> None:
     solids = {solid.name: solid for solid in read.scene.solids}
     assert set(solids) == {"Chair", "Text", "Balls", "Rail"}
     for name in ("Text", "Balls", "Rail"):
-        assert len(solids[name].triangles) and solids[name].matrix[[0, 11], 0, 3] == pytest.approx([0, 3], abs=1e-5)
+        assert len(solids[name].triangles) and solids[name].matrix[[0, 11], 0, 3] == pytest.approx(
+            [0, 3], abs=1e-5
+        )
 
 
 @pytest.mark.parametrize(
@@ -490,7 +602,10 @@ def test_whatever_becomes_a_mesh_is_read_and_moves(shot: Shot) -> None:
     [("{tmp}/file/out.blend", "file' is no folder"), ("{tmp}/folder.blend", "is a folder")],
 )
 def test_an_output_that_cannot_be_written(
-    shot: Shot, capfd: pytest.CaptureFixture[str], output: str, words: str,
+    shot: Shot,
+    capfd: pytest.CaptureFixture[str],
+    output: str,
+    words: str,
 ) -> None:
     (shot.tmp_path / "file").write_text("in the way", encoding="utf-8")
     (shot.tmp_path / "folder.blend").mkdir()

@@ -1,4 +1,6 @@
-"""Character and baker: what plays in Blender is the take, at any frame rate, and nothing that was there is lost."""
+"""Character and baker: what plays in Blender is the take, at any frame rate, and nothing that was
+there is lost.
+"""
 
 import itertools
 import sys
@@ -29,8 +31,14 @@ def made_take(addon, frames: int = 40, fps: float = 30.0, scale: float = 1.0, se
         joints[:, j] = joints[:, parent] + frame[:, parent] @ (scale * skeleton.OFFSETS[j])
     take = addon("dafnet_addon.core.take").Take
     return take(
-        fps=fps, joints=joints, rotations=q, root=path.matrices(), action=np.zeros((frames, 10)), scale=scale,
-        poses=np.zeros((frames, 66)), path=path,
+        fps=fps,
+        joints=joints,
+        rotations=q,
+        root=path.matrices(),
+        action=np.zeros((frames, 10)),
+        scale=scale,
+        poses=np.zeros((frames, 66)),
+        path=path,
     )
 
 
@@ -52,8 +60,12 @@ def test_character_stands_in_the_rest_pose(blender, addon) -> None:
     ann = character(blender, addon, height=1.4)
     heads = bone_heads(blender, addon, ann, 1)
     assert sorted(bone.name for bone in ann.data.bones) == sorted(skeleton.JOINTS)
-    assert np.abs(heads - (0.8 * skeleton.REST + np.array([1.0, 2.0, 0.5]))).max() < 1e-5, "looks along +y, left at -x"
-    assert ann.data.bones["left_wrist"].head_local.x > 0.0, "the rig itself looks along -y, left at +x"
+    assert np.abs(heads - (0.8 * skeleton.REST + np.array([1.0, 2.0, 0.5]))).max() < 1e-5, (
+        "looks along +y, left at -x"
+    )
+    assert ann.data.bones["left_wrist"].head_local.x > 0.0, (
+        "the rig itself looks along -y, left at +x"
+    )
     for bone in ann.data.bones:
         assert bone.length > 0.04 * 0.8
     assert tuple(ann.scale) == (1.0, 1.0, 1.0)
@@ -68,7 +80,11 @@ def test_build_makes_the_body_stouter_and_leaves_the_bones(blender, addon) -> No
         body = next(child for child in ann.children if child.type == "MESH")
         points = np.array([v.co for v in body.data.vertices])
         waist = points[(np.abs(points[:, 2] - 1.1) < 0.05) & (np.abs(points[:, 0]) < 0.3)]
-        wide[build] = np.ptp(waist[:, 0]), np.ptp(points[:, 2]), ann.data.bones["spine1"].head_local.copy()
+        wide[build] = (
+            np.ptp(waist[:, 0]),
+            np.ptp(points[:, 2]),
+            ann.data.bones["spine1"].head_local.copy(),
+        )
     assert wide[0.8][0] < 0.9 * wide[1.0][0] and wide[1.4][0] > 1.3 * wide[1.0][0]
     assert wide[0.8][1:] == wide[1.0][1:] == wide[1.4][1:], "as tall, on the same bones"
 
@@ -137,13 +153,17 @@ def test_bones_may_have_other_rolls_and_tails(blender, addon) -> None:
 
 
 def test_it_is_smooth_between_frames(blender, addon) -> None:
-    """Quaternions and the heading keep their signs, so half-way poses lie between their neighbours."""
+    """Quaternions and the heading keep their signs, so half-way poses lie between their
+    neighbours.
+    """
     ann = character(blender, addon)
     take = made_take(addon)
     addon("dafnet_addon.blender.baker").bake(take, ann, 1, "Walk")
     for i in range(len(take) - 1):
         heads = bone_heads(blender, addon, ann, 1 + i, 0.5)
-        assert np.linalg.norm(heads - 0.5 * (take.joints[i] + take.joints[i + 1]), axis=1).max() < 0.06
+        assert (
+            np.linalg.norm(heads - 0.5 * (take.joints[i] + take.joints[i + 1]), axis=1).max() < 0.06
+        )
 
 
 def test_every_take_is_kept_and_mode_keys_stay(blender, addon) -> None:
@@ -163,11 +183,15 @@ def test_every_take_is_kept_and_mode_keys_stay(blender, addon) -> None:
     mode = next(curve for curve in compat.action_curves(ann) if curve.data_path == "dafnet.mode")
     assert [tuple(point.co) for point in mode.keyframe_points] == [(1.0, 0.0), (20.0, 1.0)]
     compat.assign_action(ann, first)
-    assert np.abs(bone_heads(blender, addon, ann, 5) - made_take(addon, seed=1).joints[4]).max() < 1e-3
+    assert (
+        np.abs(bone_heads(blender, addon, ann, 5) - made_take(addon, seed=1).joints[4]).max() < 1e-3
+    )
 
 
 def test_all_other_curves_play_on_as_they_did(blender, addon) -> None:
-    """Muted ones, modifiers, extrapolation, handles, groups, samples, custom properties and bones that are no joints."""
+    """Muted ones, modifiers, extrapolation, handles, groups, samples, custom properties and bones
+    that are no joints.
+    """
     compat = addon("dafnet_addon.blender.compat")
     ann = character(blender, addon)
     own = ann.dafnet
@@ -177,13 +201,20 @@ def test_all_other_curves_play_on_as_they_did(blender, addon) -> None:
     blender.ops.object.mode_set(mode="OBJECT")
     ann["sparkle"] = ann["shine"] = 0.0
     for path, keys in {
-        "mode": ((1, "FREE"), (20, "EE")), "head_influence": ((1, 0.0), (6, 1.0), (11, 0.0)),
-        "hand_left_influence": ((1, 0.2), (30, 0.8)), "hand_right_influence": ((1, 0.9), (9, 0.1)),
+        "mode": ((1, "FREE"), (20, "EE")),
+        "head_influence": ((1, 0.0), (6, 1.0), (11, 0.0)),
+        "hand_left_influence": ((1, 0.2), (30, 0.8)),
+        "hand_right_influence": ((1, 0.9), (9, 0.1)),
     }.items():
         for frame, value in keys:
             setattr(own, path, value)
             ann.keyframe_insert(f"dafnet.{path}", frame=frame, group="Asked For")
-    for owner, path in ((ann, '["sparkle"]'), (ann, '["shine"]'), (ann.pose.bones["tail"], "location"), (ann, "hide_render")):
+    for owner, path in (
+        (ann, '["sparkle"]'),
+        (ann, '["shine"]'),
+        (ann.pose.bones["tail"], "location"),
+        (ann, "hide_render"),
+    ):
         for frame in (1, 12, 25):
             owner.keyframe_insert(path, frame=frame, group="pelvis")
 
@@ -191,7 +222,12 @@ def test_all_other_curves_play_on_as_they_did(blender, addon) -> None:
     curves["dafnet.mode", 0].mute = True
     curves["dafnet.head_influence", 0].modifiers.new("CYCLES").mode_after = "REPEAT_OFFSET"
     noise = curves["dafnet.head_influence", 0].modifiers.new("NOISE")
-    noise.strength, noise.use_restricted_range, noise.frame_start, noise.frame_end = 0.3, True, 5, 60
+    noise.strength, noise.use_restricted_range, noise.frame_start, noise.frame_end = (
+        0.3,
+        True,
+        5,
+        60,
+    )
     envelope = curves["dafnet.hand_left_influence", 0].modifiers.new("ENVELOPE")
     for frame in (1.0, 30.0):
         envelope.control_points.add(frame)
@@ -229,10 +265,14 @@ def test_all_other_curves_play_on_as_they_did(blender, addon) -> None:
     assert scene_says() == said, "the properties that the curves move"
     found = {(c.data_path, c.array_index): c for c in compat.action_curves(ann)}
     for place, values in played.items():
-        assert np.abs(np.array([found[place].evaluate(time) for time in times]) - values).max() < 1e-5, place
+        assert (
+            np.abs(np.array([found[place].evaluate(time) for time in times]) - values).max() < 1e-5
+        ), place
     assert found["dafnet.mode", 0].mute and found['pose.bones["tail"].location', 2].lock
     group = found["dafnet.mode", 0].group
-    assert group.name == "Asked For" and group.color_set == "THEME04" and not found["location", 0].mute
+    assert (
+        group.name == "Asked For" and group.color_set == "THEME04" and not found["location", 0].mute
+    )
     assert [m.type for m in found['["sparkle"]', 0].modifiers] == ["GENERATOR", "STEPPED", "LIMITS"]
 
 
@@ -280,7 +320,9 @@ def test_what_cannot_be_baked_is_refused_and_left_alone(blender, addon, tmp_path
     refused("armature", character=ann.dafnet.root)
     joints = take.joints.copy()
     joints[1, 3, 0] = np.nan
-    refused("not numbers", take=made_take(addon, frames=3).__class__(**{**vars(take), "joints": joints}))
+    refused(
+        "not numbers", take=made_take(addon, frames=3).__class__(**{**vars(take), "joints": joints})
+    )
 
     blender.context.view_layer.objects.active = ann
     blender.ops.object.mode_set(mode="EDIT")
@@ -302,12 +344,18 @@ def test_what_cannot_be_baked_is_refused_and_left_alone(blender, addon, tmp_path
 
 
 def test_a_longer_take_is_baked_in_as_many_calls(blender, addon) -> None:
-    """Keys are handed to Blender curve by curve; one by one they would take a hundred times as long."""
+    """Keys are handed to Blender curve by curve; one by one they would take a hundred times as
+    long.
+    """
     ann, bake = character(blender, addon), addon("dafnet_addon.blender.baker").bake
     calls = []
     for frames in (30, 30, 300):
         take, count = made_take(addon, frames=frames), itertools.count()
-        sys.setprofile(lambda frame, event, argument, count=count: next(count) if event.endswith("call") else None)
+        sys.setprofile(
+            lambda frame, event, argument, count=count: (
+                next(count) if event.endswith("call") else None
+            )
+        )
         try:
             bake(take, ann, 1, "Walk")
         finally:

@@ -1,4 +1,6 @@
-"""What follows the character is neither its root, nor a target, nor furniture; simulations are read as they are played."""
+"""What follows the character is neither its root, nor a target, nor furniture; simulations are read
+as they are played.
+"""
 
 from collections.abc import Callable
 from types import ModuleType
@@ -30,7 +32,9 @@ class Stage:
     def box(self, name: str, collection: Any = None, **transform: Any) -> Any:
         mesh = self.bpy.data.meshes.new(name)
         mesh.from_pydata(CUBE, [], FACES)
-        return self.add(self.bpy.data.objects.new(name, mesh), collection or self.furniture, **transform)
+        return self.add(
+            self.bpy.data.objects.new(name, mesh), collection or self.furniture, **transform
+        )
 
     def empty(self, name: str, **transform: Any) -> Any:
         return self.add(self.bpy.data.objects.new(name, None), self.scene.collection, **transform)
@@ -49,10 +53,14 @@ class Stage:
         curve.driver.expression = "read"
 
     def settings(self, **overrides: Any) -> Any:
-        return self.addon("dafnet_addon.blender.properties").settings_of(self.ann, self.scene, **overrides)
+        return self.addon("dafnet_addon.blender.properties").settings_of(
+            self.ann, self.scene, **overrides
+        )
 
     def steps(self, **overrides: Any) -> Any:
-        return self.addon("dafnet_addon.blender.scene_reader").read_steps(self.bpy.context, self.settings(**overrides))
+        return self.addon("dafnet_addon.blender.scene_reader").read_steps(
+            self.bpy.context, self.settings(**overrides)
+        )
 
     def read(self, **overrides: Any) -> Any:
         return self.addon("dafnet_addon.core.progress").drained(self.steps(**overrides))
@@ -92,7 +100,9 @@ def stage(blender: ModuleType, addon: Any) -> Stage:
     return Stage(blender, addon)
 
 
-def copies(stage: Stage, follower: Any, target: Any, kind: str = "COPY_LOCATION", bone: str = "") -> Any:
+def copies(
+    stage: Stage, follower: Any, target: Any, kind: str = "COPY_LOCATION", bone: str = ""
+) -> Any:
     constraint = follower.constraints.new(kind)
     if kind == "ARMATURE":
         each = constraint.targets.new()
@@ -169,8 +179,18 @@ def by_shrinkwrap(stage: Stage, follower: Any) -> None:
 
 
 WAYS = [
-    by_copy_location, by_child_of, by_armature_constraint, by_a_constraint_switched_on_later, by_driver, by_driven_distance,
-    by_a_driver_script, by_a_driven_property, by_a_chain, by_another_rig, by_a_vertex_of_the_body, by_shrinkwrap,
+    by_copy_location,
+    by_child_of,
+    by_armature_constraint,
+    by_a_constraint_switched_on_later,
+    by_driver,
+    by_driven_distance,
+    by_a_driver_script,
+    by_a_driven_property,
+    by_a_chain,
+    by_another_rig,
+    by_a_vertex_of_the_body,
+    by_shrinkwrap,
 ]
 Way = Callable[[Stage, Any], None]
 
@@ -182,8 +202,12 @@ def test_what_follows_the_character_is_no_furniture(stage: Stage, way: Way) -> N
     way(stage, prop)
     read = stage.read()
     assert {solid.name for solid in read.scene.solids} == {"Chair"}
-    assert [each for each in read.warnings if "'Cup'" in each] == ["Moved by the character, so not there for it: 'Cup'."]
-    found = stage.addon("dafnet_addon.blender.furniture").furniture_now(stage.bpy.context, stage.settings())
+    assert [each for each in read.warnings if "'Cup'" in each] == [
+        "Moved by the character, so not there for it: 'Cup'."
+    ]
+    found = stage.addon("dafnet_addon.blender.furniture").furniture_now(
+        stage.bpy.context, stage.settings()
+    )
     assert set(found) == {"Chair"}, "the same for the overlays and for ways round the furniture"
 
 
@@ -231,7 +255,10 @@ def shaped_by_surface(stage: Stage, prop: Any) -> None:
 
 
 def shaped_by_lattice(stage: Stage, prop: Any) -> None:
-    lattice = stage.add(stage.bpy.data.objects.new("Cage", stage.bpy.data.lattices.new("Cage")), stage.scene.collection)
+    lattice = stage.add(
+        stage.bpy.data.objects.new("Cage", stage.bpy.data.lattices.new("Cage")),
+        stage.scene.collection,
+    )
     lattice.parent = stage.ann
     prop.modifiers.new("Lattice", "LATTICE").object = lattice
 
@@ -249,7 +276,9 @@ def shaped_by_nodes(stage: Stage, prop: Any) -> None:
 
 
 def shaped_inside_nodes(stage: Stage, prop: Any) -> None:
-    inner, outer = (stage.bpy.data.node_groups.new(name, "GeometryNodeTree") for name in ("Inner", "Outer"))
+    inner, outer = (
+        stage.bpy.data.node_groups.new(name, "GeometryNodeTree") for name in ("Inner", "Outer")
+    )
     inner.nodes.new("GeometryNodeObjectInfo").inputs[0].default_value = stage.body
     outer.nodes.new("GeometryNodeGroup").node_tree = inner
     for tree in (inner, outer):
@@ -262,13 +291,25 @@ def shaped_inside_nodes(stage: Stage, prop: Any) -> None:
 
 def shaped_by_driven_key(stage: Stage, prop: Any) -> None:
     prop.shape_key_add(name="Basis")
-    stage.drive(prop.shape_key_add(name="Pressed"), "value", stage.ann, 'pose.bones["pelvis"].location[1]')
+    stage.drive(
+        prop.shape_key_add(name="Pressed"), "value", stage.ann, 'pose.bones["pelvis"].location[1]'
+    )
 
 
-@pytest.mark.parametrize("way", [
-    shaped_by_armature, shaped_by_surface, shaped_by_lattice, shaped_by_nodes, shaped_inside_nodes, shaped_by_driven_key,
-])
-def test_what_the_character_shapes_is_no_furniture_and_may_carry_a_root(stage: Stage, way: Way) -> None:
+@pytest.mark.parametrize(
+    "way",
+    [
+        shaped_by_armature,
+        shaped_by_surface,
+        shaped_by_lattice,
+        shaped_by_nodes,
+        shaped_inside_nodes,
+        shaped_by_driven_key,
+    ],
+)
+def test_what_the_character_shapes_is_no_furniture_and_may_carry_a_root(
+    stage: Stage, way: Way
+) -> None:
     prop = stage.box("Cup")
     assert stage.names() == {"Chair", "Cup"}
     way(stage, prop)
@@ -311,7 +352,9 @@ def test_a_held_prop_leaves_the_next_take_as_it_was(stage: Stage) -> None:
     tray = stage.box("Tray", scale=(1, 1, 0.2))
     copies(stage, tray, stage.ann, "COPY_LOCATION", "left_wrist")
     job = stage.addon("dafnet_addon.blender.job")
-    first, second = (job.run(stage.bpy.context, stage.settings(temperature=1.0)).take.joints for _ in range(2))
+    first, second = (
+        job.run(stage.bpy.context, stage.settings(temperature=1.0)).take.joints for _ in range(2)
+    )
     assert np.abs(first - second).max() == 0.0
 
 
@@ -333,7 +376,9 @@ def test_the_shot_may_begin_while_a_rigid_body_falls(stage: Stage) -> None:
 
 def test_a_root_on_a_cloth_is_read_as_it_hangs(stage: Stage) -> None:
     bpy = stage.bpy
-    bpy.ops.mesh.primitive_grid_add(x_subdivisions=6, y_subdivisions=6, size=1.0, location=(0, 0, 30))
+    bpy.ops.mesh.primitive_grid_add(
+        x_subdivisions=6, y_subdivisions=6, size=1.0, location=(0, 0, 30)
+    )
     cloth = bpy.context.object
     cloth.vertex_groups.new(name="Middle").add([24], 1.0, "REPLACE")
     cloth.modifiers.new("Cloth", "CLOTH")
@@ -344,16 +389,23 @@ def test_a_root_on_a_cloth_is_read_as_it_hangs(stage: Stage) -> None:
 
 
 def test_a_tablecloth_has_the_shape_that_it_has_fallen_into(stage: Stage) -> None:
-    stage.bpy.ops.mesh.primitive_grid_add(x_subdivisions=6, y_subdivisions=6, size=1.0, location=(0, 0, 2))
+    stage.bpy.ops.mesh.primitive_grid_add(
+        x_subdivisions=6, y_subdivisions=6, size=1.0, location=(0, 0, 2)
+    )
     cloth = stage.bpy.context.object
     cloth.modifiers.new("Cloth", "CLOTH")
     stage.furniture.objects.link(cloth)
     read = stage.read(frame_start=20)
-    low = next(solid for solid in read.scene.solids if solid.name == cloth.name).vertices[:, 2].min()
+    low = (
+        next(solid for solid in read.scene.solids if solid.name == cloth.name).vertices[:, 2].min()
+    )
     for frame in range(1, 21):
         stage.scene.frame_set(frame)
     evaluated = cloth.evaluated_get(stage.bpy.context.evaluated_depsgraph_get())
-    assert low == pytest.approx(min(vertex.co.z for vertex in evaluated.data.vertices), abs=1e-4) and low < -0.5
+    assert (
+        low == pytest.approx(min(vertex.co.z for vertex in evaluated.data.vertices), abs=1e-4)
+        and low < -0.5
+    )
     assert [each for each in read.warnings if "shape" in each and cloth.name in each]
 
 
@@ -362,13 +414,22 @@ def test_a_simulation_zone_is_read_as_it_grows(stage: Stage) -> None:
     tree = stage.bpy.data.node_groups.new("Grows", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    kinds = ("NodeGroupInput", "GeometryNodeSimulationInput", "GeometryNodeSetPosition", "GeometryNodeSimulationOutput",
-             "NodeGroupOutput")
+    kinds = (
+        "NodeGroupInput",
+        "GeometryNodeSimulationInput",
+        "GeometryNodeSetPosition",
+        "GeometryNodeSimulationOutput",
+        "NodeGroupOutput",
+    )
     source, begin, lift, end, out = (tree.nodes.new(kind) for kind in kinds)
     begin.pair_with_output(end)
     lift.inputs["Offset"].default_value = (0, 0, 0.01)
-    for a, b in ((source.outputs[0], begin.inputs[0]), (begin.outputs["Geometry"], lift.inputs["Geometry"]),
-                 (lift.outputs[0], end.inputs["Geometry"]), (end.outputs["Geometry"], out.inputs[0])):
+    for a, b in (
+        (source.outputs[0], begin.inputs[0]),
+        (begin.outputs["Geometry"], lift.inputs["Geometry"]),
+        (lift.outputs[0], end.inputs["Geometry"]),
+        (end.outputs["Geometry"], out.inputs[0]),
+    ):
         tree.links.new(a, b)
     plate = stage.box("Plate", stage.scene.collection)
     plate.modifiers.new("Grows", "NODES").node_group = tree
@@ -401,7 +462,9 @@ def test_a_simulation_that_the_character_pushes_is_to_be_baked(stage: Stage) -> 
     shin.parent, shin.parent_type, shin.parent_bone = stage.ann, "BONE", "left_knee"
     stage.falling("Other").rigid_body.type = "PASSIVE"
     stage.scene.rigidbody_world.collection.objects.link(shin)
-    assert any("push 'Ball'" in each and "bake the simulation" in each for each in stage.read().warnings)
+    assert any(
+        "push 'Ball'" in each and "bake the simulation" in each for each in stage.read().warnings
+    )
     copies(stage, stage.root, ball)
     stage.refused("push 'Ball', which moves the root 'Ann Root'; bake the simulation")
     stage.scene.rigidbody_world.point_cache.frame_end = 40

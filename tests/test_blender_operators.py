@@ -1,4 +1,6 @@
-"""Operators: what the buttons do, that they do the same as the Python API, and that failure changes nothing."""
+"""Operators: what the buttons do, that they do the same as the Python API, and that failure changes
+nothing.
+"""
 
 from types import ModuleType
 
@@ -37,7 +39,10 @@ class Shot:
 
     def keys(self) -> dict[tuple[str, int], np.ndarray]:
         curves = self.addon("dafnet_addon.blender.compat").action_curves(self.ann)
-        return {(c.data_path, c.array_index): np.array([p.co for p in c.keyframe_points]) for c in curves}
+        return {
+            (c.data_path, c.array_index): np.array([p.co for p in c.keyframe_points])
+            for c in curves
+        }
 
     def state(self) -> dict[str, object]:
         """What must not change when something fails."""
@@ -46,9 +51,15 @@ class Shot:
             "actions": sorted(action.name for action in self.bpy.data.actions),
             "objects": sorted(o.name for o in self.bpy.data.objects),
             "meshes": sorted(m.name for m in self.bpy.data.meshes),
-            "playing": [o.name for o in self.bpy.data.objects if o.animation_data and o.animation_data.action],
+            "playing": [
+                o.name
+                for o in self.bpy.data.objects
+                if o.animation_data and o.animation_data.action
+            ],
             "frame": (self.scene.frame_current, self.scene.frame_subframe, self.scene.render.fps),
-            "places": {o.name: tuple(v for row in o.matrix_world for v in row) for o in self.scene.objects},
+            "places": {
+                o.name: tuple(v for row in o.matrix_world for v in row) for o in self.scene.objects
+            },
             "pose": [tuple(b.rotation_quaternion) for b in self.ann.pose.bones],
         }
 
@@ -68,7 +79,11 @@ def test_generate_bakes_a_take_that_plays(shot: Shot) -> None:
     assert np.isfinite(last).all() and 1.3 < last[15, 2] < 1.7
     before = shot.ann.animation_data.action
     assert shot.bpy.ops.dafnet.generate() == {"FINISHED"}
-    assert before.use_fake_user and before.name in shot.bpy.data.actions and shot.ann.animation_data.action != before
+    assert (
+        before.use_fake_user
+        and before.name in shot.bpy.data.actions
+        and shot.ann.animation_data.action != before
+    )
 
 
 def test_operator_and_api_give_the_same_keys(shot: Shot, addon) -> None:
@@ -81,12 +96,16 @@ def test_operator_and_api_give_the_same_keys(shot: Shot, addon) -> None:
     addon("dafnet_addon.blender.job").run(shot.bpy.context, shot.settings(), weights)
     job = shot.keys()
     read = addon("dafnet_addon.blender.scene_reader").read_scene(shot.bpy.context, shot.settings())
-    take = api.generate(read.scene, read.controls, weights, seed=3, temperature=0.5, clean_up=api.CleanUp(1.0, 1.0))
+    take = api.generate(
+        read.scene, read.controls, weights, seed=3, temperature=0.5, clean_up=api.CleanUp(1.0, 1.0)
+    )
     addon("dafnet_addon.blender.baker").bake(take, shot.ann, 1, "By hand")
     by_hand = shot.keys()
     assert button.keys() == job.keys() == by_hand.keys() and len(button) == 6 + 3 + 22 * 4
     for name in button:
-        assert np.array_equal(button[name], job[name]) and np.array_equal(button[name], by_hand[name])
+        assert np.array_equal(button[name], job[name]) and np.array_equal(
+            button[name], by_hand[name]
+        )
     assert np.abs(take.joints[9] - _heads(shot, 10)).max() < 1e-3
 
 
@@ -127,7 +146,9 @@ def test_what_is_deleted_while_it_runs(shot: Shot, addon) -> None:
     shot.ann.select_set(True)
     shot.bpy.ops.object.delete()
     actions = [action.name for action in shot.bpy.data.actions]
-    with pytest.raises(addon("dafnet_addon.core.errors").InputError, match="'Ann' is not in the scene"):
+    with pytest.raises(
+        addon("dafnet_addon.core.errors").InputError, match="'Ann' is not in the scene"
+    ):
         for _ in steps:
             pass
     assert [action.name for action in shot.bpy.data.actions] == actions
@@ -223,7 +244,11 @@ def test_the_panel_draws(shot: Shot, addon) -> None:
     assert {"upper_body_source", "head"} <= set(drawn())
     operator.progress = 0.5
     try:
-        assert "50 %, 0 s left" in drawn() and "dafnet.cancel" in drawn() and "dafnet.generate" not in drawn()
+        assert (
+            "50 %, 0 s left" in drawn()
+            and "dafnet.cancel" in drawn()
+            and "dafnet.generate" not in drawn()
+        )
         assert not shot.bpy.ops.dafnet.generate.poll()
     finally:
         operator.progress = None

@@ -35,8 +35,12 @@ class Stage:
         return made
 
     def read(self, **overrides):
-        settings = self.addon("dafnet_addon.blender.properties").settings_of(self.ann, self.scene, **overrides)
-        return self.addon("dafnet_addon.blender.scene_reader").read_scene(self.bpy.context, settings)
+        settings = self.addon("dafnet_addon.blender.properties").settings_of(
+            self.ann, self.scene, **overrides
+        )
+        return self.addon("dafnet_addon.blender.scene_reader").read_scene(
+            self.bpy.context, settings
+        )
 
     def refused(self, match: str, **overrides) -> None:
         with pytest.raises(self.error, match=match):
@@ -65,7 +69,9 @@ def key(made, path: str, *values: tuple[int, object]) -> None:
 
 
 def test_transformed_and_modified_meshes(stage: Stage) -> None:
-    parent = stage.put(stage.bpy.data.objects.new("Parent", None), location=(5, 0, 0), scale=(2, 2, -2))
+    parent = stage.put(
+        stage.bpy.data.objects.new("Parent", None), location=(5, 0, 0), scale=(2, 2, -2)
+    )
     stage.cube("Child", parent=parent, location=(1, 0, 0), scale=(1, 3, 1))
     array = stage.cube("Array", location=(0, 0, 4)).modifiers.new("Array", "ARRAY")
     array.count = 3
@@ -78,7 +84,9 @@ def test_transformed_and_modified_meshes(stage: Stage) -> None:
     assert np.linalg.det(solids["Child"].matrix[:3, :3]) < 0
     assert np.allclose(box(corners(solids["Array"])), [[-1, -1, 3], [5, 1, 5]])
     assert np.allclose(box(corners(solids["Deep"])), [[-1, 8, -1], [1, 10, 1]])
-    assert all(solid.matrix.shape == (4, 4) and len(solid.triangles) % 12 == 0 for solid in solids.values())
+    assert all(
+        solid.matrix.shape == (4, 4) and len(solid.triangles) % 12 == 0 for solid in solids.values()
+    )
 
 
 def test_collection_and_geometry_nodes_instances(stage: Stage) -> None:
@@ -93,7 +101,12 @@ def test_collection_and_geometry_nodes_instances(stage: Stage) -> None:
     tree = stage.bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    kinds = ("NodeGroupInput", "GeometryNodeInstanceOnPoints", "GeometryNodeMeshUVSphere", "NodeGroupOutput")
+    kinds = (
+        "NodeGroupInput",
+        "GeometryNodeInstanceOnPoints",
+        "GeometryNodeMeshUVSphere",
+        "NodeGroupOutput",
+    )
     source, points, sphere, out = (tree.nodes.new(kind) for kind in kinds)
     tree.links.new(source.outputs[0], points.inputs["Points"])
     tree.links.new(sphere.outputs["Mesh"], points.inputs["Instance"])
@@ -154,7 +167,9 @@ def test_the_character_and_its_empties_are_no_furniture(stage: Stage) -> None:
 def test_units(stage: Stage) -> None:
     stage.scene.unit_settings.system = "METRIC"
     stage.scene.unit_settings.scale_length = 0.01
-    bob = stage.addon("dafnet_addon.blender.armature").create_character(stage.bpy.context, "Bob", 1.75)
+    bob = stage.addon("dafnet_addon.blender.armature").create_character(
+        stage.bpy.context, "Bob", 1.75
+    )
     bob.dafnet.furniture, stage.ann = stage.furniture, bob
     bob.dafnet.root.location = (100, 200, 0)
     bob.dafnet.head.location = (0, 0, 150)
@@ -170,7 +185,9 @@ def test_units(stage: Stage) -> None:
 
 
 def test_the_root_follows_whatever_drives_it(stage: Stage) -> None:
-    cart = stage.put(stage.bpy.data.objects.new("Cart", None), stage.scene.collection, scale=(3, 3, 3))
+    cart = stage.put(
+        stage.bpy.data.objects.new("Cart", None), stage.scene.collection, scale=(3, 3, 3)
+    )
     key(cart, "rotation_euler", (1, (0, 0, 0)), (10, (0, 0, 3)))
     key(cart, "location", (1, (0, 0, 0)), (10, (9, 0, 0)))
     constraint = stage.ann.dafnet.root.constraints.new("COPY_TRANSFORMS")
@@ -204,7 +221,9 @@ def test_targets_and_when_their_rotation_counts(stage: Stage) -> None:
     own = stage.ann.dafnet
     stage.cube("Chair")
     own.hand_right = None
-    cart = stage.put(stage.bpy.data.objects.new("Cart", None), stage.scene.collection, rotation_euler=(0, 0, 1))
+    cart = stage.put(
+        stage.bpy.data.objects.new("Cart", None), stage.scene.collection, rotation_euler=(0, 0, 1)
+    )
     own.hand_left.parent = cart
     own.hand_left.location = (1, 0, 0)
     own.head.rotation_euler = (0, 0, 0.5)
@@ -233,7 +252,9 @@ def test_the_upper_body_of_another_character(stage: Stage) -> None:
     """A source on its own root is carried to ours; its size and its place do not matter."""
     skeleton = stage.addon("dafnet_addon.core.skeleton")
     stage.scene.cursor.location = (4, 5, 0.2)
-    bob = stage.addon("dafnet_addon.blender.armature").create_character(stage.bpy.context, "Bob", 1.4)
+    bob = stage.addon("dafnet_addon.blender.armature").create_character(
+        stage.bpy.context, "Bob", 1.4
+    )
     bob.rotation_euler.z += 0.7
     bob.pose.bones["left_shoulder"].rotation_quaternion = (0.9, 0.1, 0.4, 0.1)
     stage.ann.dafnet.root.location = (1, 0, 0)
@@ -250,13 +271,20 @@ def test_the_upper_body_of_another_character(stage: Stage) -> None:
 
     bob.dafnet.root = None
     found = stage.read().controls.upper_body
-    assert np.abs(found[0][others] - rest[others]).max() < 0.02, "the root is found from hips and shoulders"
+    assert np.abs(found[0][others] - rest[others]).max() < 0.02, (
+        "the root is found from hips and shoulders"
+    )
     stage.ann.dafnet.upper_body_source = None
     stage.refused("no source")
 
 
-@pytest.mark.parametrize("values", [((1, 0.0), (10, 1.0)), ((1, 0.0), (3, 1.0), (5, 0.0)), ((1, 0.0), (9, 1.0), (10, 0.0))])
-def test_changing_shapes_are_warned_about(stage: Stage, values: tuple[tuple[int, float], ...]) -> None:
+@pytest.mark.parametrize(
+    "values",
+    [((1, 0.0), (10, 1.0)), ((1, 0.0), (3, 1.0), (5, 0.0)), ((1, 0.0), (9, 1.0), (10, 0.0))],
+)
+def test_changing_shapes_are_warned_about(
+    stage: Stage, values: tuple[tuple[int, float], ...]
+) -> None:
     """Also where the shape is the first one again in the middle and at the end."""
     stage.cube("Rigid")
     soft = stage.cube("Soft")
@@ -264,7 +292,9 @@ def test_changing_shapes_are_warned_about(stage: Stage, values: tuple[tuple[int,
     pressed = soft.shape_key_add(name="Pressed")
     pressed.data[0].co.z += 0.5
     key(pressed, "value", *values)
-    assert stage.read().warnings == ("The shape of 'Soft' changes during the shot; its shape at the first frame is used.",)
+    assert stage.read().warnings == (
+        "The shape of 'Soft' changes during the shot; its shape at the first frame is used.",
+    )
 
 
 def test_shapes_that_others_change_and_instances_are_warned_about(stage: Stage) -> None:
@@ -286,7 +316,9 @@ def test_shapes_that_others_change_and_instances_are_warned_about(stage: Stage) 
     array = stage.cube("Row").modifiers.new("Array", "ARRAY")
     key(array, "count", (1, 2), (8, 3), (9, 2))
     changed = [each for each in stage.read().warnings if "shape" in each]
-    assert len(changed) == 3 and all(any(f"'{name}'" in each for each in changed) for name in ("Plate", "Chair", "Row"))
+    assert len(changed) == 3 and all(
+        any(f"'{name}'" in each for each in changed) for name in ("Plate", "Chair", "Row")
+    )
 
 
 def test_what_is_shown_or_hidden_during_the_shot_is_said(stage: Stage) -> None:
@@ -298,7 +330,8 @@ def test_what_is_shown_or_hidden_during_the_shot_is_said(stage: Stage) -> None:
     read = stage.read()
     assert {solid.name for solid in read.scene.solids} == {"Always", "Leaves", "Flickers"}
     assert set(read.warnings) == {
-        f"'{name}' is shown or hidden during the shot; it counts for all of it as at the first frame."
+        f"'{name}' is shown or hidden during the shot; it counts for all of it as at the first "
+        "frame."
         for name in ("Leaves", "Comes", "Flickers")
     }
     assert not stage.read(frame_start=6).warnings, "nothing of it changes any more"
@@ -317,7 +350,9 @@ def test_instances_that_come_and_go_are_said(stage: Stage) -> None:
 
 
 def test_helpers_are_no_furniture_and_doubtful_objects_are_named(stage: Stage) -> None:
-    """What no picture shows and the viewport draws through, or what cuts, is there for the modeller alone."""
+    """What no picture shows and the viewport draws through, or what cuts, is there for the modeller
+    alone.
+    """
     wall = stage.cube("Wall")
     modifier = wall.modifiers.new("Door", "BOOLEAN")
     modifier.object = stage.cube("Cutter", display_type="WIRE", hide_render=True)
@@ -371,9 +406,13 @@ def test_bad_input_is_refused_in_one_sentence(stage: Stage) -> None:
 def test_the_frame_is_kept_while_reading(stage: Stage) -> None:
     stage.cube("Chair")
     stage.scene.frame_set(3, subframe=0.25)
-    settings = stage.addon("dafnet_addon.blender.properties").settings_of(stage.ann, stage.scene, frame_end=100)
+    settings = stage.addon("dafnet_addon.blender.properties").settings_of(
+        stage.ann, stage.scene, frame_end=100
+    )
     progress = []
-    for share in stage.addon("dafnet_addon.blender.scene_reader").read_steps(stage.bpy.context, settings):
+    for share in stage.addon("dafnet_addon.blender.scene_reader").read_steps(
+        stage.bpy.context, settings
+    ):
         progress.append(share)
         assert (stage.scene.frame_current, stage.scene.frame_subframe) == (3, 0.25)
     assert len(progress) > 5 and progress == sorted(progress) and progress[-1] == 1.0

@@ -1,8 +1,11 @@
-"""Takes in Blender: listed, judged, varied, gone on from, cleaned again, and found when the file is opened again."""
+"""Takes in Blender: listed, judged, varied, gone on from, cleaned again, and found when the file is
+opened again.
+"""
 
 from io import BytesIO
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
@@ -67,9 +70,14 @@ def test_several_takes_in_one_go_are_listed_and_the_first_plays(shot: Shot) -> N
     takes = shot.listed()
     assert [(a.dafnet.seed, a.dafnet.temperature) for a in takes] == [(7, 0.0), (8, 1.0), (9, 1.0)]
     assert shot.ann.animation_data.action == takes[0] and own.active_take == 0
-    assert all(a.use_fake_user and a.dafnet.frame_start == 11 and shot.takes.frames_of(a) == (11, 55) for a in takes)
+    assert all(
+        a.use_fake_user and a.dafnet.frame_start == 11 and shot.takes.frames_of(a) == (11, 55)
+        for a in takes
+    )
     assert takes[0].dafnet.log_likelihood > takes[1].dafnet.log_likelihood
-    assert takes[0].dafnet.sliding <= takes[0].dafnet.raw_sliding and takes[0].dafnet.miss == -1.0, "there are no targets"
+    assert (
+        takes[0].dafnet.sliding <= takes[0].dafnet.raw_sliding and takes[0].dafnet.miss == -1.0
+    ), "there are no targets"
     assert np.abs(shot.played() - shot.motion(takes[0])).max() < 2e-3
     assert np.abs(shot.motion(takes[1]) - shot.motion(takes[2])).max() > 0.02
 
@@ -92,9 +100,17 @@ def test_takes_are_played_judged_and_renamed_and_none_is_lost(shot: Shot) -> Non
     three.name, three.dafnet.accepted = "The one", True
     own.active_take = 1
     ops.reject_take()
-    assert shot.listed() == [one, three] and not two.use_fake_user and two.name in shot.bpy.data.actions
+    assert (
+        shot.listed() == [one, three]
+        and not two.use_fake_user
+        and two.name in shot.bpy.data.actions
+    )
     ops.keep_accepted()
-    assert shot.listed() == [three] and shot.ann.animation_data.action == three and three.name == "The one"
+    assert (
+        shot.listed() == [three]
+        and shot.ann.animation_data.action == three
+        and three.name == "The one"
+    )
     three.dafnet.accepted = False
     with pytest.raises(RuntimeError, match="No take is accepted"):
         ops.keep_accepted()
@@ -107,7 +123,11 @@ def test_rejecting_the_take_that_plays_plays_another(shot: Shot) -> None:
     shot.bpy.ops.dafnet.generate()
     one, two = shot.listed()
     shot.bpy.ops.dafnet.reject_take()
-    assert shot.ann.animation_data.action == two and shot.listed() == [two] and one.name in shot.bpy.data.actions
+    assert (
+        shot.ann.animation_data.action == two
+        and shot.listed() == [two]
+        and one.name in shot.bpy.data.actions
+    )
 
 
 def test_a_deleted_action_leaves_a_row_that_can_be_removed(shot: Shot) -> None:
@@ -131,7 +151,11 @@ def test_legs_vary_under_the_same_upper_body(shot: Shot) -> None:
     shot.ann.dafnet.seed, shot.ann.dafnet.temperature = 9, 0.0
     shot.bpy.ops.dafnet.generate(task="LEGS")
     first, second = shot.listed()
-    assert (second.dafnet.seed, second.dafnet.lower_seed, round(second.dafnet.temperature, 3)) == (4, 5, 0.6)
+    assert (second.dafnet.seed, second.dafnet.lower_seed, round(second.dafnet.temperature, 3)) == (
+        4,
+        5,
+        0.6,
+    )
     apart = np.abs(shot.motion(first) - shot.motion(second)).mean(axis=(0, 2))
     assert apart[[4, 5, 7, 8]].mean() > apart[[9, 12, 15]].mean() > 0
     shot.bpy.ops.dafnet.generate(task="LEGS")
@@ -145,7 +169,9 @@ def test_from_here_on_keeps_what_comes_before(shot: Shot) -> None:
     shot.scene.frame_set(40)
     shot.bpy.ops.dafnet.generate(task="ONWARD")
     second = shot.listed()[1]
-    apart = np.abs(shot.takes.stored(first)[0].poses - shot.takes.stored(second)[0].poses).max(axis=1)[70:]
+    apart = np.abs(shot.takes.stored(first)[0].poses - shot.takes.stored(second)[0].poses).max(
+        axis=1
+    )[70:]
     assert apart[:28].max() < 1e-5 and apart[-3:].max() > 0.01 and shot.scene.frame_current == 40
     shot.scene.frame_set(200)
     with pytest.raises(RuntimeError, match="go to a frame in it"):
@@ -165,8 +191,13 @@ def test_from_here_on_counts_seconds_where_the_rate_has_changed(shot: Shot) -> N
     assert after.fps == 2 * before.fps
     kept = (at - 10 - first.dafnet.frame_start) // 2
     assert np.abs(after.poses[:70] - before.poses[:70]).max() < 1e-5
-    place = lambda take: take.path.position[:kept, None] + take.poses[70 : 70 + kept].reshape(kept, 22, 3)  # noqa: E731
-    assert kept > 10 and np.abs(place(after)[..., 2] - place(before)[..., 2]).max() < 1e-4, "the same poses for as long"
+
+    def place(take: Any) -> np.ndarray:
+        return take.path.position[:kept, None] + take.poses[70 : 70 + kept].reshape(kept, 22, 3)
+
+    assert kept > 10 and np.abs(place(after)[..., 2] - place(before)[..., 2]).max() < 1e-4, (
+        "the same poses for as long"
+    )
     assert np.abs(after.poses[-2:] - before.poses[-2:]).max() > 0.01
 
 
@@ -175,7 +206,9 @@ def test_cleaned_again_makes_a_new_take_and_leaves_the_old(shot: Shot) -> None:
     own.plant_feet = 0.0
     shot.bpy.ops.dafnet.generate()
     own.plant_feet = 1.0
-    before = {name: np.array([p.co for p in c.keyframe_points]) for name, c in _curves(shot).items()}
+    before = {
+        name: np.array([p.co for p in c.keyframe_points]) for name, c in _curves(shot).items()
+    }
     assert shot.bpy.ops.dafnet.clean_again() == {"FINISHED"}
     raw, clean = shot.listed()
     assert shot.ann.animation_data.action == clean and clean.dafnet.sliding < raw.dafnet.sliding
@@ -200,7 +233,9 @@ def test_takes_are_there_when_the_file_is_opened_again(shot: Shot, tmp_path: Pat
     for action, joints in zip(takes, motion, strict=True):
         assert np.abs(shot.motion(action) - joints).max() < 1e-6
     shot.bpy.context.view_layer.objects.active = ann
-    assert shot.bpy.ops.dafnet.clean_again() == {"FINISHED"}, "what is needed to go on is in the file"
+    assert shot.bpy.ops.dafnet.clean_again() == {"FINISHED"}, (
+        "what is needed to go on is in the file"
+    )
 
 
 def test_all_takes_are_one_undo_step(shot: Shot) -> None:
@@ -209,7 +244,9 @@ def test_all_takes_are_one_undo_step(shot: Shot) -> None:
     shot.bpy.ops.dafnet.generate("EXEC_DEFAULT", True)
     assert len(shot.bpy.data.objects["Ann"].dafnet.takes) == 3
     shot.bpy.ops.ed.undo()
-    assert len(shot.bpy.data.objects["Ann"].dafnet.takes) == 0 and not shot.bpy.data.actions.get("Ann take")
+    assert len(shot.bpy.data.objects["Ann"].dafnet.takes) == 0 and not shot.bpy.data.actions.get(
+        "Ann take"
+    )
     shot.bpy.ops.ed.redo()
     assert len(shot.takes.takes_of(shot.bpy.data.objects["Ann"])) == 3
 
@@ -221,13 +258,21 @@ def test_influence_and_blend_are_read_from_the_scene(shot: Shot) -> None:
     for frame, share in ((20, 0.0), (30, 1.0)):
         own.hand_left_influence = share
         own.keyframe_insert("hand_left_influence", frame=frame)
-    job, reader = shot.addon("dafnet_addon.blender.job"), shot.addon("dafnet_addon.blender.scene_reader")
+    job, reader = (
+        shot.addon("dafnet_addon.blender.job"),
+        shot.addon("dafnet_addon.blender.scene_reader"),
+    )
     read = reader.read_scene(shot.bpy.context, job.settings_of(shot.ann, shot.scene)).controls
-    assert read.hand_left_influence[[0, 9, 19, 44]].tolist() == [0, 0, 1, 1] and 0 < read.hand_left_influence[14] < 1
+    assert (
+        read.hand_left_influence[[0, 9, 19, 44]].tolist() == [0, 0, 1, 1]
+        and 0 < read.hand_left_influence[14] < 1
+    )
     assert read.head_influence is None and read.blend == pytest.approx(0.2)
     shot.bpy.ops.dafnet.generate()
     shot.bpy.ops.dafnet.generate()
-    assert any(c.data_path == "dafnet.hand_left_influence" for c in _curves(shot).values()), "keys come along to the new action"
+    assert any(c.data_path == "dafnet.hand_left_influence" for c in _curves(shot).values()), (
+        "keys come along to the new action"
+    )
 
 
 def test_an_engine_that_is_not_there_is_said(shot: Shot, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -284,13 +329,23 @@ def test_presets_set_how_takes_are_made(shot: Shot) -> None:
     own, folders = shot.ann.dafnet, shot.bpy.utils.preset_paths("dafnet")
     shipped = {file.stem: file for folder in folders for file in Path(folder).glob("*.py")}
     assert {"calm", "lively", "raw", "tidy"} <= set(shipped)
-    for name, expected in (("lively", (1.0, 5, 1.0, 0.0)), ("raw", (0.0, 1, 0.0, 0.0)), ("tidy", (0.0, 1, 1.0, 1.0))):
-        shot.bpy.ops.script.execute_preset(filepath=str(shipped[name]), menu_idname="DAFNET_MT_presets")
+    for name, expected in (
+        ("lively", (1.0, 5, 1.0, 0.0)),
+        ("raw", (0.0, 1, 0.0, 0.0)),
+        ("tidy", (0.0, 1, 1.0, 1.0)),
+    ):
+        shot.bpy.ops.script.execute_preset(
+            filepath=str(shipped[name]), menu_idname="DAFNET_MT_presets"
+        )
         assert (own.temperature, own.take_count, own.plant_feet, own.clear_furniture) == expected
     own.temperature = 0.7
     assert shot.bpy.ops.dafnet.add_preset(name="Mine") == {"FINISHED"}
     own.temperature = 0.0
-    mine = next(file for folder in shot.bpy.utils.preset_paths("dafnet") for file in Path(folder).glob("Mine.py"))
+    mine = next(
+        file
+        for folder in shot.bpy.utils.preset_paths("dafnet")
+        for file in Path(folder).glob("Mine.py")
+    )
     shot.bpy.ops.script.execute_preset(filepath=str(mine), menu_idname="DAFNET_MT_presets")
     assert own.temperature == pytest.approx(0.7)
     mine.unlink()
@@ -301,11 +356,15 @@ def test_full_copies_the_upper_body_of_a_take(shot: Shot) -> None:
     own.temperature, own.seed, own.plant_feet = 1.0, 2, 0.0
     shot.bpy.ops.dafnet.generate()
     source = shot.listed()[0]
-    assert not shot.addon("dafnet_addon.blender.properties")._is_take(own, shot.bpy.data.actions.new("Mine"))
+    assert not shot.addon("dafnet_addon.blender.properties")._is_take(
+        own, shot.bpy.data.actions.new("Mine")
+    )
     own.mode, own.upper_body_take, own.seed, own.temperature = "FULL", source, 8, 0.0
     shot.bpy.ops.dafnet.generate()
     upper = list(shot.addon("dafnet_addon.core.skeleton").UPPER)
-    apart = np.linalg.norm(shot.motion(source)[5:, upper] - shot.motion(shot.listed()[1])[5:, upper], axis=-1)
+    apart = np.linalg.norm(
+        shot.motion(source)[5:, upper] - shot.motion(shot.listed()[1])[5:, upper], axis=-1
+    )
     assert apart.mean() < 0.02
     shot.scene.frame_end = 70
     with pytest.raises(RuntimeError, match="does not cover"):
@@ -324,11 +383,17 @@ def _of_zeros(data: bytes) -> bytes:
     return out.getvalue()
 
 
-@pytest.mark.parametrize(("spoil", "words"), [
-    (lambda data: data[: len(data) // 2], "it is damaged"), (lambda data: b"", "it is damaged"),
-    (_of_zeros, "'take.joints' is larger than the take's frames ask for"),
-])
-def test_a_damaged_take_is_told_in_a_sentence_wherever_it_is_used(shot: Shot, spoil, words: str) -> None:
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda data: data[: len(data) // 2], "it is damaged"),
+        (lambda data: b"", "it is damaged"),
+        (_of_zeros, "'take.joints' is larger than the take's frames ask for"),
+    ],
+)
+def test_a_damaged_take_is_told_in_a_sentence_wherever_it_is_used(
+    shot: Shot, spoil, words: str
+) -> None:
     shot.bpy.ops.dafnet.generate()
     own, take = shot.ann.dafnet, shot.listed()[0]
     packed = shot.addon("dafnet_addon.blender.properties").PACKED
@@ -339,15 +404,24 @@ def test_a_damaged_take_is_told_in_a_sentence_wherever_it_is_used(shot: Shot, sp
     shot.scene.frame_set(30)
     shot.addon("dafnet_addon.blender.overlay_data").drawings(shot.bpy.context, ("reach", "ghosts"))
     uses = [
-        shot.bpy.ops.dafnet.clean_again, lambda: shot.bpy.ops.dafnet.generate(task="LEGS"),
-        lambda: shot.bpy.ops.dafnet.generate(task="ONWARD"), shot.bpy.ops.dafnet.mark_frames,
+        shot.bpy.ops.dafnet.clean_again,
+        lambda: shot.bpy.ops.dafnet.generate(task="LEGS"),
+        lambda: shot.bpy.ops.dafnet.generate(task="ONWARD"),
+        shot.bpy.ops.dafnet.mark_frames,
     ]
     for use in uses:
         with pytest.raises(RuntimeError) as caught:
             use()
         said = str(caught.value).strip().removeprefix("Error: ")
-        assert words in said and said.endswith("; generate it again.") and "\n" not in said and "Traceback" not in said
+        assert (
+            words in said
+            and said.endswith("; generate it again.")
+            and "\n" not in said
+            and "Traceback" not in said
+        )
     own.mode, own.upper_body_take = "FULL", take
     with pytest.raises(RuntimeError, match="cannot be read"):
         shot.bpy.ops.dafnet.generate()
-    assert [a.name for a in shot.bpy.data.actions] == before and np.array_equal(shot.played(), curves)
+    assert [a.name for a in shot.bpy.data.actions] == before and np.array_equal(
+        shot.played(), curves
+    )

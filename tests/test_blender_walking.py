@@ -1,4 +1,6 @@
-"""Sending a character to a seat or to the 3D cursor: keys on the root, and the take that follows them."""
+"""Sending a character to a seat or to the 3D cursor: keys on the root, and the take that follows
+them.
+"""
 
 from types import ModuleType
 
@@ -23,8 +25,17 @@ class Room:
 
     def box(self, name: str, low: tuple[float, float, float], high: tuple[float, float, float]):
         mesh = self.bpy.data.meshes.new(name)
-        corners = [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
-        mesh.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
+        corners = [
+            (x, y, z)
+            for x in (low[0], high[0])
+            for y in (low[1], high[1])
+            for z in (low[2], high[2])
+        ]
+        mesh.from_pydata(
+            corners,
+            [],
+            [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)],
+        )
         made = self.bpy.data.objects.new(name, mesh)
         self.furniture.objects.link(made)
         return made
@@ -52,8 +63,12 @@ def test_sent_to_a_chair_the_character_sits_on_it(room: Room) -> None:
     assert room.scene.frame_current == 7 and room.scene.frame_end > 80
     first, last = room.place(7), room.place(room.scene.frame_end)
     assert np.allclose(first, 0.0, atol=1e-5)
-    assert abs(last[0]) < 0.05 and 3.1 < last[1] < 3.35 and abs(np.cos(last[3]) + 1.0) < 0.01, "it looks back"
-    assert np.allclose(room.place(room.scene.frame_end - 40), last, atol=1e-4), "it rests for two seconds"
+    assert abs(last[0]) < 0.05 and 3.1 < last[1] < 3.35 and abs(np.cos(last[3]) + 1.0) < 0.01, (
+        "it looks back"
+    )
+    assert np.allclose(room.place(room.scene.frame_end - 40), last, atol=1e-4), (
+        "it rests for two seconds"
+    )
     room.select(room.ann)
     assert room.bpy.ops.dafnet.generate() == {"FINISHED"}
     room.scene.frame_set(room.scene.frame_end)
@@ -72,7 +87,10 @@ def test_walks_go_on_from_the_last_key_and_leave_the_earlier_ones(room: Room) ->
     assert np.allclose([room.place(frame) for frame in range(1, end + 1)], before, atol=1e-3)
     assert np.allclose(room.place(room.scene.frame_end)[:2], (2.0, 1.0), atol=1e-3)
     path = np.array([room.place(frame) for frame in range(1, room.scene.frame_end + 1)])
-    assert np.abs(np.diff(path[:, :2], axis=0)).max() < 0.1 and np.abs(np.diff(path[:, 3])).max() < 0.35
+    assert (
+        np.abs(np.diff(path[:, :2], axis=0)).max() < 0.1
+        and np.abs(np.diff(path[:, 3])).max() < 0.35
+    )
 
 
 def test_what_cannot_be_walked_to_changes_nothing(room: Room) -> None:
@@ -118,7 +136,11 @@ def test_it_sits_on_a_chair_that_physics_has_dropped(room: Room) -> None:
     for made, kind in ((floor, "PASSIVE"), (stool, "ACTIVE")):
         room.select(made)
         bpy.ops.rigidbody.object_add()
-        made.rigid_body.type, made.rigid_body.use_margin, made.rigid_body.collision_margin = kind, True, 0.0
+        made.rigid_body.type, made.rigid_body.use_margin, made.rigid_body.collision_margin = (
+            kind,
+            True,
+            0.0,
+        )
     room.select(stool, room.ann)
     room.scene.frame_set(38)
     assert bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
@@ -245,9 +267,19 @@ def pushed(room: Room) -> None:
 def animation(owner) -> tuple:
     """All that is keyed of an object, and where it is."""
     data = owner.animation_data
-    curves = () if data is None or data.action is None else tuple(
-        (c.data_path, c.array_index, c.mute, c.lock, [tuple(p.co) + tuple(p.handle_right) for p in c.keyframe_points])
-        for c in all_curves(data.action)
+    curves = (
+        ()
+        if data is None or data.action is None
+        else tuple(
+            (
+                c.data_path,
+                c.array_index,
+                c.mute,
+                c.lock,
+                [tuple(p.co) + tuple(p.handle_right) for p in c.keyframe_points],
+            )
+            for c in all_curves(data.action)
+        )
     )
     place = (*owner.location, *owner.rotation_euler)
     named = (data.action and data.action.name, len(data.nla_tracks)) if data else None
@@ -256,27 +288,53 @@ def animation(owner) -> tuple:
 
 def all_curves(action) -> list:
     if hasattr(action, "layers"):
-        return [c for layer in action.layers for strip in layer.strips for bag in strip.channelbags for c in bag.fcurves]
+        return [
+            c
+            for layer in action.layers
+            for strip in layer.strips
+            for bag in strip.channelbags
+            for c in bag.fcurves
+        ]
     return list(action.fcurves)
 
 
-@pytest.mark.parametrize("way, words", [
-    (locked, "locked curves"), (in_a_locked_group, "locked curves"), (muted, "muted curves"),
-    (in_a_muted_group, "muted curves"),
-    (repeated, "modifiers on curves"), (sampled, "samples"), (linked, "linked action"), (shared, "in common with 'Other'"),
-    (added_up, "blending to Replace"), (half, "blending to Replace"), (in_tweak_mode, "tweak"), (under_a_solo_track, "solo"),
-    (with_delta_location, "delta"), (with_delta_rotation, "delta"), (with_delta_scale, "delta"), (with_keyed_delta, "delta"),
-    (driven, "drivers"), (pushed, "Something else than its keys moves the root 'Ball'"),
-])
+@pytest.mark.parametrize(
+    "way, words",
+    [
+        (locked, "locked curves"),
+        (in_a_locked_group, "locked curves"),
+        (muted, "muted curves"),
+        (in_a_muted_group, "muted curves"),
+        (repeated, "modifiers on curves"),
+        (sampled, "samples"),
+        (linked, "linked action"),
+        (shared, "in common with 'Other'"),
+        (added_up, "blending to Replace"),
+        (half, "blending to Replace"),
+        (in_tweak_mode, "tweak"),
+        (under_a_solo_track, "solo"),
+        (with_delta_location, "delta"),
+        (with_delta_rotation, "delta"),
+        (with_delta_scale, "delta"),
+        (with_keyed_delta, "delta"),
+        (driven, "drivers"),
+        (pushed, "Something else than its keys moves the root 'Ball'"),
+    ],
+)
 @pytest.mark.parametrize("button", ["SEAT", "CURVE"])
-def test_a_root_that_cannot_be_keyed_is_said_and_left_alone(room: Room, way, words: str, button: str, tmp_path) -> None:
+def test_a_root_that_cannot_be_keyed_is_said_and_left_alone(
+    room: Room, way, words: str, button: str, tmp_path
+) -> None:
     room.folder = tmp_path
     way(room)
     if button == "CURVE":
         data = room.bpy.data.curves.new("Path", "CURVE")
         data.dimensions = "3D"
         data.splines.new("POLY").points.add(1)
-        data.splines[0].points[0].co, data.splines[0].points[1].co = (0.0, 0.0, 0.0, 1.0), (-2.0, 0.0, 0.0, 1.0)
+        data.splines[0].points[0].co, data.splines[0].points[1].co = (
+            (0.0, 0.0, 0.0, 1.0),
+            (-2.0, 0.0, 0.0, 1.0),
+        )
         curve = room.bpy.data.objects.new("Path", data)
         room.scene.collection.objects.link(curve)
     room.select(room.chair if button == "SEAT" else curve, room.ann)
@@ -287,8 +345,15 @@ def test_a_root_that_cannot_be_keyed_is_said_and_left_alone(room: Room, way, wor
             room.bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0)
         else:
             room.bpy.ops.dafnet.walk_along_curve()
-    assert animation(room.root) == before and {action.name for action in room.bpy.data.actions} == actions
-    assert room.scene.frame_current == 1 and room.scene.frame_end == 40 and room.ann.dafnet.furniture is None
+    assert (
+        animation(room.root) == before
+        and {action.name for action in room.bpy.data.actions} == actions
+    )
+    assert (
+        room.scene.frame_current == 1
+        and room.scene.frame_end == 40
+        and room.ann.dafnet.furniture is None
+    )
 
 
 def with_locked_transforms(room: Room) -> None:
@@ -322,10 +387,17 @@ def with_muted_extras(room: Room) -> None:
     room.root.driver_add("location", 2).mute = True
 
 
-@pytest.mark.parametrize("way", [
-    with_locked_transforms, with_an_old_parent_inverse, where_only_needed_keys_are_wanted, with_an_active_keying_set,
-    over_nla_strips, with_muted_extras,
-])
+@pytest.mark.parametrize(
+    "way",
+    [
+        with_locked_transforms,
+        with_an_old_parent_inverse,
+        where_only_needed_keys_are_wanted,
+        with_an_active_keying_set,
+        over_nla_strips,
+        with_muted_extras,
+    ],
+)
 def test_what_does_not_move_the_root_does_not_keep_it_from_the_seat(room: Room, way) -> None:
     way(room)
     room.select(room.chair, room.ann)
@@ -334,11 +406,15 @@ def test_what_does_not_move_the_root_does_not_keep_it_from_the_seat(room: Room, 
     finally:
         room.bpy.context.preferences.edit.use_keyframe_insert_needed = False
     room.scene.frame_set(room.scene.frame_end)
-    place = room.root.evaluated_get(room.bpy.context.evaluated_depsgraph_get()).matrix_world.translation
+    place = room.root.evaluated_get(
+        room.bpy.context.evaluated_depsgraph_get()
+    ).matrix_world.translation
     assert abs(place.x) < 0.05 and 3.1 < place.y < 3.35
 
 
-def test_what_fails_while_it_is_keyed_leaves_the_root_as_it_was(room: Room, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_fails_while_it_is_keyed_leaves_the_root_as_it_was(
+    room: Room, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Also its action where that is an NLA strip as well, and a place that has no keys."""
     keys = room.addon("dafnet_addon.blender.root_keys")
     keyed(room)
@@ -383,7 +459,9 @@ def test_the_panel_offers_the_selected_seat(room: Room) -> None:
 
 
 def _table(room: Room, near: float) -> None:
-    """A table before the chair, its nearest edge at y = ``near``, its far one 0.7 m from there, towards the character."""
+    """A table before the chair, its nearest edge at y = ``near``, its far one 0.7 m from there,
+    towards the character.
+    """
     room.box("Table", (-0.7, near - 0.7, 0.70), (0.7, near, 0.73))
 
 
@@ -392,9 +470,15 @@ def test_a_chair_under_a_table_is_refused_before_anything_is_keyed(room: Room) -
     for near in (3.3, 3.0, 2.9):
         _table(room, near)
         room.select(room.chair)
-        with pytest.raises(RuntimeError, match="'Table' stands where one comes to sit on 'Chair'; pull 'Chair' out"):
+        with pytest.raises(
+            RuntimeError, match="'Table' stands where one comes to sit on 'Chair'; pull 'Chair' out"
+        ):
             room.bpy.ops.dafnet.walk_to(goal="SEAT")
-        assert not room.root.animation_data and room.ann.dafnet.furniture is None and room.scene.frame_end == 40
+        assert (
+            not room.root.animation_data
+            and room.ann.dafnet.furniture is None
+            and room.scene.frame_end == 40
+        )
         room.bpy.data.objects.remove(room.bpy.data.objects["Table"])
     _table(room, 2.5)
     assert room.bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
@@ -403,7 +487,9 @@ def test_a_chair_under_a_table_is_refused_before_anything_is_keyed(room: Room) -
 
 
 def test_what_a_walk_leads_through_is_said(room: Room) -> None:
-    walking, sources = (room.addon(f"dafnet_addon.blender.{name}") for name in ("walking", "path_sources"))
+    walking, sources = (
+        room.addon(f"dafnet_addon.blender.{name}") for name in ("walking", "path_sources")
+    )
     room.ann.dafnet.furniture = room.furniture
     _table(room, 2.0)
     room.scene.cursor.location = (0.0, 1.7, 0.0)
@@ -423,8 +509,12 @@ def test_what_a_walk_leads_through_is_said(room: Room) -> None:
 
 @pytest.mark.parametrize("kind", ["DESK", "WHITEBOARD", "SOFA", "BED"])
 def test_examples_lead_through_nothing(blender, addon, kind: str) -> None:
-    examples, job, reader = (addon(f"dafnet_addon.blender.{name}") for name in ("examples", "job", "scene_reader"))
-    conditions, progress = (addon(f"dafnet_addon.core.{name}") for name in ("conditions", "progress"))
+    examples, job, reader = (
+        addon(f"dafnet_addon.blender.{name}") for name in ("examples", "job", "scene_reader")
+    )
+    conditions, progress = (
+        addon(f"dafnet_addon.core.{name}") for name in ("conditions", "progress")
+    )
     armature = examples.add_example(blender.context, kind)
     read = reader.read_scene(blender.context, job.settings_of(armature, blender.context.scene))
     shot = progress.drained(conditions.shot_steps(read.scene, read.controls))
@@ -432,8 +522,12 @@ def test_examples_lead_through_nothing(blender, addon, kind: str) -> None:
 
 
 def test_the_demo_leads_through_nothing(blender, addon) -> None:
-    demo_room, job, reader = (addon(f"dafnet_addon.blender.{name}") for name in ("demo_room", "job", "scene_reader"))
-    conditions, progress = (addon(f"dafnet_addon.core.{name}") for name in ("conditions", "progress"))
+    demo_room, job, reader = (
+        addon(f"dafnet_addon.blender.{name}") for name in ("demo_room", "job", "scene_reader")
+    )
+    conditions, progress = (
+        addon(f"dafnet_addon.core.{name}") for name in ("conditions", "progress")
+    )
     room = demo_room.build_room(blender.context)
     read = reader.read_scene(blender.context, job.settings_of(room.armature, blender.context.scene))
     shot = progress.drained(conditions.shot_steps(read.scene, read.controls))

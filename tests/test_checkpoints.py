@@ -1,4 +1,6 @@
-"""Checkpoints: what is gone on with is exact and whole, and a stranger's run folder executes nothing."""
+"""Checkpoints: what is gone on with is exact and whole, and a stranger's run folder executes
+nothing.
+"""
 
 import json
 import pickle
@@ -27,7 +29,14 @@ from dafnet_addon.training.train import Run, TrainingConfig, train_part, trained
 
 ROOT = Path(__file__).resolve().parents[1]
 TINY = ModelConfig(
-    system="moglow", predictor_code=8, predictor_width=16, width=8, layers=1, code=8, steps_whole=1, shared_encoder=True,
+    system="moglow",
+    predictor_code=8,
+    predictor_width=16,
+    width=8,
+    layers=1,
+    code=8,
+    steps_whole=1,
+    shared_encoder=True,
 )
 TINY_SAMP = SampConfig(width=16, code=8, experts=2, latent=4, frames=10)
 STEPPED = TrainingConfig(steps_flow=4, batch=4, warmup=2, save_every=2, free_run=1.0)
@@ -43,7 +52,9 @@ def _one_sentence(error: pytest.ExceptionInfo[InputError]) -> None:
     assert text.endswith(".") and "\n" not in text and "Traceback" not in text
 
 
-def test_a_run_that_was_stopped_ends_bit_for_bit_as_one_that_was_not(dataset: Path, tmp_path: Path) -> None:
+def test_a_run_that_was_stopped_ends_bit_for_bit_as_one_that_was_not(
+    dataset: Path, tmp_path: Path
+) -> None:
     def stop(part: str, share: float, loss: float) -> None:
         if share >= 1.0:
             raise _Stopped
@@ -53,13 +64,22 @@ def test_a_run_that_was_stopped_ends_bit_for_bit_as_one_that_was_not(dataset: Pa
         train_part("whole", dataset, tmp_path / "stopped", TINY, STEPPED, progress=stop)
     assert Run.load("whole", tmp_path / "stopped").step == 2
     train_part("whole", dataset, tmp_path / "stopped", TINY, STEPPED)
-    one, two = (Checkpoint.read(tmp_path / name / "whole.checkpoint") for name in ("straight", "stopped"))
+    one, two = (
+        Checkpoint.read(tmp_path / name / "whole.checkpoint") for name in ("straight", "stopped")
+    )
     assert one.state["step"] == two.state["step"] == 4
-    assert one.tensors.keys() == two.tensors.keys() and any(name.startswith("optimiser.") for name in one.tensors)
+    assert one.tensors.keys() == two.tensors.keys() and any(
+        name.startswith("optimiser.") for name in one.tensors
+    )
     for name, tensor in one.tensors.items():
         assert torch.equal(tensor, two.tensors[name]), name
-    lines = [json.loads(line) for line in (tmp_path / "stopped" / "log.jsonl").read_text(encoding="utf-8").splitlines()]
-    assert [line["step"] for line in lines] == [2, 4], "what was stopped before it was saved is not told twice"
+    lines = [
+        json.loads(line)
+        for line in (tmp_path / "stopped" / "log.jsonl").read_text(encoding="utf-8").splitlines()
+    ]
+    assert [line["step"] for line in lines] == [2, 4], (
+        "what was stopped before it was saved is not told twice"
+    )
 
 
 def test_samp_goes_on_bit_for_bit_too(dataset: Path, tmp_path: Path) -> None:
@@ -76,7 +96,8 @@ def test_samp_goes_on_bit_for_bit_too(dataset: Path, tmp_path: Path) -> None:
     assert all(torch.equal(tensor, two.tensors[name]) for name, tensor in one.tensors.items())
     assert load_samp(stopped)[0] == "samp-ob"
     for changed, refused in (
-        ({"config": asdict(replace(TINY_SAMP, width=17))}, "of another shape"), ({"kind": ["samp"]}, "none of SAMP's"),
+        ({"config": asdict(replace(TINY_SAMP, width=17))}, "of another shape"),
+        ({"kind": ["samp"]}, "none of SAMP's"),
     ):
         write_checkpoint(tmp_path / "c.checkpoint", one.tensors, {**one.state, **changed})
         with pytest.raises(InputError, match=refused) as error:
@@ -94,12 +115,17 @@ class _Hostile:
         return Path.touch, (self.mark,)
 
 
-PICKLES = {"pickle": (pickle.dump, pickle.load), "torch": (torch.save, partial(torch.load, weights_only=False))}
+PICKLES = {
+    "pickle": (pickle.dump, pickle.load),
+    "torch": (torch.save, partial(torch.load, weights_only=False)),
+}
 
 
 @pytest.mark.parametrize("kind", PICKLES)
 @pytest.mark.parametrize("suffix", ["pt", "checkpoint"])
-def test_a_strangers_run_folder_executes_nothing(dataset: Path, tmp_path: Path, capsys: Any, suffix: str, kind: str) -> None:
+def test_a_strangers_run_folder_executes_nothing(
+    dataset: Path, tmp_path: Path, capsys: Any, suffix: str, kind: str
+) -> None:
     dump, load = PICKLES[kind]
     run, mark = tmp_path / "run", tmp_path / "executed"
     run.mkdir()
@@ -107,7 +133,9 @@ def test_a_strangers_run_folder_executes_nothing(dataset: Path, tmp_path: Path, 
         with (run / f"{part}.{suffix}").open("wb") as file:
             dump(_Hostile(mark), file)
     for read in (
-        lambda: Run.load("whole", run), lambda: trained(run), lambda: load_samp(run / f"samp.{suffix}"),
+        lambda: Run.load("whole", run),
+        lambda: trained(run),
+        lambda: load_samp(run / f"samp.{suffix}"),
         lambda: train_part("whole", dataset, run, TINY, STEPPED),
     ):
         with pytest.raises(InputError, match=r"pickle|cannot be read") as error:
@@ -137,12 +165,16 @@ checkpoints.write_checkpoint(file, {"network.a": torch.ones(1000)}, {"step": 2})
 @pytest.mark.parametrize("moment", ["written", "fsync", "replace"])
 def test_a_killed_writer_leaves_the_checkpoint_before(tmp_path: Path, moment: str) -> None:
     file = tmp_path / "whole.checkpoint"
-    done = subprocess.run([sys.executable, "-c", KILLED, file, moment], cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", KILLED, file, moment], cwd=ROOT, capture_output=True, text=True
+    )
     assert done.returncode == -signal.SIGKILL, done.stderr
     kept = Checkpoint.read(file)
     assert kept.state == {"step": 1} and not kept.tensors["network.a"].any()
     write_checkpoint(file, {"network.a": torch.ones(3)}, {"step": 3})
-    assert Checkpoint.read(file).state == {"step": 3} and list(tmp_path.iterdir()) == [file], "nothing is left lying about"
+    assert Checkpoint.read(file).state == {"step": 3} and list(tmp_path.iterdir()) == [file], (
+        "nothing is left lying about"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -158,8 +190,14 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Checkpoint:
 
 def _reads(kept: Checkpoint, folder: Path, tensors: dict[str, Any], state: dict[str, Any]) -> Run:
     """The run of a checkpoint, some of whose tensors and words are others; None takes one away."""
-    mixed = {name: tensor for name, tensor in {**kept.tensors, **tensors}.items() if tensor is not None}
-    write_checkpoint(folder / "whole.checkpoint", mixed, {k: v for k, v in {**kept.state, **state}.items() if v is not None})
+    mixed = {
+        name: tensor for name, tensor in {**kept.tensors, **tensors}.items() if tensor is not None
+    }
+    write_checkpoint(
+        folder / "whole.checkpoint",
+        mixed,
+        {k: v for k, v in {**kept.state, **state}.items() if v is not None},
+    )
     return Run.load("whole", folder)
 
 
@@ -167,30 +205,52 @@ MODEL = TINY.as_dict()
 MOVED = "couplings.0.out.bias"
 
 
-@pytest.mark.parametrize(("tensors", "state", "named"), [
-    ({}, {"model": None}, "model"), ({}, {"model": [1]}, "model"), ({}, {"model": {**MODEL, "colour": 1}}, "colour"),
-    ({}, {"model": {**MODEL, "width": "wide"}}, "width"), ({}, {"model": {**MODEL, "width": True}}, "width"),
-    ({}, {"model": {**MODEL, "width": 1 << 40}}, "width"), ({}, {"model": {**MODEL, "width": 1 << 16}}, "too large"),
-    ({}, {"model": {**MODEL, "steps_whole": 10**9}}, "steps_whole"), ({}, {"model": {**MODEL, "code": 0}}, "code"),
-    ({}, {"model": {**MODEL, "action_temperature": 0.0}}, "action_temperature"),
-    ({}, {"model": {**MODEL, "system": "dafnet"}}, "no part 'whole'"), ({}, {"model": {**MODEL, "system": "x"}}, "unknown"),
-    ({}, {"model": {**MODEL, "width": 9}}, "another shape"),
-    ({}, {"config": {"batch": 0}}, "batch"), ({}, {"config": {"peak": float("inf")}}, "not finite"),
-    ({}, {"config": {"peak": 10**17}}, "peak"), ({}, {"config": {"peak": 10**400}}, "too large"),
-    ({}, {"config": {"calm": -0.1}}, "calm"),
-    ({}, {"step": -1}, "steps"), ({}, {"step": True}, "steps"), ({}, {"step": 1.5}, "steps"), ({}, {"step": None}, "steps"),
-    ({}, {"seconds": float("nan")}, "not finite"), ({}, {"seconds": -1.0}, "seconds"),
-    ({}, {"seconds": "1"}, "seconds"), ({}, {"adopted": 3}, "adopted"),
-    ({f"network.{MOVED}": None}, {}, MOVED), ({f"network.{MOVED}": torch.zeros(2)}, {}, MOVED),
-    ({f"network.{MOVED}": torch.zeros(66, dtype=torch.complex64)}, {}, MOVED),
-    ({f"optimiser.{MOVED}.exp_avg": torch.zeros(2)}, {}, "exp_avg"),
-    ({f"optimiser.{MOVED}.exp_avg_sq": None}, {}, "exp_avg_sq"),
-    ({"generator.cpu": None}, {}, "generators"), ({"generator.cpu": torch.zeros(3, dtype=torch.uint8)}, {}, "generators"),
-    ({"generator.cpu": torch.zeros(5056)}, {}, "generators"),
-    ({"statistics.pose_std": torch.zeros(66, dtype=torch.double)}, {}, "pose_std"),
-    ({"statistics.ahead_mean": torch.full((18,), torch.nan, dtype=torch.double)}, {}, "ahead_mean"),
-    ({"statistics.velocity_mean": torch.zeros(4, dtype=torch.double)}, {}, "velocity_mean"),
-])
+@pytest.mark.parametrize(
+    ("tensors", "state", "named"),
+    [
+        ({}, {"model": None}, "model"),
+        ({}, {"model": [1]}, "model"),
+        ({}, {"model": {**MODEL, "colour": 1}}, "colour"),
+        ({}, {"model": {**MODEL, "width": "wide"}}, "width"),
+        ({}, {"model": {**MODEL, "width": True}}, "width"),
+        ({}, {"model": {**MODEL, "width": 1 << 40}}, "width"),
+        ({}, {"model": {**MODEL, "width": 1 << 16}}, "too large"),
+        ({}, {"model": {**MODEL, "steps_whole": 10**9}}, "steps_whole"),
+        ({}, {"model": {**MODEL, "code": 0}}, "code"),
+        ({}, {"model": {**MODEL, "action_temperature": 0.0}}, "action_temperature"),
+        ({}, {"model": {**MODEL, "system": "dafnet"}}, "no part 'whole'"),
+        ({}, {"model": {**MODEL, "system": "x"}}, "unknown"),
+        ({}, {"model": {**MODEL, "width": 9}}, "another shape"),
+        ({}, {"config": {"batch": 0}}, "batch"),
+        ({}, {"config": {"peak": float("inf")}}, "not finite"),
+        ({}, {"config": {"peak": 10**17}}, "peak"),
+        ({}, {"config": {"peak": 10**400}}, "too large"),
+        ({}, {"config": {"calm": -0.1}}, "calm"),
+        ({}, {"step": -1}, "steps"),
+        ({}, {"step": True}, "steps"),
+        ({}, {"step": 1.5}, "steps"),
+        ({}, {"step": None}, "steps"),
+        ({}, {"seconds": float("nan")}, "not finite"),
+        ({}, {"seconds": -1.0}, "seconds"),
+        ({}, {"seconds": "1"}, "seconds"),
+        ({}, {"adopted": 3}, "adopted"),
+        ({f"network.{MOVED}": None}, {}, MOVED),
+        ({f"network.{MOVED}": torch.zeros(2)}, {}, MOVED),
+        ({f"network.{MOVED}": torch.zeros(66, dtype=torch.complex64)}, {}, MOVED),
+        ({f"optimiser.{MOVED}.exp_avg": torch.zeros(2)}, {}, "exp_avg"),
+        ({f"optimiser.{MOVED}.exp_avg_sq": None}, {}, "exp_avg_sq"),
+        ({"generator.cpu": None}, {}, "generators"),
+        ({"generator.cpu": torch.zeros(3, dtype=torch.uint8)}, {}, "generators"),
+        ({"generator.cpu": torch.zeros(5056)}, {}, "generators"),
+        ({"statistics.pose_std": torch.zeros(66, dtype=torch.double)}, {}, "pose_std"),
+        (
+            {"statistics.ahead_mean": torch.full((18,), torch.nan, dtype=torch.double)},
+            {},
+            "ahead_mean",
+        ),
+        ({"statistics.velocity_mean": torch.zeros(4, dtype=torch.double)}, {}, "velocity_mean"),
+    ],
+)
 def test_what_no_trainer_writes_is_refused_by_name(
     kept: Checkpoint, tmp_path: Path, tensors: dict[str, Any], state: dict[str, Any], named: str
 ) -> None:
@@ -201,7 +261,11 @@ def test_what_no_trainer_writes_is_refused_by_name(
 
 
 def test_damaged_files_are_refused_or_read(kept: Checkpoint, tmp_path: Path) -> None:
-    rng, whole, file = np.random.default_rng(0), kept.path.read_bytes(), tmp_path / "whole.checkpoint"
+    rng, whole, file = (
+        np.random.default_rng(0),
+        kept.path.read_bytes(),
+        tmp_path / "whole.checkpoint",
+    )
     header = 8 + int.from_bytes(whole[:8], "little")
     refused = 0
     for k in range(60):
@@ -223,7 +287,11 @@ def test_json_as_deep_as_the_stack_is_refused(kept: Checkpoint, tmp_path: Path) 
     from safetensors.torch import save_file
 
     for text in ("[" * 100_000, "{", "7", "", "[]"):
-        save_file(kept.tensors, tmp_path / "whole.checkpoint", {"format": "dafnet-training-1", "state": text})
+        save_file(
+            kept.tensors,
+            tmp_path / "whole.checkpoint",
+            {"format": "dafnet-training-1", "state": text},
+        )
         with pytest.raises(InputError, match="its state is") as error:
             Run.load("whole", tmp_path)
         _one_sentence(error)

@@ -1,16 +1,34 @@
-"""The clean-up: planted feet stay, targets are met, bones keep their lengths, and where nothing is asked nothing changes."""
+"""The clean-up: planted feet stay, targets are met, bones keep their lengths, and where nothing is
+asked nothing changes.
+"""
 
 import numpy as np
 import pytest
 
 from dafnet_addon import Box, CleanUp, Controls, InputError, Scene, generate, load_weights
-from dafnet_addon.core.cleanup import cleaned, cleared, planted, reaching, seated, smoothed_out, standing_still
+from dafnet_addon.core.cleanup import (
+    cleaned,
+    cleared,
+    planted,
+    reaching,
+    seated,
+    smoothed_out,
+    standing_still,
+)
 from dafnet_addon.core.generate import clean_again_steps
 from dafnet_addon.core.kinematics import on_bones, two_bone
 from dafnet_addon.core.metrics import foot_sliding, jerk
 from dafnet_addon.core.paths import Stop, route
 from dafnet_addon.core.progress import drained
-from dafnet_addon.core.skeleton import END_EFFECTORS, JOINTS, OFFSETS, PARENTS, REST, TOE_HEIGHT, joint
+from dafnet_addon.core.skeleton import (
+    END_EFFECTORS,
+    JOINTS,
+    OFFSETS,
+    PARENTS,
+    REST,
+    TOE_HEIGHT,
+    joint,
+)
 from dafnet_addon.core.solids import box_distance
 from dafnet_addon.core.storage import packed, unpacked
 
@@ -27,39 +45,55 @@ def _hanging() -> np.ndarray:
     """The rest pose with bent knees and arms, hands before the body."""
     pose = REST.copy()
     for side, sign in (("left_", -1.0), ("right_", 1.0)):
-        pose[joint(side + "elbow")] = pose[joint(side + "shoulder")] + np.array([sign * 0.05, -0.05, -0.25014])
+        pose[joint(side + "elbow")] = pose[joint(side + "shoulder")] + np.array(
+            [sign * 0.05, -0.05, -0.25014]
+        )
         pose[joint(side + "wrist")] = pose[joint(side + "elbow")] + np.array([0.0, 0.2, -0.15])
     return pose
 
 
 def _sliding(frames: int = 60) -> np.ndarray:
-    """A body that stands, carried along by 6 mm a frame for a second, its right foot in the air meanwhile."""
+    """A body that stands, carried along by 6 mm a frame for a second, its right foot in the air
+    meanwhile.
+    """
     joints = np.repeat(_hanging()[None], frames, axis=0)
     joints[..., 2] -= 0.02
     joints[:, :, 0] += np.clip(np.arange(frames) - 15, 0, 20)[:, None] * 0.005
-    joints[15:36, [joint("right_ankle"), joint("right_foot")], 2] += 0.1 * np.sin(np.linspace(0, np.pi, 21))[:, None]
+    joints[15:36, [joint("right_ankle"), joint("right_foot")], 2] += (
+        0.1 * np.sin(np.linspace(0, np.pi, 21))[:, None]
+    )
     return joints
 
 
 def test_feet_that_stand_stay_and_those_in_the_air_do_not():
     joints = _sliding()
     stands = standing_still(joints)
-    assert {foot for foot, _, _ in stands} == {0, 1} and any(end - start > 50 for foot, start, end in stands if foot == 0)
+    assert {foot for foot, _, _ in stands} == {0, 1} and any(
+        end - start > 50 for foot, start, end in stands if foot == 0
+    )
     out = planted(joints)
     for foot, start, end in stands:
         toe = out[start:end, TOES[foot]]
         assert np.abs(np.diff(toe, axis=0)).max() < 1e-6 and np.allclose(toe[:, 2], TOE_HEIGHT)
     assert np.ptp(out[:, TOES[1], 2]) > 0.06, "the foot in the air keeps its step"
-    assert foot_sliding(out, 30.0)[stands[0][1] : stands[0][2]].sum() <= foot_sliding(joints, 30.0).sum()
+    assert (
+        foot_sliding(out, 30.0)[stands[0][1] : stands[0][2]].sum()
+        <= foot_sliding(joints, 30.0).sum()
+    )
     assert np.abs(_lengths(out) - BONES).max() < 1e-3
 
 
 def test_the_pelvis_comes_down_where_legs_are_too_short():
     joints = np.repeat(REST[None], 40, axis=0)
-    # Straight legs, and a foot that is led 12 cm out while the other stands: only a lower pelvis lets both reach.
-    joints[:, [joint("left_ankle"), joint("left_foot")]] += np.linspace(0, 0.1, 40)[:, None, None] * (-1.0, 0.0, 0.0)
+    # Straight legs, and a foot that is led 12 cm out while the other stands: only a lower pelvis
+    # lets both reach.
+    joints[:, [joint("left_ankle"), joint("left_foot")]] += np.linspace(0, 0.1, 40)[
+        :, None, None
+    ] * (-1.0, 0.0, 0.0)
     out = planted(joints)
-    assert (out[:, 0, 2] <= joints[:, 0, 2] + 1e-9).all() and np.abs(np.diff(out[:, 0, 2], 2)).max() < 2e-3
+    assert (out[:, 0, 2] <= joints[:, 0, 2] + 1e-9).all() and np.abs(
+        np.diff(out[:, 0, 2], 2)
+    ).max() < 2e-3
     for foot, start, end in standing_still(joints):
         assert np.abs(np.diff(out[start:end, TOES[foot]], axis=0)).max() < 1e-3
 
@@ -83,7 +117,11 @@ def test_targets_within_reach_are_met_and_bones_keep_their_length(name):
     assert np.abs(_lengths(out) - BONES).max() < 1e-3
     assert np.abs(out[:4] - joints[:4]).max() < 1e-3, "long before the target nothing moves"
     assert np.linalg.norm(np.diff(out, axis=0), axis=-1).max() < 0.05, "it is led there, not thrown"
-    legs = [j for j, name in enumerate(JOINTS) if name.split("_")[-1] in ("pelvis", "hip", "knee", "ankle", "foot")]
+    legs = [
+        j
+        for j, name in enumerate(JOINTS)
+        if name.split("_")[-1] in ("pelvis", "hip", "knee", "ankle", "foot")
+    ]
     assert np.array_equal(out[:, legs], joints[:, legs])
 
 
@@ -110,7 +148,9 @@ def test_nothing_is_done_where_nothing_is_asked():
 
 
 def _sitting_down(low: float) -> np.ndarray:
-    """A body that goes from standing to a pelvis at ``low`` metres in a second, and stays; its feet where they were."""
+    """A body that goes from standing to a pelvis at ``low`` metres in a second, and stays; its feet
+    where they were.
+    """
     joints = np.repeat(_hanging()[None], 80, axis=0)
     down = (REST[0, 2] - low) * np.clip(np.linspace(-0.5, 2.0, 80), 0.0, 1.0)
     legs = [joint(f"{side}_{n}") for side in ("left", "right") for n in ("knee", "ankle", "foot")]
@@ -162,7 +202,9 @@ def test_takes_are_cleaned_at_any_rate(fps):
     controls = Controls(fps, root, mode="EE", hand_right=target)
     raw, clean = (generate(Scene([seat]), controls, weights, clean_up=c) for c in (CleanUp(), ALL))
     last = slice(begin + 2, len(times) - 1)
-    before, after = (np.linalg.norm(t.joints[last, 21] - target[last], axis=-1).mean() for t in (raw, clean))
+    before, after = (
+        np.linalg.norm(t.joints[last, 21] - target[last], axis=-1).mean() for t in (raw, clean)
+    )
     assert after < 0.002 + 0.1 * before
     assert foot_sliding(clean.joints, fps).mean() <= foot_sliding(raw.joints, fps).mean()
     assert np.abs(_lengths(clean.joints) - BONES).max() < 1e-5
@@ -186,10 +228,15 @@ def test_hands_and_feet_come_out_of_furniture_and_the_rest_stays():
     moved = {JOINTS[j] for j in range(22) if np.abs(out[:, j] - joints[:, j]).max() > 1e-6}
     assert moved == {"left_elbow", "left_wrist"}
     target = {"hand_left": joints[:, hand]}
-    assert np.allclose(cleared(joints, reach, target), joints, atol=1e-6), "what has a target is left to it"
+    assert np.allclose(cleared(joints, reach, target), joints, atol=1e-6), (
+        "what has a target is left to it"
+    )
     low = _box(joints[0, foot] - (0.02, 0.08, 0.08), joints[0, foot] + (0.08, 0.08, 0.08))
     out = cleared(joints, low, {})
-    assert np.allclose(out[:, foot, 2], joints[:, foot, 2], atol=3e-3) and low(out[20:40, [foot]]).min() > 0.01
+    assert (
+        np.allclose(out[:, foot, 2], joints[:, foot, 2], atol=3e-3)
+        and low(out[20:40, [foot]]).min() > 0.01
+    )
     far = _box((5.0, 5.0, 0.0), (6.0, 6.0, 1.0))
     assert cleared(joints, far, {}) is joints
     half, whole = ((each - joints)[30, foot] for each in (cleared(joints, low, {}, 0.5), out))
@@ -198,22 +245,34 @@ def test_hands_and_feet_come_out_of_furniture_and_the_rest_stays():
 
 def test_smoothing_evens_out_and_keeps_bones_and_straight_ways():
     rng = np.random.default_rng(0)
-    still = np.repeat(_hanging()[None], 60, axis=0) + np.arange(60)[:, None, None] * (0.0, 0.03, 0.0)
+    still = np.repeat(_hanging()[None], 60, axis=0) + np.arange(60)[:, None, None] * (
+        0.0,
+        0.03,
+        0.0,
+    )
     shaking = on_bones(still + 0.01 * rng.normal(size=still.shape))
     out = smoothed_out(shaking)
-    assert jerk(out, 30.0) < 0.1 * jerk(shaking, 30.0) and np.abs(out - still).mean() < np.abs(shaking - still).mean()
+    assert (
+        jerk(out, 30.0) < 0.1 * jerk(shaking, 30.0)
+        and np.abs(out - still).mean() < np.abs(shaking - still).mean()
+    )
     assert np.abs(_lengths(out) - BONES).max() < 1e-6
     assert np.allclose(smoothed_out(on_bones(still)), on_bones(still), atol=1e-6)
 
 
 def test_cleaned_again_is_as_if_generated_so():
-    weights, scene = load_weights(), Scene([Box(center=np.array([0.0, 0.0, 0.225]), half_size=np.array([0.22, 0.22, 0.225]))])
+    weights, scene = (
+        load_weights(),
+        Scene([Box(center=np.array([0.0, 0.0, 0.225]), half_size=np.array([0.22, 0.22, 0.225]))]),
+    )
     path = route(Stop((1.6, 0.9), np.pi / 2), Stop((0.0, 0.0), 0.0, seconds=1.0, seated=True)).path
     controls = Controls(30.0, path.matrices())
     raw, clean = (generate(scene, controls, weights, clean_up=c) for c in (CleanUp(), ALL))
     kept, asked = unpacked(packed(raw, controls))
     again = drained(clean_again_steps(scene, asked, kept, ALL))
-    assert np.abs(again.joints - clean.joints).max() < 1e-4 and np.array_equal(again.poses, kept.poses)
+    assert np.abs(again.joints - clean.joints).max() < 1e-4 and np.array_equal(
+        again.poses, kept.poses
+    )
     assert clean.metrics["foot_sliding_per_frame"] < clean.raw_metrics["foot_sliding_per_frame"]
     assert clean.raw_metrics == raw.metrics and again.log_likelihood == raw.log_likelihood
     with pytest.raises(InputError, match="other frames"):
@@ -225,6 +284,13 @@ def test_cleaned_again_is_as_if_generated_so():
 def test_a_head_that_is_asked_out_of_reach_does_not_shake():
     path = route(Stop((0.0, 0.0), 0.0, 0.2), Stop((0.0, 2.0), 0.0, 0.2)).path
     head = np.tile((0.0, 0.0, 1.6), (len(path), 1))
-    controls = Controls(30.0, path.matrices(), mode="EE", head=head, hand_left=head - (0.3, 0.0, 0.7))
-    raw, clean = (generate(Scene(), controls, load_weights(), clean_up=c) for c in (CleanUp(), CleanUp(reach=1.0)))
-    assert jerk(clean.joints, 30.0) < jerk(raw.joints, 30.0) + 78.0, "no more than real motion has on top"
+    controls = Controls(
+        30.0, path.matrices(), mode="EE", head=head, hand_left=head - (0.3, 0.0, 0.7)
+    )
+    raw, clean = (
+        generate(Scene(), controls, load_weights(), clean_up=c)
+        for c in (CleanUp(), CleanUp(reach=1.0))
+    )
+    assert jerk(clean.joints, 30.0) < jerk(raw.joints, 30.0) + 78.0, (
+        "no more than real motion has on top"
+    )

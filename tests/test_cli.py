@@ -1,4 +1,6 @@
-"""The command: what it prints and returns, and that its two doors and the operator make the same keys."""
+"""The command: what it prints and returns, and that its two doors and the operator make the same
+keys.
+"""
 
 import json
 import os
@@ -18,7 +20,9 @@ from dafnet_addon.core.weights import load_weights
 Addon = Callable[[str], Any]
 
 
-def test_wrong_command_lines_return_2_and_help_returns_0(capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_command_lines_return_2_and_help_returns_0(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert main([]) == 2
     assert main(["bake", "a.blend"]) == 2
     assert main(["bake", "a.blend", "-o", "b.blend", "--frames", "7"]) == 2
@@ -27,7 +31,9 @@ def test_wrong_command_lines_return_2_and_help_returns_0(capsys: pytest.CaptureF
     assert "bake" in capsys.readouterr().out
 
 
-def test_errors_are_one_sentence_on_standard_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_errors_are_one_sentence_on_standard_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["info", str(tmp_path / "none.safetensors")]) == 1
     said = capsys.readouterr()
     assert said.out == ""
@@ -47,7 +53,9 @@ def test_info_says_what_a_file_is(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.fixture
 def scene_file(blender: ModuleType, addon: Addon, tmp_path: Path) -> Path:
-    """A character whose root walks a metre in 20 frames, beside a box to sit on, saved to a file."""
+    """A character whose root walks a metre in 20 frames, beside a box to sit on, saved to a
+    file.
+    """
     bpy = blender
     bpy.context.scene.frame_end = 20
     armature = addon("dafnet_addon.blender.armature").create_character(bpy.context)
@@ -59,7 +67,11 @@ def scene_file(blender: ModuleType, addon: Addon, tmp_path: Path) -> Path:
     bpy.context.scene.collection.children.link(furniture)
     mesh = bpy.data.meshes.new("Box")
     corners = [(x, y, z) for x in (0.3, 0.7) for y in (0.8, 1.2) for z in (0.0, 0.45)]
-    mesh.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
+    mesh.from_pydata(
+        corners,
+        [],
+        [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)],
+    )
     furniture.objects.link(bpy.data.objects.new("Box", mesh))
     armature.dafnet.furniture = furniture
     file = tmp_path / "scene.blend"
@@ -79,7 +91,11 @@ def keys(bpy: ModuleType, addon: Addon) -> dict[tuple[str, int], np.ndarray]:
 
 
 def test_bake_saves_the_keys_that_the_operator_makes(
-    blender: ModuleType, addon: Addon, scene_file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    blender: ModuleType,
+    addon: Addon,
+    scene_file: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     bpy = blender
     bpy.ops.wm.open_mainfile(filepath=str(scene_file))
@@ -102,11 +118,27 @@ def test_bake_saves_the_keys_that_the_operator_makes(
 
 
 def test_several_takes_are_kept_and_the_first_one_plays(
-    blender: ModuleType, addon: Addon, scene_file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    blender: ModuleType,
+    addon: Addon,
+    scene_file: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     out = tmp_path / "takes.blend"
     capfd.readouterr()
-    arguments = ["bake", str(scene_file), "-o", str(out), "--takes", "3", "--seed", "5", "--frames", "3:9", "--json"]
+    arguments = [
+        "bake",
+        str(scene_file),
+        "-o",
+        str(out),
+        "--takes",
+        "3",
+        "--seed",
+        "5",
+        "--frames",
+        "3:9",
+        "--json",
+    ]
     assert addon("dafnet_addon.cli").main(arguments) == 0
     takes = json.loads(capfd.readouterr().out)["takes"]
     made = [(take["seed"], take["temperature"], take["frames"]) for take in takes]
@@ -122,11 +154,26 @@ def test_several_takes_are_kept_and_the_first_one_plays(
     [
         (["none.blend", "-o", "out.blend"], "no file"),
         (["{scene}", "-o", "out.txt"], ".blend"),
-        (["{scene}", "-o", "{out}", "--takes", "100000"], "number of takes is 100000; give a whole number from 1 to 64"),
-        (["{scene}", "-o", "{out}", "--seed", "2147483647", "--takes", "2"], "last take's seed is 2147483648"),
-        (["{scene}", "-o", "{out}", "--frames", "1:99999999999"], "frame of the range is 99999999999"),
-        (["{scene}", "-o", "{out}", "--frames", "99999999999:99999999999"], "frame of the range is 99999999999"),
-        (["{scene}", "-o", "{out}", "--frames", "1:1000000"], "length of the frame range is 1000000"),
+        (
+            ["{scene}", "-o", "{out}", "--takes", "100000"],
+            "number of takes is 100000; give a whole number from 1 to 64",
+        ),
+        (
+            ["{scene}", "-o", "{out}", "--seed", "2147483647", "--takes", "2"],
+            "last take's seed is 2147483648",
+        ),
+        (
+            ["{scene}", "-o", "{out}", "--frames", "1:99999999999"],
+            "frame of the range is 99999999999",
+        ),
+        (
+            ["{scene}", "-o", "{out}", "--frames", "99999999999:99999999999"],
+            "frame of the range is 99999999999",
+        ),
+        (
+            ["{scene}", "-o", "{out}", "--frames", "1:1000000"],
+            "length of the frame range is 1000000",
+        ),
         (["{scene}", "-o", "{out}", "--temperature", "11"], "temperature is 11"),
         (["{scene}", "-o", "{scene}"], "is the scene's own file"),
         (["{scene}", "-o", "{out}", "--character", "Nobody"], "no armature 'Nobody'"),
@@ -136,7 +183,12 @@ def test_several_takes_are_kept_and_the_first_one_plays(
     ],
 )
 def test_bake_says_what_is_wrong(
-    addon: Addon, scene_file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], arguments: list[str], said: str
+    addon: Addon,
+    scene_file: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    arguments: list[str],
+    said: str,
 ) -> None:
     out = tmp_path / "out.blend"
     capfd.readouterr()
@@ -154,7 +206,9 @@ def test_the_demo_room_has_its_seats_at_their_heights(blender: ModuleType, addon
     furniture = {ob.name: ob for ob in blender.data.collections["Furniture"].objects}
     assert set(furniture) == set(demo.PLACES)
     for seat in demo.SEATS:
-        hit, where, _, _, ob, _ = room.scene.ray_cast(depsgraph, (*seat.center[:2], 0.9), (0, 0, -1))
+        hit, where, _, _, ob, _ = room.scene.ray_cast(
+            depsgraph, (*seat.center[:2], 0.9), (0, 0, -1)
+        )
         assert hit and ob.name == seat.name
         assert where.z == pytest.approx(seat.center[2], abs=0.002)
 
@@ -172,13 +226,31 @@ def test_the_demo_runs_in_a_process_of_its_own(tmp_path: Path) -> None:
     if bpy.app.binary_path:
         pytest.skip("runs the Python module in a process of its own")
     done = subprocess.run(
-        [sys.executable, "-m", "dafnet_addon", "demo", "-o", str(tmp_path), "--no-preview", "--json"],
-        capture_output=True, text=True, cwd=Path(__file__).resolve().parents[1],
+        [
+            sys.executable,
+            "-m",
+            "dafnet_addon",
+            "demo",
+            "-o",
+            str(tmp_path),
+            "--no-preview",
+            "--json",
+        ],
+        capture_output=True,
+        text=True,
+        cwd=Path(__file__).resolve().parents[1],
         env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")},
     )
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)
-    assert (tmp_path / "demo.blend").is_file() and report == json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert (tmp_path / "demo.blend").is_file() and report == json.loads(
+        (tmp_path / "report.json").read_text(encoding="utf-8")
+    )
     heights = {seat["name"]: seat["seat_height"] for seat in report["seats"]}
-    assert len(set(heights.values())) == 2 and all(abs(seat["error"]) <= 0.05 for seat in report["seats"])
-    assert 0.88 < report["standing_pelvis_height"] < 1.0 and report["metrics"]["ground_truth"]["clips"] > 0
+    assert len(set(heights.values())) == 2 and all(
+        abs(seat["error"]) <= 0.05 for seat in report["seats"]
+    )
+    assert (
+        0.88 < report["standing_pelvis_height"] < 1.0
+        and report["metrics"]["ground_truth"]["clips"] > 0
+    )

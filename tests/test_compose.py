@@ -1,4 +1,6 @@
-"""Composed motion: joins without jumps or sliding feet, lent upper bodies, led hands; where there is capture, all of it."""
+"""Composed motion: joins without jumps or sliding feet, lent upper bodies, led hands; where there
+is capture, all of it.
+"""
 
 from pathlib import Path
 
@@ -27,13 +29,17 @@ def _lengths(joints: np.ndarray) -> np.ndarray:
 
 
 def _standing(frames: int, sway: float = 0.0) -> np.ndarray:
-    """A body that stands with hanging arms and sways sideways by ``sway`` metres over planted feet."""
+    """A body that stands with hanging arms and sways sideways by ``sway`` metres over planted
+    feet.
+    """
     pose = REST.copy()
     for side, sign in (("left_", -1.0), ("right_", 1.0)):
         shoulder = REST[joint(side + "shoulder")]
         wrist = shoulder + np.array([sign * 0.03, 0.12, -0.45])
         middle = shoulder + np.array([sign * 0.1, -0.2, -0.25])
-        pose[joint(side + "elbow")], pose[joint(side + "wrist")] = two_bone(shoulder, wrist, middle, 0.26, 0.25)
+        pose[joint(side + "elbow")], pose[joint(side + "wrist")] = two_bone(
+            shoulder, wrist, middle, 0.26, 0.25
+        )
     pose[:, 2] -= np.where(np.isin(np.arange(22), LEGS), 0.0, 0.04)  # soft knees
     pose[[joint("left_knee"), joint("right_knee")], 1] += 0.1
     joints = np.repeat(pose[None], frames, axis=0)
@@ -68,13 +74,18 @@ def test_a_join_neither_jumps_nor_slides_a_standing_foot():
     assert np.abs(np.diff(whole[:, TOES, :2], axis=0)).max() < 1e-3
     assert _speed(whole).max() < _speed(sit).max() + 0.3
     assert np.abs(_lengths(whole) - BONES).max() < 1e-6
-    assert whole[-1, 0, 2] == pytest.approx(sit[-1, 0, 2], abs=1e-3) and whole[:, TOES, 2].min() > 0.015
+    assert (
+        whole[-1, 0, 2] == pytest.approx(sit[-1, 0, 2], abs=1e-3)
+        and whole[:, TOES, 2].min() > 0.015
+    )
 
 
 def test_a_foot_works_off_its_difference_while_it_swings():
     stand, step = _standing(60), _standing(90)
     swing = np.clip((np.arange(90) - 40) / 20, 0, 1)
-    step[:, [joint("left_ankle"), joint("left_foot")], 1] += 0.4 * (swing * swing * (3 - 2 * swing))[:, None]
+    step[:, [joint("left_ankle"), joint("left_foot")], 1] += (
+        0.4 * (swing * swing * (3 - 2 * swing))[:, None]
+    )
     step = pose_legs(step)
     stand[:, [joint("left_ankle"), joint("left_foot")], 0] -= 0.06
     whole = joined(pose_legs(stand), step)
@@ -90,7 +101,10 @@ def test_a_lent_upper_body_keeps_legs_and_moves_the_chest_and_arms_as_the_other_
     waving[:, joint("right_elbow")] = waving[:, joint("right_shoulder")] + (0.26, 0.0, 0.0)
     waving[:, joint("right_wrist")] = waving[:, joint("right_elbow")] + (0.0, 0.0, 0.25)
     seated = lent(sit, waving @ yaw_matrix(np.array(1.0)).T, np.linspace(0, 1, 50))
-    assert np.abs(seated[:, LOWER] - sit[:, LOWER]).max() < 1e-6 and np.abs(seated[0] - sit[0]).max() < 1e-6
+    assert (
+        np.abs(seated[:, LOWER] - sit[:, LOWER]).max() < 1e-6
+        and np.abs(seated[0] - sit[0]).max() < 1e-6
+    )
     forearm = seated[-1, joint("right_wrist")] - seated[-1, joint("right_elbow")]
     assert forearm[2] > 0.24 and np.abs(_lengths(seated) - BONES).max() < 1e-6
 
@@ -148,4 +162,6 @@ def test_composed_capture_is_whole_fluent_and_the_same_again(captured, monkeypat
         from_behind += bool(way @ (-np.sin(rest.yaw), np.cos(rest.yaw)) < 0)
     assert 0.2 < from_behind / len(sides) < 0.8
     again = composed(captured)
-    assert all(np.array_equal(a.motion.joints, b.motion.joints) for a, b in zip(made, again, strict=True))
+    assert all(
+        np.array_equal(a.motion.joints, b.motion.joints) for a, b in zip(made, again, strict=True)
+    )

@@ -1,4 +1,6 @@
-"""Composing training data: boxes, fitted furniture, retargeted heights, windows; and the real motion files where they are."""
+"""Composing training data: boxes, fitted furniture, retargeted heights, windows; and the real
+motion files where they are.
+"""
 
 import json
 from pathlib import Path
@@ -29,14 +31,18 @@ def _lengths(joints: np.ndarray) -> np.ndarray:
 
 
 def _sit_down(seated: float = 0.55, frames: int = 150) -> np.ndarray:
-    """A made-up sit-down on the canonical body: the pelvis goes back and down, legs by two-bone IK, then rests."""
+    """A made-up sit-down on the canonical body: the pelvis goes back and down, legs by two-bone IK,
+    then rests.
+    """
     t = np.clip((np.arange(frames) - 40) / 40, 0, 1)
     ease = (t * t * (3 - 2 * t))[:, None]
     arms_down = REST.copy()
     for side, sign in (("left_", -1), ("right_", 1)):
         hanging = np.array([sign * 0.05, 0.0, -np.sqrt(0.26**2 - 0.05**2)])
         arms_down[joint(side + "elbow")] = REST[joint(side + "shoulder")] + hanging
-        arms_down[joint(side + "wrist")] = arms_down[joint(side + "elbow")] + np.array([0.0, 0.15, -0.2])
+        arms_down[joint(side + "wrist")] = arms_down[joint(side + "elbow")] + np.array(
+            [0.0, 0.15, -0.2]
+        )
     joints = np.repeat(arms_down[None], frames, axis=0)
     legs = [joint(s + n) for s in ("left_", "right_") for n in ("ankle", "foot")]
     feet = joints[:, legs].copy()
@@ -79,12 +85,18 @@ def test_windows_hold_the_motion_they_were_drawn_from():
             continue
         drawn += 1
         joints = window.poses.reshape(80, 22, 3)
-        assert np.abs(_lengths(joints) - BONES).max() < 0.03, "turning and mirroring keep lengths; re-timing nearly"
+        assert np.abs(_lengths(joints) - BONES).max() < 0.03, (
+            "turning and mirroring keep lengths; re-timing nearly"
+        )
         assert joints[..., 2].min() > TOE_HEIGHT - 0.03 and window.boxes.shape == (b.MOST, 7)
         path = RootPath(np.c_[window.root[:, :2], np.zeros(70)], window.root[:, 2])
         assert b.occupancy(window.boxes, path).max() > 0.8, "a seat is seen"
-        assert np.abs(velocities(path)[1:] - window.velocity[11:]).max() < 1e-9, "the root moves as it is said to"
-        assert np.abs(ahead(path)[:40] - window.ahead[:40]).max() < 1e-9, "and goes where it is said to"
+        assert np.abs(velocities(path)[1:] - window.velocity[11:]).max() < 1e-9, (
+            "the root moves as it is said to"
+        )
+        assert np.abs(ahead(path)[:40] - window.ahead[:40]).max() < 1e-9, (
+            "and goes where it is said to"
+        )
     assert drawn > 15
 
 
@@ -93,9 +105,16 @@ def test_motions_come_back_from_their_file(tmp_path):
     draws = {"sit": (np.array([[0, 90], [0, 100]]), np.array([0.25, 0.75]))}
     write_motions(tmp_path / "m.npz", [motion], draws)
     (again,), moments = read_motions(tmp_path / "m.npz")
-    assert np.abs(again.joints - motion.joints).max() <= 0.00051 and (again.valid == motion.valid).all()
-    assert [(r.start, r.end, r.yaw) for r in again.rests] == [(r.start, r.end, r.yaw) for r in motion.rests]
-    assert (moments["sit"][0] == draws["sit"][0]).all() and (moments["sit"][1] == draws["sit"][1]).all()
+    assert (
+        np.abs(again.joints - motion.joints).max() <= 0.00051
+        and (again.valid == motion.valid).all()
+    )
+    assert [(r.start, r.end, r.yaw) for r in again.rests] == [
+        (r.start, r.end, r.yaw) for r in motion.rests
+    ]
+    assert (moments["sit"][0] == draws["sit"][0]).all() and (
+        moments["sit"][1] == draws["sit"][1]
+    ).all()
 
 
 def test_a_canonical_body_keeps_planted_toes():
@@ -106,7 +125,10 @@ def test_a_canonical_body_keeps_planted_toes():
     assert abs(body.scale - LEG / (LEG * 1.1)) < 1e-3
     assert np.abs(_lengths(out) - BONES).max() < 1e-6
     toe = joint("left_foot")
-    assert np.abs(np.diff(out[:, toe, :2], axis=0)).max() < 2e-3 and abs(np.median(out[:, toe, 2]) - TOE_HEIGHT) < 0.01
+    assert (
+        np.abs(np.diff(out[:, toe, :2], axis=0)).max() < 2e-3
+        and abs(np.median(out[:, toe, 2]) - TOE_HEIGHT) < 0.01
+    )
 
 
 def test_a_folder_without_motion_is_refused(tmp_path):
@@ -138,7 +160,9 @@ def test_real_windows_are_in_the_roots_frame(real_clips):
     clip = next(c for c in clips if c.category == "sit_down")
     motion = motion_of(clip.name, clip.source, clip.subject, clip.category, canonical(clip, body))
     rng = np.random.default_rng(0)
-    windows = [w for w in (draw(rng, motion, motion.rests[0].start) for _ in range(20)) if w is not None]
+    windows = [
+        w for w in (draw(rng, motion, motion.rests[0].start) for _ in range(20)) if w is not None
+    ]
     assert len(windows) > 8
     pelvis = np.stack([w.poses.reshape(80, 22, 3)[:, 0] for w in windows])
     assert np.abs(pelvis[..., :2]).max() < 0.35 and np.abs(np.median(pelvis[..., :2])) < 0.05
@@ -176,8 +200,14 @@ def real_motions():
 def test_the_split_is_by_body(real_motions):
     from dafnet_addon.data.splits import TRAINED_ON_PARTLY
 
-    train, test = ({f"{m.source}/{m.subject}" for m in real_motions[split]} for split in ("train", "test"))
-    both = {body for body in train & test if body not in TRAINED_ON_PARTLY and body.split("/")[0] not in TRAINED_ON_PARTLY}
+    train, test = (
+        {f"{m.source}/{m.subject}" for m in real_motions[split]} for split in ("train", "test")
+    )
+    both = {
+        body
+        for body in train & test
+        if body not in TRAINED_ON_PARTLY and body.split("/")[0] not in TRAINED_ON_PARTLY
+    }
     assert not both and not any(body.startswith("hdm05") for body in train)
 
 
@@ -193,12 +223,19 @@ def test_a_dataset_is_made_and_gone_on_with(tmp_path):
     prepare(folder, out, windows=24)
     pool = load_pool([out / "pool-0000.npz"])
     assert pool["poses"].shape == (24, 80, 66) and pool["poses"].dtype == np.int16
-    assert {"walk", "stand"} & set(pool["kinds"]) and {"approach", "descend", "sit"} & set(pool["kinds"])
+    assert {"walk", "stand"} & set(pool["kinds"]) and {"approach", "descend", "sit"} & set(
+        pool["kinds"]
+    )
     described = json.loads((out / "dataset.json").read_text(encoding="utf-8"))
-    assert described["train"] == ["rocketbox/male"] and described["held_out"] == ["rocketbox/female"]
+    assert described["train"] == ["rocketbox/male"] and described["held_out"] == [
+        "rocketbox/female"
+    ]
     summary = (out / "summary.txt").read_text(encoding="utf-8")
     assert "sit_down" in summary and "MIT" in summary and "minutes" in summary
-    assert "no seat" in (out / "fits.txt").read_text(encoding="utf-8") and (out / "preview.png").stat().st_size > 10_000
+    assert (
+        "no seat" in (out / "fits.txt").read_text(encoding="utf-8")
+        and (out / "preview.png").stat().st_size > 10_000
+    )
     stamp = (out / "pool-0000.npz").stat().st_mtime_ns
     prepare(folder, out, windows=24)
     assert (out / "pool-0000.npz").stat().st_mtime_ns == stamp, "finished shards are kept"
@@ -218,27 +255,39 @@ def test_a_dataset_of_raw_files_needs_a_licence_and_a_held_out_body(tmp_path):
     for name in ("cmu69_69_02_1.bvh", "accad_male1_B3_walk.bvh"):
         (folder / name).symlink_to(raw / name)
     free = {"licence": "CC0", "category": "locomotion"}
-    for stated, lacking in ({}, "test"), ({"*": free}, "test"), ({"*": {**free, "split": "test"}}, "train"):
+    for stated, lacking in (
+        ({}, "test"),
+        ({"*": free}, "test"),
+        ({"*": {**free, "split": "test"}}, "train"),
+    ):
         (folder / "clips.json").write_text(json.dumps(stated), encoding="utf-8")
         with pytest.raises(InputError, match=f"split '{lacking}'.*clips.json"):
             prepare(folder, out, windows=4)
     (out / "test.npz").unlink()
-    (folder / "clips.json").write_text(json.dumps({"*": free, "accad*": {"subject": "a", "split": "test"}}), encoding="utf-8")
+    (folder / "clips.json").write_text(
+        json.dumps({"*": free, "accad*": {"subject": "a", "split": "test"}}), encoding="utf-8"
+    )
     prepare(folder, out, windows=4)
     assert (out / "pool-0000.npz").exists()
     assert json.loads((out / "dataset.json").read_text(encoding="utf-8"))["held_out"] == ["mocap/a"]
 
 
 def test_the_pelvis_is_over_the_hips_alike_in_every_source(real_motions):
-    """Sources put it from 3 cm under to 10 cm over the hips' middle; a seat's height is read off it."""
+    """Sources put it from 3 cm under to 10 cm over the hips' middle; a seat's height is read off
+    it.
+    """
     hips = [joint("left_hip"), joint("right_hip")]
     over: dict[str, list[np.ndarray]] = {}
     for motion in [*real_motions["train"], *real_motions["test"]]:
         trunk = motion.joints[:, joint("neck")] - motion.joints[:, 0]
-        upright = (motion.joints[:, 0, 2] > 0.88) & (trunk[:, 2] > 0.97 * np.linalg.norm(trunk, axis=-1))
+        upright = (motion.joints[:, 0, 2] > 0.88) & (
+            trunk[:, 2] > 0.97 * np.linalg.norm(trunk, axis=-1)
+        )
         heights = motion.joints[upright, 0, 2] - motion.joints[upright][:, hips, 2].mean(1)
         over.setdefault(motion.source, []).append(heights)
-    assert {"mhad", "cmu_fbx", "cmu_daz", "rocketbox", "snu_tiling", "snu_ys2010", "cmu69"} <= set(over)
+    assert {"mhad", "cmu_fbx", "cmu_daz", "rocketbox", "snu_tiling", "snu_ys2010", "cmu69"} <= set(
+        over
+    )
     for source, heights in over.items():
         of_all = np.concatenate(heights)
         assert len(of_all) > 100 and abs(np.median(of_all) + OFFSETS[hips[0]][2]) < 0.002, source
@@ -246,11 +295,20 @@ def test_the_pelvis_is_over_the_hips_alike_in_every_source(real_motions):
 
 
 def _made_up_folder(folder: Path, **more: list[tuple[dict[str, str], np.ndarray]]) -> Path:
-    """A folder with a body to train on and one held out, each of whom sits down twice; and ``more`` archives."""
+    """A folder with a body to train on and one held out, each of whom sits down twice; and ``more``
+    archives.
+    """
     folder.mkdir()
     for source, split in (("here", "train"), ("there", "test")):
-        info = {"licence": f"CC0 from {source}", "split": split, "subject": source, "category": "sit_down"}
-        clips = [(info | {"clip": f"{source} {seated}"}, _sit_down(seated)) for seated in (0.5, 0.6)]
+        info = {
+            "licence": f"CC0 from {source}",
+            "split": split,
+            "subject": source,
+            "category": "sit_down",
+        }
+        clips = [
+            (info | {"clip": f"{source} {seated}"}, _sit_down(seated)) for seated in (0.5, 0.6)
+        ]
         write_compact(folder / f"{source}.npz", clips)
     for source, clips in more.items():
         write_compact(folder / f"{source}.npz", clips)
@@ -278,15 +336,23 @@ def test_a_dataset_has_as_many_windows_as_were_asked_for(tmp_path, monkeypatch):
     assert _count(out) == [10, 5]
     described = json.loads((out / "dataset.json").read_text(encoding="utf-8"))
     assert described["windows"] == 15 and described["licences"] == {"CC0 from here": ["here"]}
-    kept = {name: (out / name).stat().st_mtime_ns for name in ("pool-0000.npz", "train.npz", "summary.txt")}
+    kept = {
+        name: (out / name).stat().st_mtime_ns
+        for name in ("pool-0000.npz", "train.npz", "summary.txt")
+    }
     first = np.load(out / "pool-0001.npz")["poses"]
     (out / "pool-0000.part.npz").write_bytes(b"of a run that was killed")
     p.prepare(folder, out, windows=32)
     assert _count(out) == [10, 10, 10, 2] and not list(out.glob("*.part.*"))
     assert kept == {name: (out / name).stat().st_mtime_ns for name in kept}
-    assert (np.load(out / "pool-0001.npz")["poses"][:5] == first).all(), "a shard that was too short begins as it did"
+    assert (np.load(out / "pool-0001.npz")["poses"][:5] == first).all(), (
+        "a shard that was too short begins as it did"
+    )
     assert json.loads((out / "dataset.json").read_text(encoding="utf-8"))["windows"] == 32
-    for asked, said in ({"windows": 15}, "begun with 32 windows"), ({"windows": 40, "seed": 1}, "begun with the seed 0"):
+    for asked, said in (
+        ({"windows": 15}, "begun with 32 windows"),
+        ({"windows": 40, "seed": 1}, "begun with the seed 0"),
+    ):
         with pytest.raises(InputError, match=said):
             p.prepare(folder, out, **asked)
     assert _count(out) == [10, 10, 10, 2]
@@ -305,8 +371,13 @@ def test_what_a_dataset_leaves_out_is_said_and_does_not_stop_it(tmp_path):
         cooks=[(known | {"clip": "stir", "category": "kitchen_mime"}, _sit_down())],
         hops=[(known | {"clip": "hop on", "category": "locomotion"}, _sit_down())],
         unstated=[({"clip": "walk"}, _sit_down())],
-        ui_prmd=[(known | {"clip": "squat down", "category": "sit-stand", "description": ""}, _sit_down()),
-                 (known | {"clip": "sit", "category": "sit-stand"}, _sit_down())],
+        ui_prmd=[
+            (
+                known | {"clip": "squat down", "category": "sit-stand", "description": ""},
+                _sit_down(),
+            ),
+            (known | {"clip": "sit", "category": "sit-stand"}, _sit_down()),
+        ],
     )
     (folder / "torn.npz").write_bytes((folder / "here.npz").read_bytes()[:-700])
     (folder / "torn.bvh").write_text("HIERARCHY", encoding="utf-8")
@@ -314,23 +385,33 @@ def test_what_a_dataset_leaves_out_is_said_and_does_not_stop_it(tmp_path):
     assert _count(out) == [4]
     summary = (out / "summary.txt").read_text(encoding="utf-8")
     for said in (
-        "torn.npz' cannot be read", "torn.bvh' is damaged", "'lies/tired' never stands upright",
+        "torn.npz' cannot be read",
+        "torn.bvh' is damaged",
+        "'lies/tired' never stands upright",
         "The clip 'sit' of 'ui_prmd' has arms that are not real, and none to borrow",
         "of the activity 'kitchen_mime', of which no windows are drawn (1 of the clips of cooks).",
         "whose name or description says 'hop' (1 of the clips of hops).",
         "or of no stated licence (1 of the clips of unstated).",
     ):
         assert said in summary, said
-    assert json.loads((out / "dataset.json").read_text(encoding="utf-8"))["licences"] == {"CC0 from here": ["here"]}
+    assert json.loads((out / "dataset.json").read_text(encoding="utf-8"))["licences"] == {
+        "CC0 from here": ["here"]
+    }
 
 
 def test_motion_that_is_too_short_for_a_window_is_no_endless_search(tmp_path):
     from dafnet_addon.data.prepare import prepare
 
     known = {"licence": "CC0", "subject": "a", "category": "standing"}
-    standing = np.repeat(_sit_down()[:1], 20, axis=0) + np.linspace(0, 0.8, 20)[:, None, None] * (1, 0, 0)
+    standing = np.repeat(_sit_down()[:1], 20, axis=0) + np.linspace(0, 0.8, 20)[:, None, None] * (
+        1,
+        0,
+        0,
+    )
     (tmp_path / "mocap").mkdir()
     for split in ("train", "test"):
-        write_compact(tmp_path / "mocap" / f"{split}.npz", [(known | {"clip": "a", "split": split}, standing)])
+        write_compact(
+            tmp_path / "mocap" / f"{split}.npz", [(known | {"clip": "a", "split": split}, standing)]
+        )
     with pytest.raises(InputError, match="no window could be drawn"):
         prepare(tmp_path / "mocap", tmp_path / "dataset", windows=4)

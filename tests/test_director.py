@@ -1,4 +1,6 @@
-"""The director: seats found on meshes and scans, ways round furniture, and that who is sent to a seat sits on it."""
+"""The director: seats found on meshes and scans, ways round furniture, and that who is sent to a
+seat sits on it.
+"""
 
 from itertools import pairwise
 from pathlib import Path
@@ -43,7 +45,9 @@ def test_surface_points_are_dense_and_on_the_surface():
     points = surface_points([block], 0.05)
     assert ((points >= -1e-9) & (points <= np.array([0.5, 0.3, 0.4]) + 1e-9)).all()
     top = points[points[:, 2] > 0.399, :2]
-    grid = np.stack(np.meshgrid(np.linspace(0, 0.5, 20), np.linspace(0, 0.3, 20)), -1).reshape(-1, 2)
+    grid = np.stack(np.meshgrid(np.linspace(0, 0.5, 20), np.linspace(0, 0.3, 20)), -1).reshape(
+        -1, 2
+    )
     assert np.linalg.norm(grid[:, None] - top, axis=-1).min(1).max() < 0.05
     assert surface_points([], 0.05).shape == (0, 3)
     field = height_field(points, np.zeros(2), np.array([1.0, 1.0]), 0.05)
@@ -64,10 +68,14 @@ def test_stools_and_benches_are_sat_on_from_where_one_comes():
     stool = [_box((-0.2, -0.2, 0.55), (0.2, 0.2, 0.6))]
     for towards, yaw in (((3.0, 0.3), -np.pi / 2), ((0.2, 3.0), 0.0)):
         found = seat_of(stool, np.array(towards))
-        assert not found.back and abs(found.yaw - yaw) < 0.05 and np.linalg.norm(found.position) < 0.05
+        assert (
+            not found.back and abs(found.yaw - yaw) < 0.05 and np.linalg.norm(found.position) < 0.05
+        )
     bench = [_box((-1.0, -0.25, 0.35), (1.0, 0.25, 0.4))]
     found = seat_of(bench, np.array([5.0, 2.0]))
-    assert abs(found.yaw) < 0.05 and abs(found.position[0]) < 0.05, "one looks across a bench, not along it"
+    assert abs(found.yaw) < 0.05 and abs(found.position[0]) < 0.05, (
+        "one looks across a bench, not along it"
+    )
     beside = seat_of(bench, np.array([5.0, 2.0]), near=np.array([0.9, 0.0]))
     assert 0.6 < beside.position[0] < 0.75
     bed = [_box((-1.0, -0.8, 0.2), (1.0, 0.8, 0.5))]
@@ -77,7 +85,9 @@ def test_stools_and_benches_are_sat_on_from_where_one_comes():
 def test_who_rests_over_a_seat_sits():
     chair = _chair()
     assert on_a_seat(chair, np.array([0.0, 0.0])) and not on_a_seat(chair, np.array([0.0, 0.6]))
-    assert not on_a_seat([_box((-1, -1, 0.9), (1, 1, 1.0))], np.zeros(2)) and not on_a_seat([], np.zeros(2))
+    assert not on_a_seat([_box((-1, -1, 0.9), (1, 1, 1.0))], np.zeros(2)) and not on_a_seat(
+        [], np.zeros(2)
+    )
 
 
 def test_what_nobody_can_sit_on_is_refused():
@@ -108,13 +118,17 @@ def test_ways_go_round_furniture():
     start, goal = np.array([-1.5, 0.0]), np.array([1.5, 0.0])
     via = way_round(wall, start, goal)
     points = np.array([start, *via, goal])
-    dense = np.concatenate([a + np.linspace(0, 1, 50)[:, None] * (b - a) for a, b in pairwise(points)])
+    dense = np.concatenate(
+        [a + np.linspace(0, 1, 50)[:, None] * (b - a) for a, b in pairwise(points)]
+    )
     away = np.linalg.norm(np.maximum(np.abs(dense) - [0.1, 1.5], 0.0), axis=1)
     assert away.min() > 0.2 and np.linalg.norm(np.diff(points, axis=0), axis=1).sum() < 5.2
     assert way_round(np.zeros((0, 3)), start, goal) == []
     rug, lamp = (surface_points([_box((-1, -1, z), (1, 1, z + 0.02))], 0.05) for z in (0.0, 2.0))
     assert way_round(np.concatenate([rug, lamp]), start, goal) == []
-    ring = [_box((-3, y, 0), (3, y + 0.1, 1)) for y in (-3.0, 3.0)] + [_box((x, -3, 0), (x + 0.1, 3, 1)) for x in (-3.0, 3.0)]
+    ring = [_box((-3, y, 0), (3, y + 0.1, 1)) for y in (-3.0, 3.0)] + [
+        _box((x, -3, 0), (x + 0.1, 3, 1)) for x in (-3.0, 3.0)
+    ]
     with pytest.raises(InputError, match="no way"):
         way_round(surface_points(ring, 0.05), np.zeros(2), np.array([5.0, 0.0]))
     with pytest.raises(InputError, match="already"):
@@ -127,7 +141,9 @@ def test_points_are_only_made_where_they_are_asked_for():
     far = _turned(_chair(), 0.0, (9.0, 9.0))
     found = surface_points([*chair, *wall, *far], 0.05, (low, high))
     assert len(found) and np.array_equal(found, surface_points(chair, 0.05))
-    assert surface_points([*wall, Mesh(np.zeros((0, 3)), np.zeros((0, 3), int))], 0.05, (low, high)).shape == (0, 3)
+    assert surface_points(
+        [*wall, Mesh(np.zeros((0, 3)), np.zeros((0, 3), int))], 0.05, (low, high)
+    ).shape == (0, 3)
 
 
 def test_far_ways_are_found_or_refused_in_seconds():
@@ -141,7 +157,9 @@ def test_far_ways_are_found_or_refused_in_seconds():
             way_round(surface_points(ring, 0.05), here, there)
     with pytest.raises(InputError, match="1,000 m away: is the scene's unit right"):
         walk_to(ring, Stop((0.0, 0.0), 0.0), Stop((1000.0, 0.0), 0.0))
-    assert process_time() - started < 20.0, "of the processor; a tenth of it where nothing else runs"
+    assert process_time() - started < 20.0, (
+        "of the processor; a tenth of it where nothing else runs"
+    )
     room = [_box((-0.02, -0.02, 0.0), (0.02, 0.02, 0.01))]
     with pytest.raises(InputError, match=r"The scene is 0\.04 m across: is its unit right"):
         walk_to(room, Stop((0.0, 0.0), 0.0), Stop((0.03, 0.0), 0.0))
@@ -160,9 +178,16 @@ def test_who_starts_inside_furniture_is_led_out_of_it():
 
 def test_who_is_sent_to_a_chair_behind_a_table_sits_on_it():
     chair = _turned(_chair(), np.pi, (0.0, 0.0))
-    table = [_box((-0.8, 1.4, 0.70), (0.8, 2.0, 0.75)), *(_box((x, 1.5, 0), (x + 0.05, 1.9, 0.7)) for x in (-0.7, 0.65))]
+    table = [
+        _box((-0.8, 1.4, 0.70), (0.8, 2.0, 0.75)),
+        *(_box((x, 1.5, 0), (x + 0.05, 1.9, 0.7)) for x in (-0.7, 0.65)),
+    ]
     found = seat_of(chair, towards=np.array([0.0, 4.0]))
-    way = walk_to([*chair, *table], Stop((0.0, 4.0), np.pi, 0.5), Stop(tuple(found.position), found.yaw, 3.0, seated=True))
+    way = walk_to(
+        [*chair, *table],
+        Stop((0.0, 4.0), np.pi, 0.5),
+        Stop(tuple(found.position), found.yaw, 3.0, seated=True),
+    )
     assert np.abs(np.diff(way.path.position, axis=0)).max() < 0.08
     inside = (np.abs(way.path.position[:, 0]) < 0.8) & (np.abs(way.path.position[:, 1] - 1.7) < 0.3)
     assert not inside.any()

@@ -14,7 +14,11 @@ from dafnet_addon.core.solids import Box, Mesh, Scene, box_distance
 
 FURNITURE = Path(__file__).resolve().parents[2] / "shared" / "data" / "furniture"
 MODELS = (
-    "painted_wooden_cabinet", "painted_wooden_cabinet_02", "painted_wooden_stool", "sofa_03", "wooden_bookshelf_worn",
+    "painted_wooden_cabinet",
+    "painted_wooden_cabinet_02",
+    "painted_wooden_stool",
+    "sofa_03",
+    "wooden_bookshelf_worn",
     "wooden_table_02",
 )
 GROUND = np.array([0.0, 0.0, 1.0, 0.0])
@@ -23,23 +27,35 @@ BETWEEN_NODES = 0.012
 
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 CUBE_FACES = {  # outward
-    "left": (0, 1, 3, 2), "right": (4, 6, 7, 5), "front": (0, 4, 5, 1), "back": (2, 3, 7, 6), "bottom": (0, 2, 6, 4),
+    "left": (0, 1, 3, 2),
+    "right": (4, 6, 7, 5),
+    "front": (0, 4, 5, 1),
+    "back": (2, 3, 7, 6),
+    "bottom": (0, 2, 6, 4),
     "top": (1, 5, 7, 3),
 }
 
 
 def box_mesh(half, center=(0, 0, 0), without=()):
     quads = [q for name, q in CUBE_FACES.items() if name not in without]
-    return CUBE * half + center, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
+    return CUBE * half + center, np.array(
+        [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
+    )
 
 
 def sphere_mesh(radius, rings=120, sectors=240):
     """About 57,000 triangles."""
-    polar, turn = np.meshgrid(np.linspace(0, np.pi, rings + 1), np.arange(sectors) * 2 * np.pi / sectors, indexing="ij")
-    vertices = radius * np.stack([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], axis=-1)
+    polar, turn = np.meshgrid(
+        np.linspace(0, np.pi, rings + 1), np.arange(sectors) * 2 * np.pi / sectors, indexing="ij"
+    )
+    vertices = radius * np.stack(
+        [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], axis=-1
+    )
     i, j = (k.ravel() for k in np.meshgrid(np.arange(rings), np.arange(sectors), indexing="ij"))
     a, b = i * sectors + j, i * sectors + (j + 1) % sectors
-    triangles = np.concatenate([np.stack([a, a + sectors, b], 1), np.stack([b, a + sectors, b + sectors], 1)])
+    triangles = np.concatenate(
+        [np.stack([a, a + sectors, b], 1), np.stack([b, a + sectors, b + sectors], 1)]
+    )
     return vertices.reshape(-1, 3), triangles
 
 
@@ -109,12 +125,15 @@ def test_overlapping_loose_parts_unite():
     centers = np.array([[0, 0, 0], [0.1, 0, 0.05], [0, 0, 0]])
     grid = build_grid(*joined(*(box_mesh(h, c) for h, c in zip(halves, centers, strict=True))))
     points = points_around([0.4, 0.4, 0.4])
-    exact = np.min([box_distance(points - c, h) for h, c in zip(halves, centers, strict=True)], axis=0)
+    exact = np.min(
+        [box_distance(points - c, h) for h, c in zip(halves, centers, strict=True)], axis=0
+    )
     found = grid.sample(points)
     outside = exact > 0
     np.testing.assert_allclose(found[outside], np.minimum(exact[outside], BAND), atol=BETWEEN_NODES)
     assert (found[exact < -BETWEEN_NODES] <= BETWEEN_NODES).all()
-    assert (found[exact < -BETWEEN_NODES] < 0).mean() > 0.97  # 0 on the faces that lie inside another part
+    # 0 on the faces that lie inside another part
+    assert (found[exact < -BETWEEN_NODES] < 0).mean() > 0.97
 
 
 def test_single_sided_board_is_a_thin_shell():
@@ -130,9 +149,18 @@ def test_thin_table_top_is_not_lost_between_nodes():
     half = np.array([0.6, 0.4, 0.006])
     points = points_around(half)
     for lift in (0.0, 0.003, 0.007, 0.011):
-        grid = build_grid(*joined(box_mesh(half, (0, 0, lift)), box_mesh([0.02, 0.02, 0.35], (0.3, 0.2, -0.36 + lift))))
+        grid = build_grid(
+            *joined(
+                box_mesh(half, (0, 0, lift)), box_mesh([0.02, 0.02, 0.35], (0.3, 0.2, -0.36 + lift))
+            )
+        )
         outside = points[points[:, 2] > 0] + [0, 0, lift]
-        assert_like(grid, outside, np.maximum(box_distance(outside - [0, 0, lift], half), -0.01), BETWEEN_NODES + 0.006)
+        assert_like(
+            grid,
+            outside,
+            np.maximum(box_distance(outside - [0, 0, lift], half), -0.01),
+            BETWEEN_NODES + 0.006,
+        )
 
 
 def test_box_without_a_bottom_is_solid():
@@ -149,7 +177,9 @@ def test_curved_open_sheet_is_a_thin_shell():
     bottom = np.stack([0.3 * np.cos(angle), 0.3 * np.sin(angle), 0 * angle - 0.4], axis=-1)
     vertices = np.concatenate([bottom, bottom * [1, 1, -1]])
     k = np.arange(39)
-    triangles = np.concatenate([np.stack([k, k + 1, k + 40], 1), np.stack([k + 1, k + 41, k + 40], 1)])
+    triangles = np.concatenate(
+        [np.stack([k, k + 1, k + 40], 1), np.stack([k + 1, k + 41, k + 40], 1)]
+    )
     assert (build_grid(vertices, triangles).values >= 0).all()
 
 
@@ -160,8 +190,12 @@ def test_room_in_one_mesh_is_not_full():
     rng = np.random.default_rng(1)
     air = rng.uniform([-3.7, -2.7, 0.0], [0.0, 2.7, 2.3], (2000, 3))
     assert (grid.sample(air) > 0.14).all()  # down to the floor itself
-    assert (grid.sample(rng.uniform([0.55, 0.75, 0.0], [1.45, 1.25, 0.75], (500, 3))) < grid.spacing / 2).all()
-    wall = np.stack([rng.uniform(-3, 3, 500), np.full(500, -3.0), rng.uniform(0.3, 2, 500)], axis=-1)
+    assert (
+        grid.sample(rng.uniform([0.55, 0.75, 0.0], [1.45, 1.25, 0.75], (500, 3))) < grid.spacing / 2
+    ).all()
+    wall = np.stack(
+        [rng.uniform(-3, 3, 500), np.full(500, -3.0), rng.uniform(0.3, 2, 500)], axis=-1
+    )
     assert (grid.sample(wall) < grid.spacing / 2 + 1e-6).all()
     assert grid.spacing < 0.05 and grid.values.nbytes < 30e6
 
@@ -181,7 +215,10 @@ def test_floors_slabs_and_rugs_are_not_seen(bottom, top):
     assert grid.sample(np.zeros(3)) == np.float32(BAND)
     assert (grid.sample(np.array([[1, 1, 0.0], [1, 1, 0.02], [1.1, 0.9, 0.4]])) < 0.011).all()
     assert build_grid(*floor, GROUND).sample(np.zeros(3)) == np.float32(BAND)
-    assert build_grid(*floor, np.array([0, 0, 1, 0.5])).sample(np.array([0, 0, top])) < BETWEEN_NODES  # as a table top
+    # as a table top
+    assert (
+        build_grid(*floor, np.array([0, 0, 1, 0.5])).sample(np.array([0, 0, top])) < BETWEEN_NODES
+    )
 
 
 def test_solid_that_stands_on_the_floor_is_full_down_to_it():
@@ -266,11 +303,16 @@ def test_what_lies_higher_than_the_floor_shares_one_grid_at_any_height():
     grids = [grid_of(Mesh(*box_mesh(half), matrix=matrix), 0.0) for matrix in matrices]
     assert grids[0] is grids[1] is grids[2]
     alone = build_grid(*box_mesh(half), np.array([0.0, 0.0, 1.0, 0.9]))
-    assert np.array_equal(grids[0].values, alone.values) and np.array_equal(grids[0].origin, alone.origin)
+    assert np.array_equal(grids[0].values, alone.values) and np.array_equal(
+        grids[0].origin, alone.origin
+    )
 
 
 def test_floor_is_measured_in_the_world():
-    slab = Mesh(*box_mesh([1, 0.1, 1]), matrix=np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 4.9], [0, 0, 0, 1.0]]))
+    slab = Mesh(
+        *box_mesh([1, 0.1, 1]),
+        matrix=np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 4.9], [0, 0, 0, 1.0]]),
+    )
     assert (grid_of(slab, 5.0).values == np.float32(BAND)).all()
     assert (grid_of(slab, 4.7).values < 0).any()
 
@@ -304,7 +346,9 @@ def test_scaled_scene_keeps_its_grids():
     points = points_around([0.4, 0.4, 0.4], 2000)
     small, full = after.solids[0].grid.sample(0.8 * points), before.solids[0].grid.sample(points)
     np.testing.assert_allclose(small, 0.8 * full, atol=1e-5)
-    np.testing.assert_allclose(rigid_split(after.solids[0].matrix)[0][:3, 3], 0.8 * mesh.matrix[:3, 3])
+    np.testing.assert_allclose(
+        rigid_split(after.solids[0].matrix)[0][:3, 3], 0.8 * mesh.matrix[:3, 3]
+    )
     np.testing.assert_allclose(after.solids[1].center, [0.8, 1.6, 2.4])
     np.testing.assert_allclose(after.solids[1].half_size, [0.08, 0.16, 0.24])
 
@@ -344,7 +388,9 @@ def test_real_furniture_has_exact_distances_at_nodes_and_close_ones_between(mode
 
 
 def test_real_furniture_is_solid_where_rays_say_so(model):
-    """Trimesh's rays, for each closed loose part; of the open planks and sheets they say nothing."""
+    """Trimesh's rays, for each closed loose part; of the open planks and sheets they say
+    nothing.
+    """
     grid = build_grid(model.vertices, model.faces)
     model.merge_vertices(merge_tex=True, merge_norm=True)
     parts = model.split(only_watertight=False, repair=False)
@@ -358,7 +404,9 @@ def test_real_furniture_is_solid_where_rays_say_so(model):
 
 
 def test_sofa_is_solid_where_the_bvh_tree_says_so():
-    """Parity of rays of mathutils' BVHTree in each closed loose part, of which the sofa is nearly all made."""
+    """Parity of rays of mathutils' BVHTree in each closed loose part, of which the sofa is nearly
+    all made.
+    """
     pytest.importorskip("bpy")
     trimesh = pytest.importorskip("trimesh")
     from mathutils import Vector
@@ -372,7 +420,8 @@ def test_sofa_is_solid_where_the_bvh_tree_says_so():
     model.merge_vertices(merge_tex=True, merge_norm=True)
     trees = [
         BVHTree.FromPolygons(part.vertices.tolist(), part.faces.tolist())
-        for part in model.split(only_watertight=False, repair=False) if part.is_watertight
+        for part in model.split(only_watertight=False, repair=False)
+        if part.is_watertight
     ]
 
     def crossings(tree, point, direction):
@@ -385,9 +434,12 @@ def test_sofa_is_solid_where_the_bvh_tree_says_so():
     points = rng.uniform(*model.bounds, (300, 3))
     directions = rng.normal(size=(5, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    inside = np.array([
-        any(sum(crossings(tree, p, d) % 2 for d in directions.tolist()) >= 3 for tree in trees) for p in points.tolist()
-    ])
+    inside = np.array(
+        [
+            any(sum(crossings(tree, p, d) % 2 for d in directions.tolist()) >= 3 for tree in trees)
+            for p in points.tolist()
+        ]
+    )
     found = grid.sample(points)
     clear = np.abs(found) > BETWEEN_NODES
     assert inside.any() and (~inside).any()
@@ -397,8 +449,20 @@ def test_sofa_is_solid_where_the_bvh_tree_says_so():
 @pytest.mark.parametrize("side", [100.0, 4000.0])
 def test_a_huge_slab_is_measured_coarsely_and_within_memory(side: float) -> None:
     corners = np.array([(x, y, z) for x in (0.0, side) for y in (0.0, side) for z in (0.0, 0.5)])
-    sides = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4),
-             (1, 5, 7), (1, 7, 3)]
+    sides = [
+        (0, 1, 3),
+        (0, 3, 2),
+        (4, 6, 7),
+        (4, 7, 5),
+        (0, 4, 5),
+        (0, 5, 1),
+        (2, 3, 7),
+        (2, 7, 6),
+        (0, 2, 6),
+        (0, 6, 4),
+        (1, 5, 7),
+        (1, 7, 3),
+    ]
     tracemalloc.start()
     try:
         grid = build_grid(corners, np.array(sides))
@@ -418,20 +482,46 @@ def _soup(count, across, spread):
 
 
 def _collinear():
-    return np.c_[np.linspace(0, 1, 300), np.zeros((300, 2))], np.random.default_rng(0).integers(0, 300, (2000, 3))
+    return np.c_[np.linspace(0, 1, 300), np.zeros((300, 2))], np.random.default_rng(0).integers(
+        0, 300, (2000, 3)
+    )
 
 
 def _needles():
-    ends = np.random.default_rng(0).normal(size=(3, 2000, 3)) + np.array([0.0, 0.0, 1e4])[:, None, None] * (1, 0, 0)
+    ends = np.random.default_rng(0).normal(size=(3, 2000, 3)) + np.array([0.0, 0.0, 1e4])[
+        :, None, None
+    ] * (1, 0, 0)
     return ends.reshape(-1, 3), np.arange(6000).reshape(3, 2000).T
 
 
-@pytest.mark.parametrize("mesh", [
-    _collinear(), _needles(), _soup(20_000, 0.0, 100.0), _soup(200, 1e8, 1.0), _soup(50_000, 0.0, 3.0),
-    (np.array([[0, 0, 0], [1e8, 0, 0], [1e8, 1e8, 0], [0, 1e8, 0]]), np.array([[0, 1, 2], [0, 2, 3]])),
-    (np.array([[0, 0, 0], [1e8, 0, 0], [1e8, 1e-3, 0]]), np.array([[0, 1, 2]])), (np.zeros((5, 3)), np.array([[0, 1, 2]] * 9)),
-    (box_mesh([0.3, 0.3, 0.3])[0] + 1e8, box_mesh([0.3, 0.3, 0.3])[1]),
-], ids=["collinear", "needles", "soup", "far apart", "dense", "sheet", "needle", "points", "far away"])
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        _collinear(),
+        _needles(),
+        _soup(20_000, 0.0, 100.0),
+        _soup(200, 1e8, 1.0),
+        _soup(50_000, 0.0, 3.0),
+        (
+            np.array([[0, 0, 0], [1e8, 0, 0], [1e8, 1e8, 0], [0, 1e8, 0]]),
+            np.array([[0, 1, 2], [0, 2, 3]]),
+        ),
+        (np.array([[0, 0, 0], [1e8, 0, 0], [1e8, 1e-3, 0]]), np.array([[0, 1, 2]])),
+        (np.zeros((5, 3)), np.array([[0, 1, 2]] * 9)),
+        (box_mesh([0.3, 0.3, 0.3])[0] + 1e8, box_mesh([0.3, 0.3, 0.3])[1]),
+    ],
+    ids=[
+        "collinear",
+        "needles",
+        "soup",
+        "far apart",
+        "dense",
+        "sheet",
+        "needle",
+        "points",
+        "far away",
+    ],
+)
 def test_no_mesh_takes_long_or_much_memory(mesh):
     tracemalloc.start()
     started = process_time()
@@ -444,7 +534,10 @@ def test_no_mesh_takes_long_or_much_memory(mesh):
 
 
 def test_of_a_vast_mesh_the_unit_is_asked_for():
-    plane = np.array([[-500, -500, 0.3], [500, -500, 0.3], [500, 500, 0.3], [-500, 500, 0.3]]), np.array([[0, 1, 2], [0, 2, 3]])
+    plane = (
+        np.array([[-500, -500, 0.3], [500, -500, 0.3], [500, 500, 0.3], [-500, 500, 0.3]]),
+        np.array([[0, 1, 2], [0, 2, 3]]),
+    )
     _, (warning,) = prepared(Scene([Mesh(*plane, name="Ground")]), 0.0)
     assert warning.startswith("'Ground' is 1,0") and "is its unit right?" in warning
 

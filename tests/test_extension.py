@@ -1,6 +1,8 @@
-"""The extension's zip: Blender's own tool builds and validates it, it holds what an animator needs, installs and goes.
+"""The extension's zip: Blender's own tool builds and validates it, it holds what an animator needs,
+installs and goes.
 
-Also the rules that every module keeps: the core does not know Blender, and nothing of the product imports upward.
+Also the rules that every module keeps: the core does not know Blender, and nothing of the product
+imports upward.
 """
 
 import ast
@@ -15,8 +17,18 @@ import pytest
 from said import without_blenders
 
 ROOT = Path(__file__).absolute().parents[1]
-SHIPPED = {"__init__.py", "blender_manifest.toml", "dafnet_addon", "operators", "panels", "weights_stub", "LICENSE",
-           "LICENSE-WEIGHTS.md", "README.md", "docs"}
+SHIPPED = {
+    "__init__.py",
+    "blender_manifest.toml",
+    "dafnet_addon",
+    "operators",
+    "panels",
+    "weights_stub",
+    "LICENSE",
+    "LICENSE-WEIGHTS.md",
+    "README.md",
+    "docs",
+}
 LEFT_OUT = {"model", "data", "training", "baselines"}
 
 LIFE = """
@@ -46,9 +58,13 @@ sys.stdout.flush(); sys.stderr.flush(); os._exit(0)
 def tool(*arguments: str | Path) -> str:
     """Run Blender's extension tool."""
     bpy = pytest.importorskip("bpy")
-    programs = (Path(folder, "addons_core/bl_pkg/cli/blender_ext.py") for folder in bpy.utils.script_paths())
+    programs = (
+        Path(folder, "addons_core/bl_pkg/cli/blender_ext.py") for folder in bpy.utils.script_paths()
+    )
     program = next(path for path in programs if path.exists())
-    done = subprocess.run([sys.executable, program, *arguments], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, program, *arguments], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -70,10 +86,16 @@ def test_the_zip_holds_what_an_animator_needs(zipped: Path) -> None:
     assert {name.parts[0] for name in names} <= SHIPPED
     assert not {name.parts[1] for name in names if name.parts[0] == "dafnet_addon"} & LEFT_OUT
     assert {name.parts[1] for name in names if name.parts[0] == "docs"} == {"guide.md", "guide"}
-    assert not [name for name in names if "__pycache__" in name.parts or name.suffix in {".pyc", ".zip", ".blend"}]
+    assert not [
+        name
+        for name in names
+        if "__pycache__" in name.parts or name.suffix in {".pyc", ".zip", ".blend"}
+    ]
     shipped = {str(name) for name in names}
     for folder in ("rig_maps", "presets/dafnet"):
-        files = {path for path in (ROOT / "dafnet_addon/blender" / folder).iterdir() if path.is_file()}
+        files = {
+            path for path in (ROOT / "dafnet_addon/blender" / folder).iterdir() if path.is_file()
+        }
         assert files and {str(path.relative_to(ROOT)) for path in files} <= shipped
     for package in ("dafnet_addon/core", "dafnet_addon/blender", "operators", "panels"):
         assert {str(path.relative_to(ROOT)) for path in (ROOT / package).glob("*.py")} <= shipped
@@ -91,13 +113,17 @@ def test_it_installs_generates_and_goes_without_a_word(zipped: Path, tmp_path: P
         command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-exit-code", "1"]
         command += ["--python", script, "--", zipped]
     environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=tmp_path)
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, env=environment, cwd=tmp_path
+    )
     assert done.returncode == 0 and "lived" in done.stdout, done.stdout + done.stderr
     assert without_blenders(done.stderr) == ""
 
 
 def imports(path: Path, at_load_only: bool = False) -> set[str]:
-    """Names of imported modules, relative ones with their dots; all, or those that loading the module imports."""
+    """Names of imported modules, relative ones with their dots; all, or those that loading the
+    module imports.
+    """
     tree = ast.parse(path.read_text(encoding="utf-8"))
     names: set[str] = set()
     for node in tree.body if at_load_only else ast.walk(tree):
@@ -121,7 +147,9 @@ def test_the_core_needs_numpy_only(path: Path) -> None:
 LOWER = ("dafnet_addon/core", "dafnet_addon/model", "dafnet_addon/data", "dafnet_addon/training")
 
 
-@pytest.mark.parametrize("path", modules(*LOWER), ids=lambda path: f"{path.parent.name}/{path.name}")
+@pytest.mark.parametrize(
+    "path", modules(*LOWER), ids=lambda path: f"{path.parent.name}/{path.name}"
+)
 def test_nothing_below_blender_imports_it_or_reaches_out_of_the_package(path: Path) -> None:
     depth = len(path.relative_to(ROOT / "dafnet_addon").parts)
     for name in imports(path):
@@ -130,8 +158,11 @@ def test_nothing_below_blender_imports_it_or_reaches_out_of_the_package(path: Pa
         assert not re.match(r"\.+(blender|cli)\b", name), name
 
 
-@pytest.mark.parametrize("path", [ROOT / "__init__.py", *modules("dafnet_addon/blender", "operators", "panels")],
-                         ids=lambda path: f"{path.parent.name}/{path.name}")
+@pytest.mark.parametrize(
+    "path",
+    [ROOT / "__init__.py", *modules("dafnet_addon/blender", "operators", "panels")],
+    ids=lambda path: f"{path.parent.name}/{path.name}",
+)
 def test_the_extension_imports_itself_relatively(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert "dafnet_addon" not in {name.split(".")[0] for name in imports(path)}
@@ -142,11 +173,18 @@ def test_the_extension_imports_itself_relatively(path: Path) -> None:
 def test_what_is_translated_is_said_somewhere() -> None:
     """Every word of the translation tables is one that the add-on shows."""
     sources = "\n".join(
-        file.read_text(encoding="utf-8") for folder in ("operators", "panels", "dafnet_addon/blender")
-        for file in (ROOT / folder).glob("*.py") if file.name != "translations.py"
+        file.read_text(encoding="utf-8")
+        for folder in ("operators", "panels", "dafnet_addon/blender")
+        for file in (ROOT / folder).glob("*.py")
+        if file.name != "translations.py"
     )
     tables = ast.parse((ROOT / "dafnet_addon/blender/translations.py").read_text(encoding="utf-8"))
-    words = [key.value for node in ast.walk(tables) if isinstance(node, ast.Dict) for key in node.keys
-             if isinstance(key, ast.Constant) and key.value != "de_DE"]
+    words = [
+        key.value
+        for node in ast.walk(tables)
+        if isinstance(node, ast.Dict)
+        for key in node.keys
+        if isinstance(key, ast.Constant) and key.value != "de_DE"
+    ]
     assert len(words) > 50
     assert not [word for word in words if f'"{word}"' not in sources]

@@ -15,7 +15,9 @@ Image = pytest.importorskip("PIL.Image")
 SCRIPT = Path(__file__).parents[1] / "benchmarks" / "figures.py"
 
 
-def test_figure_11_is_drawn_and_its_mannequins_end_at_different_heights(blender: ModuleType, tmp_path: Path) -> None:
+def test_figure_11_is_drawn_and_its_mannequins_end_at_different_heights(
+    blender: ModuleType, tmp_path: Path
+) -> None:
     figures = runpy.run_path(str(SCRIPT))
     progress: list[float] = []
     files = figures["draw"](tmp_path / "new", None, {}, ["11"], progress.append, scale=0.25)
@@ -26,10 +28,14 @@ def test_figure_11_is_drawn_and_its_mannequins_end_at_different_heights(blender:
         pixels = np.asarray(picture.convert("RGB"), dtype=float)
     heights = figures["HEIGHTS"]
     columns = np.array_split(pixels[: picture.height * 3 // 4], len(heights), axis=1)
-    assert all(column.std(axis=(0, 1)).max() > 10.0 for column in columns), "there is somebody in every column"
+    assert all(column.std(axis=(0, 1)).max() > 10.0 for column in columns), (
+        "there is somebody in every column"
+    )
 
     chosen = heights[::2]
-    pelvis = np.array([motion.joints[-15, 0, 2] for motion in figures["seated_at"](load_weights(), chosen)])
+    pelvis = np.array(
+        [motion.joints[-15, 0, 2] for motion in figures["seated_at"](load_weights(), chosen)]
+    )
     assert (np.diff(pelvis) > 0.05).all(), "higher seats, higher pelvises"
     assert np.abs(pelvis - chosen - SEAT_TO_PELVIS).max() < 0.08
 

@@ -32,7 +32,9 @@ def test_a_file_is_replaced_in_one_step(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("failure", [RuntimeError, KeyboardInterrupt, InputError])
-def test_what_fails_leaves_the_old_file_and_nothing_else(tmp_path: Path, failure: type[BaseException]) -> None:
+def test_what_fails_leaves_the_old_file_and_nothing_else(
+    tmp_path: Path, failure: type[BaseException]
+) -> None:
     file = tmp_path / "out.txt"
     file.write_bytes(b"old")
     with pytest.raises(failure), whole_file(file) as part:
@@ -81,12 +83,16 @@ def _left_by(process: int, host: str | None = None) -> str:
 
 
 def test_what_killed_runs_left_is_removed_and_no_more(tmp_path: Path) -> None:
-    """Killed while it writes: what it leaves is no output, and the next run removes it. What others write stays."""
+    """Killed while it writes: what it leaves is no output, and the next run removes it. What others
+    write stays.
+    """
     code = (
-        "import os, signal, sys; from pathlib import Path; from dafnet_addon.core.files import whole_file\n"
+        "import os, signal, sys; from pathlib import Path; from dafnet_addon.core.files import "
+        "whole_file\n"
         "with whole_file(Path(sys.argv[1])) as part:\n"
         "    part.write_bytes(b'half'); part.with_name(part.name + '@').write_bytes(b'half')\n"
-        "    os.kill(os.getpid(), signal.SIGKILL if hasattr(signal, 'SIGKILL') else signal.SIGTERM)\n"
+        "    os.kill(os.getpid(), signal.SIGKILL if hasattr(signal, 'SIGKILL') else "
+        "signal.SIGTERM)\n"
     )
     file = tmp_path / "out.blend"
     killed = subprocess.run([sys.executable, "-c", code, str(file)], cwd=ROOT)
@@ -94,7 +100,12 @@ def test_what_killed_runs_left_is_removed_and_no_more(tmp_path: Path) -> None:
     assert not [each for each in tmp_path.iterdir() if each.suffix == ".blend"]
 
     running = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
-    stay = [_left_by(running.pid), _left_by(running.pid, "elsewhere"), _left_by(1 << 22, "elsewhere"), ".dafnet-mine.part"]
+    stay = [
+        _left_by(running.pid),
+        _left_by(running.pid, "elsewhere"),
+        _left_by(1 << 22, "elsewhere"),
+        ".dafnet-mine.part",
+    ]
     for name in stay:
         (tmp_path / name).write_bytes(b"")
     (tmp_path / _left_by(os.getpid())).write_bytes(b"of a process that had this one's number")
@@ -105,14 +116,18 @@ def test_what_killed_runs_left_is_removed_and_no_more(tmp_path: Path) -> None:
     assert names(tmp_path) == sorted([*stay, "out.blend"])
 
 
-def test_a_disk_that_refuses_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_refuses_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file = tmp_path / "out.txt"
 
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
     def open_elsewhere(*_: object) -> None:
-        raise PermissionError(13, "The process cannot access the file because it is being used by another process")
+        raise PermissionError(
+            13, "The process cannot access the file because it is being used by another process"
+        )
 
     for refusal, words in ((full, "No space left"), (open_elsewhere, "close it in other programs")):
         monkeypatch.setattr(os, "replace", refusal)

@@ -1,4 +1,6 @@
-"""Furniture found in the motion: what the body uses, pieces that fit it, nothing that cuts it; and contacts."""
+"""Furniture found in the motion: what the body uses, pieces that fit it, nothing that cuts it; and
+contacts.
+"""
 
 import numpy as np
 import pytest
@@ -19,7 +21,10 @@ from dafnet_addon.data.uses import lying, reaching, stroking, working
 from dafnet_addon.data.windows import motion_of
 
 FEET = [joint(side + part) for side in ("left_", "right_") for part in ("ankle", "foot")]
-TORSO = [joint(name) for name in ("spine1", "spine2", "spine3", "neck", "head", "left_shoulder", "right_shoulder")]
+TORSO = [
+    joint(name)
+    for name in ("spine1", "spine2", "spine3", "neck", "head", "left_shoulder", "right_shoulder")
+]
 
 
 def _ease(frames: int, start: int, length: int = 30) -> np.ndarray:
@@ -50,7 +55,9 @@ def _seated(frames: int = 120, pelvis: float = 0.55, down: int = 20) -> np.ndarr
 
 
 def _hand_to(joints: np.ndarray, side: str, wrist: np.ndarray) -> np.ndarray:
-    """The motion with one wrist at ``wrist`` (T, 3), the elbow by two-bone geometry, hanging below the line."""
+    """The motion with one wrist at ``wrist`` (T, 3), the elbow by two-bone geometry, hanging below
+    the line.
+    """
     out = joints.copy()
     shoulder = joints[:, joint(side + "shoulder")]
     line = wrist - shoulder
@@ -59,7 +66,9 @@ def _hand_to(joints: np.ndarray, side: str, wrist: np.ndarray) -> np.ndarray:
     along = (0.26**2 - 0.25**2 + far**2) / (2 * far)
     down = np.array([0.0, 0.0, -1.0]) - line * (-line[:, 2:] / far**2)
     down /= np.linalg.norm(down, axis=-1, keepdims=True)
-    out[:, joint(side + "elbow")] = shoulder + line / far * along + down * np.sqrt(np.maximum(0.26**2 - along**2, 0.0))
+    out[:, joint(side + "elbow")] = (
+        shoulder + line / far * along + down * np.sqrt(np.maximum(0.26**2 - along**2, 0.0))
+    )
     out[:, joint(side + "wrist")] = wrist
     return out
 
@@ -78,7 +87,10 @@ def _at_board() -> np.ndarray:
     """The right wrist writes on the plane y = 0.35, from 1.2 to 1.5 m high."""
     joints = _standing()
     t = np.arange(len(joints)) / 30.0
-    wrist = np.stack([0.15 + 0.12 * np.sin(2.0 * t), np.full(len(t), 0.35), 1.35 + 0.12 * np.sin(5.0 * t)], axis=-1)
+    wrist = np.stack(
+        [0.15 + 0.12 * np.sin(2.0 * t), np.full(len(t), 0.35), 1.35 + 0.12 * np.sin(5.0 * t)],
+        axis=-1,
+    )
     return _hand_to(joints, "right_", wrist)
 
 
@@ -108,8 +120,13 @@ def _turned(joints: np.ndarray, yaw: float) -> np.ndarray:
 
 
 MOTIONS = {
-    "sits": _seated, "seat and desk": _at_desk, "table": lambda: _at_desk(False), "board": _at_board, "shelf": _reach,
-    "bed": _lies, "walks": lambda: _standing(walk=4.0),
+    "sits": _seated,
+    "seat and desk": _at_desk,
+    "table": lambda: _at_desk(False),
+    "board": _at_board,
+    "shelf": _reach,
+    "bed": _lies,
+    "walks": lambda: _standing(walk=4.0),
 }
 
 
@@ -123,11 +140,17 @@ def test_no_piece_cuts_the_swept_body(name, yaw):
         if boxes is None or not len(boxes):
             continue
         rooms += 1
-        assert (boxes[:, 3:6] > 0).all() and (boxes[:, 2] - boxes[:, 5] > -1e-9).all(), "nothing reaches under the floor"
+        assert (boxes[:, 3:6] > 0).all() and (boxes[:, 2] - boxes[:, 5] > -1e-9).all(), (
+            "nothing reaches under the floor"
+        )
         # Beds are soft: who lies sinks in.
-        assert distances(boxes, joints[:, FEET].reshape(-1, 3)).min() > (-0.06 if name == "bed" else -0.03)
+        assert distances(boxes, joints[:, FEET].reshape(-1, 3)).min() > (
+            -0.06 if name == "bed" else -0.03
+        )
         trunk = distances(boxes, joints[:, TORSO].reshape(-1, 3)).min()
-        assert trunk > (-0.11 if name == "bed" else 0.03), "a joint of the trunk never comes this near"
+        assert trunk > (-0.11 if name == "bed" else 0.03), (
+            "a joint of the trunk never comes this near"
+        )
         assert distances(boxes, joints[:, :1].reshape(-1, 3)).min() > 0.0
     assert rooms >= 6
 
@@ -164,9 +187,12 @@ def test_desk_top_lies_under_the_wrists_and_beside_the_seat():
                 continue
             tops = boxes[:, 2] + boxes[:, 5]
             wrists = np.median(joints[:, [joint("left_wrist"), joint("right_wrist")]], axis=0)
-            below = [i for i, row in enumerate(boxes) if 0.015 <= lowest - tops[i] <= 0.055 and (
-                distances(row[None], wrists * (1, 1, 0) + (0, 0, tops[i] - 0.01)) < 0
-            ).all()]
+            below = [
+                i
+                for i, row in enumerate(boxes)
+                if 0.015 <= lowest - tops[i] <= 0.055
+                and (distances(row[None], wrists * (1, 1, 0) + (0, 0, tops[i] - 0.01)) < 0).all()
+            ]
             found += bool(below)
         assert found >= 7
 
@@ -225,15 +251,30 @@ def test_bending_down_is_no_lying():
     joints = _standing()
     trunk = [j for j in range(22) if j not in (0, 1, 2, 4, 5, 7, 8, 10, 11)]
     offset = joints[:, trunk] - joints[:, :1]
-    joints[:, trunk] = joints[:, :1] + np.stack([offset[..., 0], offset[..., 2], 0.1 * offset[..., 2]], axis=-1)
+    joints[:, trunk] = joints[:, :1] + np.stack(
+        [offset[..., 0], offset[..., 2], 0.1 * offset[..., 2]], axis=-1
+    )
     assert not lying(joints)
 
 
 def test_bowing_on_a_seat_is_no_lying():
     joints = _seated(down=-40)
-    upper = [joint(name) for name in ("spine1", "spine2", "spine3", "neck", "head", "left_shoulder", "right_shoulder")]
+    upper = [
+        joint(name)
+        for name in (
+            "spine1",
+            "spine2",
+            "spine3",
+            "neck",
+            "head",
+            "left_shoulder",
+            "right_shoulder",
+        )
+    ]
     offset = joints[:, upper] - joints[:, :1]
-    joints[:, upper] = joints[:, :1] + np.stack([offset[..., 0], offset[..., 2], 0.2 * offset[..., 2]], axis=-1)
+    joints[:, upper] = joints[:, :1] + np.stack(
+        [offset[..., 0], offset[..., 2], 0.2 * offset[..., 2]], axis=-1
+    )
     assert not lying(joints)
 
 
@@ -242,7 +283,9 @@ def test_who_sits_on_the_edge_and_lies_down_has_one_bed():
     place = sits[-1, 0]
     lies = _turned(_lies(0.55, 60), 0.0)
     lies += place - lies[0, 0] + np.array([0.0, -0.2, -0.02])
-    legs = [joint(side + part) for side in ("left_", "right_") for part in ("knee", "ankle", "foot")]
+    legs = [
+        joint(side + part) for side in ("left_", "right_") for part in ("knee", "ankle", "foot")
+    ]
     share = _ease(20, 0, 20)[:, None, None]
     over = sits[-1] * (1 - share) + lies[0] * share
     over[:, legs, 2] += 0.15 * np.sin(np.pi * share[..., 0])  # the feet clear the edge
@@ -290,16 +333,25 @@ def test_some_random_pieces_stand_in_the_way():
 
 def test_contacts_of_known_motion():
     joints = _seated(frames=150, down=40)
-    joints = _hand_to(joints, "left_", np.median(joints[100:, joint("left_wrist")], axis=0) + np.where(
-        np.arange(150)[:, None] < 100, joints[:, joint("left_wrist")] - joints[-1, joint("left_wrist")], (0.0, 0.2, 0.15)
-    ))
+    joints = _hand_to(
+        joints,
+        "left_",
+        np.median(joints[100:, joint("left_wrist")], axis=0)
+        + np.where(
+            np.arange(150)[:, None] < 100,
+            joints[:, joint("left_wrist")] - joints[-1, joint("left_wrist")],
+            (0.0, 0.2, 0.15),
+        ),
+    )
     touch = contacts(joints)
     assert touch.shape == (150, len(CONTACTS)) and touch.dtype == bool
     assert touch[:, :2].all(), "the feet never leave the floor"
     pelvis = touch[:, CONTACTS.index("pelvis")]
     assert not pelvis[:60].any() and pelvis[80:].all()
     left, right = touch[:, CONTACTS.index("left_hand")], touch[:, CONTACTS.index("right_hand")]
-    assert not left[:90].any() and left[110:].all() and not right.any(), "the hanging hand touches nothing"
+    assert not left[:90].any() and left[110:].all() and not right.any(), (
+        "the hanging hand touches nothing"
+    )
 
 
 def test_contacts_of_a_step_and_of_noise():
@@ -315,9 +367,17 @@ def test_contacts_of_a_step_and_of_noise():
 
 def test_report_counts_what_fits_and_why_not():
     sits = motion_of("sits", "made", "0", "sit-stand", _seated(150, down=60))
-    moments = {"rest": (np.array([[0, 165]]), np.ones(1)), "on the way": (np.array([[0, 60]]), np.ones(1))}
-    head, rest, on_the_way = fit_report([sits], moments, np.random.default_rng(0), count=10).splitlines()
+    moments = {
+        "rest": (np.array([[0, 165]]), np.ones(1)),
+        "on the way": (np.array([[0, 60]]), np.ones(1)),
+    }
+    head, rest, on_the_way = fit_report(
+        [sits], moments, np.random.default_rng(0), count=10
+    ).splitlines()
     columns = head.split()
-    assert columns[:6] == ["moments", "of", "used", "no", "seat", "no"] and rest.split()[:2] == ["rest", "10"]
+    assert columns[:6] == ["moments", "of", "used", "no", "seat", "no"] and rest.split()[:2] == [
+        "rest",
+        "10",
+    ]
     assert "10/10" in rest, "a seat for every one of the ten"
     assert on_the_way.split()[3:7] == ["0", "0", "0", "10"], "all are cut off half-way down"

@@ -37,22 +37,35 @@ def turn(axis: str, angle: np.ndarray) -> np.ndarray:
 def waves(rng: np.random.Generator, low: float, high: float) -> np.ndarray:
     """Smooth random angles (FRAMES,) between two bounds in degrees."""
     time = np.arange(FRAMES) / 30.0
-    wave = sum(np.sin(2 * np.pi * (rng.uniform(0.1, 0.5) * time + rng.uniform())) for _ in range(3)) / 3.0
+    wave = (
+        sum(np.sin(2 * np.pi * (rng.uniform(0.1, 0.5) * time + rng.uniform())) for _ in range(3))
+        / 3.0
+    )
     return np.radians(low + (high - low) * (wave + 1.0) / 2.0)
 
 
 def moving_body(seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Random smooth motion within a person's joint limits: local frames (FRAMES, 22, 3, 3), pelvis (FRAMES, 3)."""
+    """Random smooth motion within a person's joint limits: local frames (FRAMES, 22, 3, 3), pelvis
+    (FRAMES, 3).
+    """
     rng = np.random.default_rng(seed)
     local = np.broadcast_to(np.eye(3), (FRAMES, 22, 3, 3)).copy()
     local[:, 0] = turn("z", waves(rng, -180, 180)) @ turn("x", waves(rng, -30, 30))
     for j in (3, 6, 9, 12, 13, 14):
-        local[:, j] = turn("z", waves(rng, -12, 12)) @ turn("x", waves(rng, -12, 12)) @ turn("y", waves(rng, -12, 12))
+        local[:, j] = (
+            turn("z", waves(rng, -12, 12))
+            @ turn("x", waves(rng, -12, 12))
+            @ turn("y", waves(rng, -12, 12))
+        )
     for side, shoulder, elbow, hip, knee in ((-1, 16, 18, 1, 4), (1, 17, 19, 2, 5)):
         raised, forward, twisted = waves(rng, -20, 80), waves(rng, -40, 40), waves(rng, -50, 50)
         local[:, shoulder] = turn("y", side * raised) @ turn("z", forward) @ turn("x", twisted)
         local[:, elbow] = turn("z", side * waves(rng, 25, 120))
-        local[:, hip] = turn("x", waves(rng, -20, 90)) @ turn("z", waves(rng, -25, 25)) @ turn("y", waves(rng, -20, 20))
+        local[:, hip] = (
+            turn("x", waves(rng, -20, 90))
+            @ turn("z", waves(rng, -25, 25))
+            @ turn("y", waves(rng, -20, 20))
+        )
         local[:, knee] = turn("x", -waves(rng, 25, 110))
     for j in (7, 8):
         local[:, j] = turn("x", waves(rng, -30, 20))
@@ -159,17 +172,25 @@ def test_head_and_hands_follow_their_rotation_where_given() -> None:
     asked = np.broadcast_to(yaw_matrix(np.radians(30.0)), (4, 3, 3)).copy()
     asked[2:] = np.nan
     left = np.stack([np.array([0.0, 1, 0]), np.array([-1.0, 0, 0]), np.array([0.0, 0, 1])], axis=-1)
-    right = np.stack([np.array([-1.0, 0, 0]), np.array([0.0, 1, 0]), np.array([0.0, 0, -1])], axis=-1)
+    right = np.stack(
+        [np.array([-1.0, 0, 0]), np.array([0.0, 1, 0]), np.array([0.0, 0, -1])], axis=-1
+    )
     known = np.array([1.0, 1.0, 0.0, 0.0])
     fitted = fit(joints)[1]
-    frames = turned(fitted, {
-        "head": Turn(asked, known), "hand_left": Turn(np.tile(left, (4, 1, 1)), np.ones(4)),
-        "hand_right": Turn(2.0 * np.tile(right, (4, 1, 1)), np.ones(4)),
-    })
+    frames = turned(
+        fitted,
+        {
+            "head": Turn(asked, known),
+            "hand_left": Turn(np.tile(left, (4, 1, 1)), np.ones(4)),
+            "hand_right": Turn(2.0 * np.tile(right, (4, 1, 1)), np.ones(4)),
+        },
+    )
     assert np.allclose(frames[:2, 15], asked[:2]) and np.allclose(frames[2:, 15], frames[2:, 12])
     assert np.allclose(frames[:, 20], np.eye(3))
-    assert np.allclose(rotate(frames[:, 21], np.array([1.0, 0, 0])), [0, 1, 0])  # right fingers: rest +x, asked +y
-    assert np.allclose(rotate(frames[:, 21], np.array([0.0, 0, 1])), [0, 0, -1])  # back of the hand: down
+    # right fingers: rest +x, asked +y
+    assert np.allclose(rotate(frames[:, 21], np.array([1.0, 0, 0])), [0, 1, 0])
+    # back of the hand: down
+    assert np.allclose(rotate(frames[:, 21], np.array([0.0, 0, 1])), [0, 0, -1])
     before, after = (forward_kinematics(each, joints[:, 0]) for each in (fitted, frames))
     assert np.allclose(before, after), "no joint moves"
 
@@ -203,7 +224,9 @@ def test_two_bone_reaches_bends_and_clamps() -> None:
     side = np.cross(target - root, middle - root)
     assert ((side * normal).sum(-1)[reachable] > 0).all()  # on the pole's side
     far = two_bone(np.zeros(3), np.array([0.0, 5, 0]), np.array([0.0, 1, 1]), 0.3, 0.2)
-    assert np.allclose(far[1], [0, 0.5, 0], atol=1e-6) and np.allclose(far[0], [0, 0.3, 0], atol=1e-5)
+    assert np.allclose(far[1], [0, 0.5, 0], atol=1e-6) and np.allclose(
+        far[0], [0, 0.3, 0], atol=1e-5
+    )
 
 
 def test_two_bone_where_the_pole_says_nothing() -> None:
@@ -251,7 +274,10 @@ def test_where_a_change_changes_nothing_the_stride_goes_on() -> None:
 def test_changes_that_follow_at_once_do_not_pop() -> None:
     time, ease = np.arange(60), smoothstep(np.arange(1, 11) / 11)
     angle = np.select([time < 30, time < 34], [0.0, 1.2], -0.8)
-    changes = [(30, ease, _turning(np.zeros(10), np.ones(10))), (34, ease, _turning(np.full(10, 1.2), np.ones(10)))]
+    changes = [
+        (30, ease, _turning(np.zeros(10), np.ones(10))),
+        (34, ease, _turning(np.full(10, 1.2), np.ones(10))),
+    ]
     out = _arm(come_over(_turning(angle, np.ones(60)), changes))
     assert np.abs(np.diff(out)).max() < 0.35 and np.allclose(out[44:], -0.8)
     assert np.allclose(out[30:34], 1.2 * ease[:4])

@@ -63,5 +63,9 @@ def test_leaning_back_is_negative() -> None:
     length = np.linalg.norm(trunk, axis=-1)
     for degrees in (-25.0, 30.0):
         angle = np.radians(degrees)
-        joints[:, joint("neck")] = joints[:, 0] + length[:, None] * (0.0, np.sin(angle), np.cos(angle))
+        joints[:, joint("neck")] = joints[:, 0] + length[:, None] * (
+            0.0,
+            np.sin(angle),
+            np.cos(angle),
+        )
         assert np.allclose(np.degrees(liveliness.lean(joints, np.array([[0.0, 1.0]] * 3))), degrees)

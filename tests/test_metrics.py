@@ -40,11 +40,21 @@ def gliding(metres_per_second: float, fps: float = 30.0, frames: int = 60) -> np
 
 
 @pytest.mark.parametrize("fps", [24.0, 30.0, 60.0, 120.0])
-@pytest.mark.parametrize(("speed", "frame_reading", "second_reading"), [
-    (0.0, 0, 0), (0.003, 0, 0), (0.005, 0, 2), (0.11, 0, 2), (0.13, 2, 2),
-])
+@pytest.mark.parametrize(
+    ("speed", "frame_reading", "second_reading"),
+    [
+        (0.0, 0, 0),
+        (0.003, 0, 0),
+        (0.005, 0, 2),
+        (0.11, 0, 2),
+        (0.13, 2, 2),
+    ],
+)
 def test_foot_sliding_in_both_readings_at_any_rate(
-    fps: float, speed: float, frame_reading: int, second_reading: int,
+    fps: float,
+    speed: float,
+    frame_reading: int,
+    second_reading: int,
 ) -> None:
     joints = gliding(speed, fps)
     assert (foot_sliding(joints, fps) == frame_reading).all()
@@ -64,7 +74,8 @@ def test_foot_sliding_counts_low_feet_over_their_own_floor() -> None:
 @pytest.mark.parametrize("fps", [30.0, 60.0])
 def test_skate_weighs_speed_by_height(fps: float) -> None:
     assert skate(standing(), fps) == 0.0
-    assert skate(gliding(0.3, fps), fps) == pytest.approx(1.0)  # 0.3 m/s is 1 cm a frame; a planted foot has weight 1
+    # 0.3 m/s is 1 cm a frame; a planted foot has weight 1
+    assert skate(gliding(0.3, fps), fps) == pytest.approx(1.0)
     half = gliding(0.3, fps)
     half[:, [LEFT_TOE, RIGHT_TOE], 2] += 0.025 * np.log2(1.5)
     assert skate(half, fps) == pytest.approx(0.5)
@@ -79,7 +90,9 @@ def test_end_effector_distance_over_given_targets_only() -> None:
     left = joints[:, 20] + [0, 0, 0.34]
     assert end_effector_distance(joints, {"head": head, "hand_left": None}) == pytest.approx(0.1)
     expected = (2 * 0.1 + 4 * 0.2) / 6
-    assert end_effector_distance(joints, {"head": head, "hand_left": left}) == pytest.approx(expected)
+    assert end_effector_distance(joints, {"head": head, "hand_left": left}) == pytest.approx(
+        expected
+    )
     assert np.isnan(end_effector_distance(joints, {"hand_right": np.full((4, 3), np.nan)}))
     assert np.isnan(end_effector_distance(joints, {}))
 
@@ -87,7 +100,15 @@ def test_end_effector_distance_over_given_targets_only() -> None:
 def test_bad_collisions_touch_within_the_colliders() -> None:
     names = {JOINTS[j] for j in BAD_COLLISION_JOINTS}
     assert len(BAD_COLLISION_JOINTS) == 13
-    assert not names & {"pelvis", "left_hip", "left_wrist", "right_ankle", "left_foot", "right_hip", "right_wrist"}
+    assert not names & {
+        "pelvis",
+        "left_hip",
+        "left_wrist",
+        "right_ankle",
+        "left_foot",
+        "right_hip",
+        "right_wrist",
+    }
     distance = np.full((3, 13), 0.15)
     distance[1, [0, 4]] = 0.09, -0.2
     distance[2, 12] = 0.11
@@ -111,7 +132,9 @@ def test_penetration_of_a_floor_raised_into_the_feet() -> None:
 
 
 def walk_and_sit(fps: float, seat: float = 0.45, floor: float = 3.0) -> tuple[np.ndarray, RootPath]:
-    """Two seconds of walking 2 m, three of sitting there, two of walking on, one of standing; on the third storey."""
+    """Two seconds of walking 2 m, three of sitting there, two of walking on, one of standing; on
+    the third storey.
+    """
     time = np.arange(int(8 * fps)) / fps
     forward = np.interp(time, [0, 2, 5, 7], [0, 2, 2, 4])
     path = RootPath(np.stack([0 * time, forward, 0 * time + floor], axis=1), 0 * time)
@@ -131,9 +154,15 @@ def test_seats_are_reported_with_their_errors(fps: float) -> None:
     taken, missed = seat_report(joints, path, fps, [chair, stool])
     assert taken["name"] == "Chair" and taken["seat_height"] == pytest.approx(0.45)
     assert taken["pelvis_height"] == pytest.approx(0.60) and taken["error"] == pytest.approx(0.03)
-    assert missed["pelvis_height"] is None and missed["error"] is None and missed["seat_height"] == pytest.approx(0.6)
+    assert (
+        missed["pelvis_height"] is None
+        and missed["error"] is None
+        and missed["seat_height"] == pytest.approx(0.6)
+    )
     assert standing_pelvis_height(joints, path, fps) == pytest.approx(STANDING_PELVIS)
-    assert np.isnan(standing_pelvis_height(joints[:1], RootPath(path.position[:1], path.yaw[:1]), fps))
+    assert np.isnan(
+        standing_pelvis_height(joints[:1], RootPath(path.position[:1], path.yaw[:1]), fps)
+    )
 
 
 def test_short_stops_are_no_rest() -> None:

@@ -1,4 +1,6 @@
-"""Every transform of the model: inverse, log-determinant against a numerical Jacobian, likelihood, sizes of the paper."""
+"""Every transform of the model: inverse, log-determinant against a numerical Jacobian, likelihood,
+sizes of the paper.
+"""
 
 import math
 from itertools import pairwise
@@ -6,7 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch", reason="the model's own code needs torch; inside Blender only NumPy runs")
+torch = pytest.importorskip(
+    "torch", reason="the model's own code needs torch; inside Blender only NumPy runs"
+)
 
 from dafnet_addon.baselines.flows import LowerFirstFlow  # noqa: E402
 from dafnet_addon.model.config import PAPER, SMALL, ModelConfig  # noqa: E402
@@ -14,7 +18,14 @@ from dafnet_addon.model.flow import ActNorm, Coupling, InvertibleLinear, PartFlo
 from dafnet_addon.model.predictor import GMVAE, gumbel_temperature  # noqa: E402
 
 TINY = ModelConfig(
-    predictor_code=8, predictor_width=16, width=12, code=8, shared_encoder=True, mask=True, steps_upper=2, steps_lower=2
+    predictor_code=8,
+    predictor_width=16,
+    width=12,
+    code=8,
+    shared_encoder=True,
+    mask=True,
+    steps_upper=2,
+    steps_lower=2,
 )
 
 
@@ -73,7 +84,9 @@ def test_coupling_inverts_and_counts_volume_over_time():
     x, condition = torch.randn(1, 5, 6), torch.randn(1, 5, 4)
     y, log_det, _ = coupling(x, condition)
     assert (coupling.inverse(y, condition)[0] - x).abs().max() < 1e-10
-    whole = _log_abs_det(lambda v: coupling(v.reshape(1, 5, 6), condition)[0].reshape(-1), x.reshape(-1))
+    whole = _log_abs_det(
+        lambda v: coupling(v.reshape(1, 5, 6), condition)[0].reshape(-1), x.reshape(-1)
+    )
     assert torch.allclose(log_det.sum(), whole)
 
 
@@ -99,7 +112,10 @@ def test_part_flow_inverts_to_1e8_and_matches_a_numerical_jacobian(shared):
         for i in range(len(flat)):
             e = torch.zeros_like(flat)
             e[i] = step
-            ahead, back = (flow((flat + s * e).reshape(1, 4, 6), condition, occupancy)[0].reshape(-1) for s in (1, -1))
+            ahead, back = (
+                flow((flat + s * e).reshape(1, 4, 6), condition, occupancy)[0].reshape(-1)
+                for s in (1, -1)
+            )
             columns.append((ahead - back) / (2 * step))
         assert abs(float(log_det.sum() - torch.linalg.slogdet(torch.stack(columns, 1))[1])) < 1e-5
         constant = 0.5 * math.log(2 * math.pi)
@@ -111,7 +127,9 @@ def _inputs(frames=5, batch=2):
     given = (torch.rand(batch, frames, 22) < 0.2).double()
     upper, lower = torch.randn(batch, frames, 42), torch.randn(batch, frames, 24)
     observation = torch.cat([upper, torch.zeros_like(lower)], -1) * given.repeat_interleave(3, -1)
-    base = torch.cat([torch.softmax(torch.randn(batch, frames, 10), -1), torch.randn(batch, frames, 3)], -1)
+    base = torch.cat(
+        [torch.softmax(torch.randn(batch, frames, 10), -1), torch.randn(batch, frames, 3)], -1
+    )
     return upper, lower, base, torch.rand(batch, frames, 2640), observation, given
 
 
@@ -128,17 +146,29 @@ def test_the_upper_body_does_not_hang_on_the_lower_noise():
     flow = _stirred(TwoPartFlow(TINY))
     _, _, base, occupancy, observation, given = _inputs()
     z_upper = torch.randn(2, 5, 42)
-    one, two = (flow.inverse(z_upper, torch.randn(2, 5, 24), base, occupancy, observation, given) for _ in range(2))
-    assert torch.allclose(one[..., :42], two[..., :42]) and not torch.allclose(one[..., 42:], two[..., 42:])
+    one, two = (
+        flow.inverse(z_upper, torch.randn(2, 5, 24), base, occupancy, observation, given)
+        for _ in range(2)
+    )
+    assert torch.allclose(one[..., :42], two[..., :42]) and not torch.allclose(
+        one[..., 42:], two[..., 42:]
+    )
 
 
 def test_with_the_lower_body_first_it_is_the_other_way_round():
     flow = _stirred(LowerFirstFlow(TINY))
     upper, lower, base, occupancy, observation, given = _inputs()
     z_lower = torch.randn(2, 5, 24)
-    one, two = (flow.inverse(torch.randn(2, 5, 42), z_lower, base, occupancy, observation, given) for _ in range(2))
-    assert torch.allclose(one[..., 42:], two[..., 42:]) and not torch.allclose(one[..., :42], two[..., :42])
-    told = flow.condition("upper", base, observation, given, torch.cat([upper, lower], -1))[..., base.shape[-1] :]
+    one, two = (
+        flow.inverse(torch.randn(2, 5, 42), z_lower, base, occupancy, observation, given)
+        for _ in range(2)
+    )
+    assert torch.allclose(one[..., 42:], two[..., 42:]) and not torch.allclose(
+        one[..., :42], two[..., :42]
+    )
+    told = flow.condition("upper", base, observation, given, torch.cat([upper, lower], -1))[
+        ..., base.shape[-1] :
+    ]
     assert (told[..., :42] == observation[..., :42]).all() and (told[..., 42:66] == lower).all()
     assert (told[..., 66:80] == given[..., :14]).all() and (told[..., 80:] == 1).all()
 
@@ -147,8 +177,14 @@ def test_data_dependent_start_whitens_the_noise():
     flow = PartFlow(24, 2, TINY)
     x = 5.0 + torch.randn(30, 60, 24) @ torch.randn(24, 24)
     with torch.no_grad():
-        z, _, _ = flow(x, torch.zeros(30, 60, TINY.condition_size - TINY.code), torch.zeros(30, 60, 2640), initialise=True)
-    # A coupling starts with the scale sigmoid(2) = 0.88; half of the features pass it unscaled at every step.
+        z, _, _ = flow(
+            x,
+            torch.zeros(30, 60, TINY.condition_size - TINY.code),
+            torch.zeros(30, 60, 2640),
+            initialise=True,
+        )
+    # A coupling starts with the scale sigmoid(2) = 0.88; half of the features pass it unscaled at
+    # every step.
     assert abs(float(z.mean())) < 0.05 and abs(float(z.std()) - 1) < 0.2
 
 
@@ -157,7 +193,11 @@ def test_sizes_of_the_paper():
         flow, gmvae = TwoPartFlow(PAPER), GMVAE(PAPER)
     count = lambda module: sum(p.numel() for p in module.parameters())  # noqa: E731
     assert PAPER.scene_size == 693 and PAPER.condition_size == 591
-    assert 35.5e6 < count(flow) < 37e6 and 2.2e6 < count(gmvae.predictor) < 2.3e6 and 5.1e6 < count(gmvae) < 5.3e6
+    assert (
+        35.5e6 < count(flow) < 37e6
+        and 2.2e6 < count(gmvae.predictor) < 2.3e6
+        and 5.1e6 < count(gmvae) < 5.3e6
+    )
     assert SMALL.condition_size == 10 + 3 + SMALL.code + 66 + 22
 
 
@@ -174,7 +214,9 @@ def test_gmvae_losses_have_known_values():
     for head in (model.mean, model.spread, model.prior_mean, model.prior_spread):
         head.weight.zero_()
         head.bias.zero_()
-    assert abs(float(model.losses(past, past, occupancy, 1.0).kl)) < 1e-9, "equal Gaussians have no divergence"
+    assert abs(float(model.losses(past, past, occupancy, 1.0).kl)) < 1e-9, (
+        "equal Gaussians have no divergence"
+    )
 
 
 def test_annealing_goes_from_one_to_a_half():
@@ -185,4 +227,8 @@ def test_annealing_goes_from_one_to_a_half():
 def test_predictor_gives_probabilities():
     predictor = GMVAE(TINY).predictor
     actions = predictor(torch.randn(3, 5, TINY.scene_size), torch.rand(3, 5, 2640))
-    assert actions.shape == (3, 5, 10) and torch.allclose(actions.sum(-1), torch.ones(3, 5)) and (actions > 0).all()
+    assert (
+        actions.shape == (3, 5, 10)
+        and torch.allclose(actions.sum(-1), torch.ones(3, 5))
+        and (actions > 0).all()
+    )

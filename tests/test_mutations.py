@@ -1,8 +1,10 @@
-"""What strangers' files and careless callers may hand in: weights, stored takes, controls, boxes and meshes, mutated.
+"""What strangers' files and careless callers may hand in: weights, stored takes, controls, boxes
+and meshes, mutated.
 
-Whatever comes in, motion made of numbers comes out, or one sentence that names the field; within five seconds of the
-processor's time and 200 MB. A third of the mutations at least gets past the parser, so that the checks behind it are tested
-too. 100 of each are tried; 1,000 with ``--hypothesis-profile=full``.
+Whatever comes in, motion made of numbers comes out, or one sentence that names the field; within
+five seconds of the processor's time and 200 MB. A third of the mutations at least gets past the
+parser, so that the checks behind it are tested too. 100 of each are tried; 1,000 with
+``--hypothesis-profile=full``.
 """
 
 import json
@@ -18,7 +20,17 @@ import numpy as np
 import pytest
 from bounds import bounded
 
-from dafnet_addon import Box, CleanUp, Controls, DafnetError, Mesh, Scene, Take, generate, load_weights
+from dafnet_addon import (
+    Box,
+    CleanUp,
+    Controls,
+    DafnetError,
+    Mesh,
+    Scene,
+    Take,
+    generate,
+    load_weights,
+)
 from dafnet_addon.core import distance, storage
 from dafnet_addon.core.generate import Draw, clean_again_steps, takes_steps
 from dafnet_addon.core.progress import drained
@@ -54,7 +66,9 @@ class Tally:
                 use()
         except DafnetError as error:
             said = str(error)
-            assert said.endswith(".") and ". " not in said and said.isprintable() and len(said) < 1200, said
+            assert (
+                said.endswith(".") and ". " not in said and said.isprintable() and len(said) < 1200
+            ), said
             assert any(name in said for name in names), f"{said} ({names})"
         else:
             self.used += 1
@@ -67,7 +81,11 @@ class Tally:
 
 def sound(take: Take, frames: int = FRAMES) -> None:
     """Every number of the take is one."""
-    assert take.joints.shape == (frames, 22, 3) and np.isfinite(take.joints).all() and np.isfinite(take.rotations).all()
+    assert (
+        take.joints.shape == (frames, 22, 3)
+        and np.isfinite(take.joints).all()
+        and np.isfinite(take.rotations).all()
+    )
 
 
 # Things in order.
@@ -82,14 +100,30 @@ class _Growing(Weights):
         grown = 0.1 * rng.standard_normal(size)
         if name.endswith("_std"):
             grown = np.full(size, 0.3)
-        elif len(size) == 2 and name.count(".") == 2 and name.endswith(".weight") and size[0] == size[1]:
+        elif (
+            len(size) == 2
+            and name.count(".") == 2
+            and name.endswith(".weight")
+            and size[0] == size[1]
+        ):
             grown = np.eye(size[0]) + 0.1 * grown
         return self.tensors.setdefault(name, grown.astype(np.float32))
 
 
 MODEL = {
-    "actions": 3, "history": 2, "predictor_code": 4, "predictor_width": 6, "width": 8, "layers": 1, "code": 4,
-    "steps_upper": 1, "steps_lower": 1, "shared_encoder": True, "mask": True, "ahead": 18, "action_temperature": 0.7,
+    "actions": 3,
+    "history": 2,
+    "predictor_code": 4,
+    "predictor_width": 6,
+    "width": 8,
+    "layers": 1,
+    "code": 4,
+    "steps_upper": 1,
+    "steps_lower": 1,
+    "shared_encoder": True,
+    "mask": True,
+    "ahead": 18,
+    "action_temperature": 0.7,
 }
 CONFIG = {"model": MODEL, "fps": 30, "offsets": OFFSETS.tolist()}
 
@@ -114,13 +148,19 @@ def root(frames: int = FRAMES) -> np.ndarray:
 def asked() -> dict[str, Any]:
     """Arguments of ``Controls`` with every field."""
     given: dict[str, Any] = {
-        "fps": 30.0, "root": root(), "mode": "EE", "upper_body": np.full((FRAMES, len(UPPER), 3), 0.9),
-        "pelvis_given": True, "blend": 0.2, "scale": 1.0,
+        "fps": 30.0,
+        "root": root(),
+        "mode": "EE",
+        "upper_body": np.full((FRAMES, len(UPPER), 3), 0.9),
+        "pelvis_given": True,
+        "blend": 0.2,
+        "scale": 1.0,
     }
     for name in END_EFFECTORS:
         if name in {each.name for each in fields(Controls)}:
             given |= {
-                name: np.full((FRAMES, 3), 0.5), f"{name}_rotation": np.tile(np.eye(3), (FRAMES, 1, 1)),
+                name: np.full((FRAMES, 3), 0.5),
+                f"{name}_rotation": np.tile(np.eye(3), (FRAMES, 1, 1)),
                 f"{name}_influence": np.linspace(0.0, 1.0, FRAMES),
             }
     return given
@@ -128,36 +168,126 @@ def asked() -> dict[str, Any]:
 
 SEAT = Box([0.0, 0.5, 0.2], [0.2, 0.2, 0.2])
 CORNERS = np.array([(x, y, z) for x in (-0.2, 0.2) for y in (0.3, 0.7) for z in (0.0, 0.45)])
-SIDES = np.array([(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (1, 5, 7), (1, 7, 3)])
+SIDES = np.array(
+    [
+        (0, 1, 3),
+        (0, 3, 2),
+        (4, 6, 7),
+        (4, 7, 5),
+        (0, 4, 5),
+        (0, 5, 1),
+        (2, 3, 7),
+        (2, 7, 6),
+        (1, 5, 7),
+        (1, 7, 3),
+    ]
+)
 
 
 # Mutations.
 
 VALUES = [
-    math.nan, math.inf, -math.inf, 1e300, -1e300, 3e38, 1e9, 1e7, 1e4, 100.0, 7.0, 2.0, 1.0, 0.5, 0.0, -0.0, 1e-3, 1e-30,
-    5e-324, -1e-3, -1.0, -2.0, -50.0,
+    math.nan,
+    math.inf,
+    -math.inf,
+    1e300,
+    -1e300,
+    3e38,
+    1e9,
+    1e7,
+    1e4,
+    100.0,
+    7.0,
+    2.0,
+    1.0,
+    0.5,
+    0.0,
+    -0.0,
+    1e-3,
+    1e-30,
+    5e-324,
+    -1e-3,
+    -1.0,
+    -2.0,
+    -50.0,
 ]
 STRANGE = [
-    None, True, False, 0, 1, -1, 2, 30, 10**6, 2**31, 3_000_000_000, 10**400, 1.5, "", "FREE", "30", b"FREE", [], {}, (),
-    object(), [[1.0, 2.0], [3.0]], [None], ["EE"] * FRAMES, ["EE", 3], np.array("FREE"), np.array(None), np.zeros((0, 3)),
-    np.int64(7), np.float32(24.0), np.zeros((2,) * 20), "\x1b[31m", "\ud800", 1j, np.array([1 + 1j]), {"a": 1}, *VALUES,
+    None,
+    True,
+    False,
+    0,
+    1,
+    -1,
+    2,
+    30,
+    10**6,
+    2**31,
+    3_000_000_000,
+    10**400,
+    1.5,
+    "",
+    "FREE",
+    "30",
+    b"FREE",
+    [],
+    {},
+    (),
+    object(),
+    [[1.0, 2.0], [3.0]],
+    [None],
+    ["EE"] * FRAMES,
+    ["EE", 3],
+    np.array("FREE"),
+    np.array(None),
+    np.zeros((0, 3)),
+    np.int64(7),
+    np.float32(24.0),
+    np.zeros((2,) * 20),
+    "\x1b[31m",
+    "\ud800",
+    1j,
+    np.array([1 + 1j]),
+    {"a": 1},
+    *VALUES,
 ]
 HARMLESS: list[Callable[[np.ndarray], Any]] = [
-    lambda a: a.tolist(), lambda a: a.astype(np.float32), np.asfortranarray, lambda a: a.copy(), lambda a: tuple(a.tolist()),
-    lambda a: a.astype(np.longdouble), lambda a: a[::-1],
+    lambda a: a.tolist(),
+    lambda a: a.astype(np.float32),
+    np.asfortranarray,
+    lambda a: a.copy(),
+    lambda a: tuple(a.tolist()),
+    lambda a: a.astype(np.longdouble),
+    lambda a: a[::-1],
 ]
 SHAPES: list[Callable[[np.ndarray], Any]] = [
-    lambda a: a[:-1], lambda a: a[None], lambda a: a.T, lambda a: a.reshape(-1), lambda a: a[..., :-1], lambda a: a[:0],
-    lambda a: np.concatenate([a, a]), lambda a: a[..., None], lambda a: a[0], lambda a: np.zeros((len(a), 0)),
-    lambda a: a.astype(object), lambda a: a.astype(complex), lambda a: a.astype(str), lambda a: a.astype(int),
-    lambda a: [*a, None], lambda a: a.astype(bool), lambda a: a[1:], lambda a: a[:1], lambda a: a.astype(np.float16),
+    lambda a: a[:-1],
+    lambda a: a[None],
+    lambda a: a.T,
+    lambda a: a.reshape(-1),
+    lambda a: a[..., :-1],
+    lambda a: a[:0],
+    lambda a: np.concatenate([a, a]),
+    lambda a: a[..., None],
+    lambda a: a[0],
+    lambda a: np.zeros((len(a), 0)),
+    lambda a: a.astype(object),
+    lambda a: a.astype(complex),
+    lambda a: a.astype(str),
+    lambda a: a.astype(int),
+    lambda a: [*a, None],
+    lambda a: a.astype(bool),
+    lambda a: a[1:],
+    lambda a: a[:1],
+    lambda a: a.astype(np.float16),
 ]
 
 
 @st.composite
 def arrays(draw: Any, good: np.ndarray) -> Any:
     """An array like the one that is in order, with something about it changed."""
-    way = draw(st.sampled_from(["one", "one", "some", "all", "shape", *["harmless"] * 5, "strange"]))
+    way = draw(
+        st.sampled_from(["one", "one", "some", "all", "shape", *["harmless"] * 5, "strange"])
+    )
     if way == "strange":
         return draw(st.sampled_from(STRANGE))
     if way in ("shape", "harmless"):
@@ -177,14 +307,24 @@ def changed(draw: Any, good: dict[str, Any], most: int = 2) -> dict[str, Any]:
     names = draw(st.lists(st.sampled_from(sorted(good)), min_size=1, max_size=most, unique=True))
     return {
         name: draw(
-            arrays(good[name]) if isinstance(good[name], np.ndarray)
-            else st.one_of(st.sampled_from(STRANGE), st.floats(0.0, 3.0), st.integers(1, 60), st.sampled_from(MODES))
+            arrays(good[name])
+            if isinstance(good[name], np.ndarray)
+            else st.one_of(
+                st.sampled_from(STRANGE),
+                st.floats(0.0, 3.0),
+                st.integers(1, 60),
+                st.sampled_from(MODES),
+            )
         )
         for name in names
     }
 
 
-WORDS = {"fps": "frame rate", "lower_seed": "seed of the legs", "lower_temperature": "temperature of the legs"}
+WORDS = {
+    "fps": "frame rate",
+    "lower_seed": "seed of the legs",
+    "lower_temperature": "temperature of the legs",
+}
 
 
 def test_controls() -> None:
@@ -198,11 +338,16 @@ def test_controls() -> None:
             draw = Draw(*(given.pop(name) for name in drawn))
             controls = Controls(**given)
             tally.past += 1
-            sound(drained(takes_steps(Scene([SEAT]), controls, SMALL, [draw], clean_up=ALL))[0], len(controls))
+            sound(
+                drained(takes_steps(Scene([SEAT]), controls, SMALL, [draw], clean_up=ALL))[0],
+                len(controls),
+            )
 
         # Another root makes all else too long or too short.
         names = {WORDS.get(name, name) for name in (*odd, *(good if "root" in odd else ()))}
-        tally.attempt(use, names | ({"upper body"} if {"mode", "upper_body"} & odd.keys() else set()))
+        tally.attempt(
+            use, names | ({"upper body"} if {"mode", "upper_body"} & odd.keys() else set())
+        )
 
     each()
     tally.judge()
@@ -211,10 +356,19 @@ def test_controls() -> None:
 def test_boxes() -> None:
     tally = Tally()
     turned = np.tile(np.eye(3), (FRAMES, 1, 1))
-    still = {"center": SEAT.center, "half_size": SEAT.half_size, "rotation": np.eye(3), "name": "Seat"}
+    still = {
+        "center": SEAT.center,
+        "half_size": SEAT.half_size,
+        "rotation": np.eye(3),
+        "name": "Seat",
+    }
     moving = still | {"center": np.tile(SEAT.center, (FRAMES, 1)), "rotation": turned}
 
-    @hypothesis.given(st.one_of(*(changed(each).map(lambda odd, each=each: (each, odd)) for each in (still, moving))))
+    @hypothesis.given(
+        st.one_of(
+            *(changed(each).map(lambda odd, each=each: (each, odd)) for each in (still, moving))
+        )
+    )
     def each(pair: tuple[dict[str, Any], dict[str, Any]]) -> None:
         good, odd = pair
 
@@ -234,7 +388,11 @@ def test_meshes() -> None:
     still = {"vertices": CORNERS, "triangles": SIDES, "matrix": np.eye(4), "name": "Chair"}
     moving = still | {"matrix": root()}
 
-    @hypothesis.given(st.one_of(*(changed(each).map(lambda odd, each=each: (each, odd)) for each in (still, moving))))
+    @hypothesis.given(
+        st.one_of(
+            *(changed(each).map(lambda odd, each=each: (each, odd)) for each in (still, moving))
+        )
+    )
     def each(pair: tuple[dict[str, Any], dict[str, Any]]) -> None:
         good, odd = pair
 
@@ -253,12 +411,52 @@ def test_meshes() -> None:
 # Weights.
 
 JSON_VALUES = [
-    None, True, False, 0, 1, -1, 2, 3, 8, 18, 30, 256, 65536, 10**9, 10**18, 10**400, 0.5, 1.5, -1.0, 1e308, math.nan, math.inf,
-    "", "text", "\x1b[2J", "\ud800", "a" * 5000, [], [1], {}, {"a": {}}, [[[[[[[[[[0]]]]]]]]]],
+    None,
+    True,
+    False,
+    0,
+    1,
+    -1,
+    2,
+    3,
+    8,
+    18,
+    30,
+    256,
+    65536,
+    10**9,
+    10**18,
+    10**400,
+    0.5,
+    1.5,
+    -1.0,
+    1e308,
+    math.nan,
+    math.inf,
+    "",
+    "text",
+    "\x1b[2J",
+    "\ud800",
+    "a" * 5000,
+    [],
+    [1],
+    {},
+    {"a": {}},
+    [[[[[[[[[[0]]]]]]]]]],
 ]
 WORDS_OF_FILES = [
-    "", "\x1b[31m", "x" * 100_000, "[" * 20 + "]" * 20, "[" * 20_000 + "]" * 20_000, "{" * 9, "NaN", '"\\ud800"', "1" * 5000,
-    "\u202e", '{"a": 1, "a": 2}', "\ud800",
+    "",
+    "\x1b[31m",
+    "x" * 100_000,
+    "[" * 20 + "]" * 20,
+    "[" * 20_000 + "]" * 20_000,
+    "{" * 9,
+    "NaN",
+    '"\\ud800"',
+    "1" * 5000,
+    "\u202e",
+    '{"a": 1, "a": 2}',
+    "\ud800",
 ]
 PARTS = ("header", "tensors", "metadata", "config", "format", "scales")
 """Of a weights file, as a sentence names them."""
@@ -268,7 +466,13 @@ Change = Callable[[bytes], bytes]
 @st.composite
 def scratches(draw: Any) -> Change:
     """Some bytes other than they were, and the end cut off, or not."""
-    places = draw(st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=4))
+    places = draw(
+        st.lists(
+            st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)),
+            min_size=1,
+            max_size=4,
+        )
+    )
     early, kept = draw(st.booleans()), draw(st.sampled_from([1.0, 1.0, 1.0, 0.999, 0.5, 0.01]))
 
     def scratched(raw: bytes) -> bytes:
@@ -284,9 +488,27 @@ def scratches(draw: Any) -> Change:
 def other_headers(draw: Any) -> Change:
     """One tensor described otherwise in the header of a weights file, or one more."""
     key = draw(st.sampled_from(["shape", "dtype", "data_offsets", "more", "empty", "empty"]))
-    value = draw(st.sampled_from([
-        [], [0], [-1], [2**31], [1, 1], ["1"], None, "F8_E4M3", "I64", "BF16", {}, [0, 2**62], [2**40, 0], [True], [1.5],
-    ]))
+    value = draw(
+        st.sampled_from(
+            [
+                [],
+                [0],
+                [-1],
+                [2**31],
+                [1, 1],
+                ["1"],
+                None,
+                "F8_E4M3",
+                "I64",
+                "BF16",
+                {},
+                [0, 2**62],
+                [2**40, 0],
+                [True],
+                [1.5],
+            ]
+        )
+    )
     sizes = [0, *draw(st.lists(st.sampled_from([1, 2, 2**16, 2**28, 2**31, 2**62, 0]), max_size=8))]
 
     def described(raw: bytes) -> bytes:
@@ -304,7 +526,9 @@ def other_headers(draw: Any) -> Change:
 
 @dataclass
 class File:
-    """A weights file to be: its content, what is then done to its bytes, and the fields that were changed."""
+    """A weights file to be: its content, what is then done to its bytes, and the fields that were
+    changed.
+    """
 
     tensors: dict[str, np.ndarray] = field(repr=False)
     metadata: dict[str, str] = field(repr=False)
@@ -317,7 +541,21 @@ def weights_files(draw: Any) -> File:
     """A weights file that is mutated."""
     tensors, config = dict(SMALL.tensors), json.loads(json.dumps(CONFIG))
     metadata = {"format": FORMAT, "licence": "CC0", "config": json.dumps(CONFIG)}
-    way = draw(st.sampled_from(["config", "config", "values", "values", "values", "tensor", "metadata", "bytes", "header"]))
+    way = draw(
+        st.sampled_from(
+            [
+                "config",
+                "config",
+                "values",
+                "values",
+                "values",
+                "tensor",
+                "metadata",
+                "bytes",
+                "header",
+            ]
+        )
+    )
     name = draw(st.sampled_from(sorted(tensors)))
     if way == "bytes":
         return File(tensors, metadata, {*tensors, *MODEL, *CONFIG, *PARTS}, draw(scratches()))
@@ -325,7 +563,9 @@ def weights_files(draw: Any) -> File:
         return File(tensors, metadata, {"pose_mean", "header", "tensors"}, draw(other_headers()))
     if way == "metadata":
         key = draw(st.sampled_from(["format", "licence", "config", "\x1b]0;title\x07", "held_out"]))
-        return File(tensors, metadata | {key: draw(st.sampled_from(WORDS_OF_FILES))}, {key, "header"})
+        return File(
+            tensors, metadata | {key: draw(st.sampled_from(WORDS_OF_FILES))}, {key, "header"}
+        )
     if way == "config":
         key = draw(st.sampled_from([*MODEL, "system", *CONFIG]))
         place = config if key in CONFIG else config["model"]
@@ -343,16 +583,26 @@ def weights_files(draw: Any) -> File:
             tensor = tensor * np.float32(value) if at < 0 else tensor.copy()
         if at >= 0:
             tensor.reshape(-1)[at] = value if abs(value) < 3.4e38 else math.inf
-        return File(tensors | {name: tensor}, metadata, {name, name.rpartition(".")[0] or name, "poses"})
+        return File(
+            tensors | {name: tensor}, metadata, {name, name.rpartition(".")[0] or name, "poses"}
+        )
     deed = draw(st.sampled_from(["drop", "rename", "shape", "dtype", "bytes"]))
     if deed == "rename":
-        tensors[draw(st.sampled_from(["", "\x1b[31m", "\ud800", name + ".scale", "x" * 500]))] = tensor
+        tensors[draw(st.sampled_from(["", "\x1b[31m", "\ud800", name + ".scale", "x" * 500]))] = (
+            tensor
+        )
     elif deed == "shape":
-        tensors[name] = draw(st.sampled_from([tensor[:-1], tensor[None], tensor.T, tensor[..., None], tensor[:0]]))
+        tensors[name] = draw(
+            st.sampled_from([tensor[:-1], tensor[None], tensor.T, tensor[..., None], tensor[:0]])
+        )
     elif deed != "drop":
-        tensors[name] = tensor.astype(draw(st.sampled_from([np.float64, np.int32, np.float16, np.int8, np.uint8])))
+        tensors[name] = tensor.astype(
+            draw(st.sampled_from([np.float64, np.int32, np.float16, np.int8, np.uint8]))
+        )
     if deed == "bytes":
-        tensors[name + ".scale"] = np.full(draw(st.integers(0, 9)), draw(st.sampled_from(VALUES[3:])), np.float32)
+        tensors[name + ".scale"] = np.full(
+            draw(st.integers(0, 9)), draw(st.sampled_from(VALUES[3:])), np.float32
+        )
     return File(tensors, metadata, {name, name.rpartition(".")[0] or name, "poses", "header"})
 
 
@@ -367,7 +617,9 @@ def test_weights(tmp_path: Path) -> None:
         def use() -> None:
             read_safetensors(path)
             tally.past += 1
-            sound(generate(Scene([SEAT]), Controls(30, root()), load_weights(path), temperature=1.0))
+            sound(
+                generate(Scene([SEAT]), Controls(30, root()), load_weights(path), temperature=1.0)
+            )
 
         tally.attempt(use, file.names)
 
@@ -400,7 +652,11 @@ def put_together(found: dict[str, Any], plain: object) -> bytes:
         for name, value in {"plain": np.frombuffer(text, np.uint8), **found}.items():
             raw = BytesIO()
             if not isinstance(value, bytes):
-                np.save(raw, np.asarray(value, None if isinstance(value, np.ndarray) else object), allow_pickle=True)
+                np.save(
+                    raw,
+                    np.asarray(value, None if isinstance(value, np.ndarray) else object),
+                    allow_pickle=True,
+                )
             file.writestr(f"{name}.npy", value if isinstance(value, bytes) else raw.getvalue())
     return out.getvalue()
 
@@ -410,8 +666,13 @@ BOMB = put_together({"controls.root": np.zeros((2_000_000, 4, 4), np.float32)}, 
 
 
 ALSO = {
-    "take.path.position": {"root"}, "take.path.yaw": {"root"}, "take.unchanged": {"mode"}, "controls.mode": {"mode"},
-    "controls.blend": {"mode"}, "controls.scale": {"size"}, "take.scale": {"size"},
+    "take.path.position": {"root"},
+    "take.path.yaw": {"root"},
+    "take.unchanged": {"mode"},
+    "controls.mode": {"mode"},
+    "controls.blend": {"mode"},
+    "controls.scale": {"size"},
+    "take.scale": {"size"},
 }
 """What a sentence may name instead, where two fields do not belong together."""
 
@@ -420,30 +681,62 @@ ALSO = {
 def other_takes(draw: Any, data: bytes) -> tuple[bytes, set[str]]:
     """A stored take that is mutated, and the fields that were changed."""
     found, plain = contents(data)
-    ways = ["array", "array", "array", "plain", "plain", "plain", "text", "bytes", "header", "missing", "bomb"]
+    ways = [
+        "array",
+        "array",
+        "array",
+        "plain",
+        "plain",
+        "plain",
+        "text",
+        "bytes",
+        "header",
+        "missing",
+        "bomb",
+    ]
     way = draw(st.sampled_from(ways))
-    name, key = draw(st.sampled_from(sorted(found))), draw(st.sampled_from([*sorted(plain), "take.path", "controls.head"]))
+    name, key = (
+        draw(st.sampled_from(sorted(found))),
+        draw(st.sampled_from([*sorted(plain), "take.path", "controls.head"])),
+    )
     also = ALSO.get(key if way == "plain" else name, set())
     if way == "bytes":
         return draw(scratches())(data), {"damaged", "plain", *found}
     if way == "array":
         value = draw(arrays(found[name].astype(np.float64)))
-        single = isinstance(value, np.ndarray) and value.dtype.kind == "f" and draw(st.integers(0, 3)) > 0
+        single = (
+            isinstance(value, np.ndarray)
+            and value.dtype.kind == "f"
+            and draw(st.integers(0, 3)) > 0
+        )
         with np.errstate(over="ignore"):
             found[name] = value.astype(np.float32) if single else value
         # The number of frames is that of the root, so that all others may be wrong then.
-        return put_together(found, plain), {name, name.split(".")[1], *(found if name == "controls.root" else ()), *also}
+        return put_together(found, plain), {
+            name,
+            name.split(".")[1],
+            *(found if name == "controls.root" else ()),
+            *also,
+        }
     if way == "header":
         raw = BytesIO()
         np.save(raw, found[name])
         found[name] = draw(scratches())(raw.getvalue()[:128]) + raw.getvalue()[128:]
-        return put_together(found, plain), {name, *(found if name == "controls.root" else ()), *also}
+        return put_together(found, plain), {
+            name,
+            *(found if name == "controls.root" else ()),
+            *also,
+        }
     if way == "plain":
         odd = [*JSON_VALUES, *WORDS_OF_FILES[:3], ["\x1b[1m"], {"jerk": "a"}]
         plain[key] = draw(st.one_of(st.sampled_from(odd), st.floats()))
         names = {key, WORDS.get(key.split(".")[-1], key.split(".")[-1]), "plain"}
         # The rate says how many frames the model made.
-        rate = {*found, "number of frames", "take.fps", "take.scale"} if "fps" in key or "scale" in key else set()
+        rate = (
+            {*found, "number of frames", "take.fps", "take.scale"}
+            if "fps" in key or "scale" in key
+            else set()
+        )
         return put_together(found, plain), names | rate | also
     if way == "text":
         text = draw(st.sampled_from([*WORDS_OF_FILES[:-1], "[]", "3", "null"]))

@@ -10,8 +10,22 @@ from dafnet_addon.core.paths import Stop, route
 from dafnet_addon.core.rotations import yaw_matrix
 
 CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-FACES = np.array([(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4),
-                  (1, 5, 7), (1, 7, 3)])
+FACES = np.array(
+    [
+        (0, 1, 3),
+        (0, 3, 2),
+        (4, 6, 7),
+        (4, 7, 5),
+        (0, 4, 5),
+        (0, 5, 1),
+        (2, 3, 7),
+        (2, 7, 6),
+        (0, 2, 6),
+        (0, 6, 4),
+        (1, 5, 7),
+        (1, 7, 3),
+    ]
+)
 
 
 def cube(place: tuple[float, float, float], half: float = 0.3, name: str = "cube") -> Mesh:
@@ -27,8 +41,11 @@ def names(scene: Scene) -> list[str]:
 def test_what_comes_near_is_found_and_nothing_else() -> None:
     places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     solids = [
-        cube((0.0, 1.2, 0.3), name="near"), cube((0.0, 1.4, 0.3), name="far"), cube((0.0, 0.0, 3.4), name="above"),
-        cube((0.0, 0.0, 2.8), name="overhead"), Box(np.array([1.5, 0.0, 0.5]), np.full(3, 0.2), name="box"),
+        cube((0.0, 1.2, 0.3), name="near"),
+        cube((0.0, 1.4, 0.3), name="far"),
+        cube((0.0, 0.0, 3.4), name="above"),
+        cube((0.0, 0.0, 2.8), name="overhead"),
+        Box(np.array([1.5, 0.0, 0.5]), np.full(3, 0.2), name="box"),
         Mesh(np.zeros((0, 3)), np.zeros((0, 3), int), name="empty"),
     ]
     assert names(beside(Scene(solids), places, 1.0)) == ["near", "overhead", "box"]
@@ -46,7 +63,12 @@ def test_what_moves_is_near_only_while_the_body_is_there() -> None:
     apart = along.copy()
     apart[:, 0, 3] = t[::-1]
     apart[:, 1, 3] = np.where(np.abs(t - 5.0) < 2.0, 5.0, 0.0)
-    scene = Scene([Mesh(0.3 * CORNERS, FACES, m, n) for m, n in ((along, "along"), (against, "against"), (apart, "apart"))])
+    scene = Scene(
+        [
+            Mesh(0.3 * CORNERS, FACES, m, n)
+            for m, n in ((along, "along"), (against, "against"), (apart, "apart"))
+        ]
+    )
     assert names(beside(scene, path, 1.0)) == ["along", "against"]
     box = Box(apart[:, :3, 3], np.full(3, 0.3), np.tile(np.eye(3), (50, 1, 1)), "box")
     assert beside(Scene([box]), path, 1.0).solids == ()
@@ -63,19 +85,29 @@ def test_boxes_hold_their_solids() -> None:
         assert (world >= low - 1e-9).all() and (world <= high + 1e-9).all()
     low, high = bounds(Box(np.zeros(3), np.array([1.0, 0.0, 0.0]), yaw_matrix(np.array(np.pi / 2))))
     assert np.allclose(high - low, [0.0, 2.0, 0.0], atol=1e-12)
-    assert extent([cube((0.0, 0.0, 0.0)), cube((5.0, 0.0, 0.0))]) == pytest.approx(5.6) and extent([]) == 0.0
+    assert (
+        extent([cube((0.0, 0.0, 0.0)), cube((5.0, 0.0, 0.0))]) == pytest.approx(5.6)
+        and extent([]) == 0.0
+    )
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.8])
-def test_takes_are_the_same_to_the_last_bit_and_far_grids_are_not_built(monkeypatch, scale: float) -> None:
+def test_takes_are_the_same_to_the_last_bit_and_far_grids_are_not_built(
+    monkeypatch, scale: float
+) -> None:
     seat = Mesh(np.array([0.22, 0.22, 0.225]) * CORNERS + [0.0, 0.0, 0.225], FACES, name="seat")
     random = np.random.default_rng(1)
-    crowd = [cube((*(random.uniform(-12.0, 12.0, 2)), 0.3), random.uniform(0.05, 0.3), f"cube {k}") for k in range(120)]
+    crowd = [
+        cube((*(random.uniform(-12.0, 12.0, 2)), 0.3), random.uniform(0.05, 0.3), f"cube {k}")
+        for k in range(120)
+    ]
     crowd = [each for each in crowd if np.linalg.norm(each.matrix[:2, 3]) > 1.2]
     walked = route(Stop((2.5, 1.0), 1.5, 0.3), Stop((0.0, 0.0), 0.0, 1.0, seated=True))
     matrices = walked.path.matrices()
     matrices[:, :3, 3] *= scale
-    controls = Controls(30.0, matrices, "EE", hand_left=np.tile([0.3, 0.3, 1.0], (len(matrices), 1)), scale=scale)
+    controls = Controls(
+        30.0, matrices, "EE", hand_left=np.tile([0.3, 0.3, 1.0], (len(matrices), 1)), scale=scale
+    )
     clean, weights = CleanUp(1.0, 1.0, 1.0, 1.0, 0.5), load_weights()
     built: list[str] = []
     real = distance._grid_of_steps
@@ -90,6 +122,8 @@ def test_takes_are_the_same_to_the_last_bit_and_far_grids_are_not_built(monkeypa
     few = len(set(built))
     monkeypatch.setattr(conditions, "beside", lambda scene, *_: scene)
     everything = generate(scene, controls, weights, clean_up=clean)
-    assert np.array_equal(take.joints, everything.joints) and np.array_equal(take.rotations, everything.rotations)
+    assert np.array_equal(take.joints, everything.joints) and np.array_equal(
+        take.rotations, everything.rotations
+    )
     assert take.metrics == everything.metrics and take.raw_metrics == everything.raw_metrics
     assert 1 < few < 0.3 * len(set(built))

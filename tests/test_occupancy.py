@@ -33,7 +33,12 @@ def walk(frames=40):
 
 def furniture():
     return [
-        Box(np.array([0.5, 0.3, 0.25]), np.array([0.25, 0.3, 0.25]), yaw_matrix(np.array(0.6)), "stool"),
+        Box(
+            np.array([0.5, 0.3, 0.25]),
+            np.array([0.25, 0.3, 0.25]),
+            yaw_matrix(np.array(0.6)),
+            "stool",
+        ),
         Box(np.array([-0.8, -0.5, 0.72]), np.array([0.6, 0.35, 0.02]), name="table top"),
         Box(np.array([1.5, 0.0, 1.0]), np.array([0.05, 1.5, 1.0]), name="wall"),
         Box(np.array([9.0, 9.0, 0.5]), np.array([0.5, 0.5, 0.5]), name="far away"),
@@ -43,7 +48,8 @@ def furniture():
 def expected(boxes, path):
     centres = to_world(path, np.broadcast_to(SPHERES, (len(path), *SPHERES.shape)))
     found = [
-        box_distance(rotate(transpose(box.rotation), centres - box.center), box.half_size) for box in boxes
+        box_distance(rotate(transpose(box.rotation), centres - box.center), box.half_size)
+        for box in boxes
     ]
     return occupancy_of_distance(np.min(found, axis=0))
 
@@ -58,7 +64,10 @@ def test_boxes_are_exact():
 
 def test_meshes_see_what_their_boxes_see():
     path, boxes = walk(), furniture()
-    from_meshes, exact = occupancy(Scene([as_mesh(box) for box in boxes]), path), occupancy(Scene(boxes), path)
+    from_meshes, exact = (
+        occupancy(Scene([as_mesh(box) for box in boxes]), path),
+        occupancy(Scene(boxes), path),
+    )
     assert np.abs(from_meshes - exact).max() < GRID_ERROR
     assert np.abs(from_meshes - exact)[(from_meshes > 0) | (exact > 0)].mean() < 0.03
 
@@ -129,9 +138,12 @@ def test_a_character_of_any_size_sees_what_the_exact_boxes_are(scale):
         assert np.abs(found - exact).max() < tolerance and found.max() == 1.0
         assert np.abs(found - exact)[exact > 0].mean() < 0.03
         points = np.random.default_rng(0).uniform([-1.5, -1.2, 0], [1.7, 1.2, 1.2], (40, 500, 3))
-        apart = np.min([box_distance((points - b.center) @ b.rotation, b.half_size) for b in boxes], axis=0)
+        apart = np.min(
+            [box_distance((points - b.center) @ b.rotation, b.half_size) for b in boxes], axis=0
+        )
         for measured in (shot.scene, shot.own_scene):
-            near = np.maximum(distance(measured, points, 0.0), -BAND)  # grids say no more of what is deeper inside
+            # grids say no more of what is deeper inside
+            near = np.maximum(distance(measured, points, 0.0), -BAND)
             np.testing.assert_allclose(near, np.clip(apart, -BAND, BAND), atol=0.013)
 
 
@@ -140,8 +152,17 @@ def test_a_character_of_any_size_sees_what_the_exact_boxes_are(scale):
 def test_the_own_scene_lies_where_furniture_is_at_the_own_frames(make, scale):
     fps, frames = 60.0, 81
     way = np.linspace(0.0, 1.0, frames)[:, None]
-    moving = Box(scale * (np.array([0.6, -0.8, 0.4]) + way * (0.0, 1.6, 0.0)), scale * np.full(3, 0.3), np.eye(3), "trolley")
-    shot = drained(shot_steps(Scene([make(moving)]), Controls(fps, np.tile(np.eye(4), (frames, 1, 1)), scale=scale)))
+    moving = Box(
+        scale * (np.array([0.6, -0.8, 0.4]) + way * (0.0, 1.6, 0.0)),
+        scale * np.full(3, 0.3),
+        np.eye(3),
+        "trolley",
+    )
+    shot = drained(
+        shot_steps(
+            Scene([make(moving)]), Controls(fps, np.tile(np.eye(4), (frames, 1, 1)), scale=scale)
+        )
+    )
     assert len(shot.own_path) == frames and len(shot.path) == 41
     points = np.array([0.6, 0.2, 0.4]) + np.zeros((frames, 1, 3))
     inside = np.where(distance(shot.own_scene, points, 0.0)[:, 0] < 0.0)[0]
@@ -157,14 +178,20 @@ def test_frames_must_match():
 
 def test_one_frame_is_enough():
     path = RootPath(np.zeros((1, 3)), np.zeros(1))
-    np.testing.assert_allclose(occupancy(Scene(furniture()), path), expected(furniture(), path), atol=1e-4)
+    np.testing.assert_allclose(
+        occupancy(Scene(furniture()), path), expected(furniture(), path), atol=1e-4
+    )
 
 
 def test_distance_of_points_to_the_scene():
     boxes = furniture()
     points = np.random.default_rng(0).uniform([-1.5, -1.2, 0], [1.7, 1.2, 1.2], (4, 5000, 3))
-    exact = np.min([box_distance((points - b.center) @ b.rotation, b.half_size) for b in boxes], axis=0)
-    np.testing.assert_allclose(distance(Scene(boxes), points, 0.0), np.minimum(exact, BAND), atol=1e-9)
+    exact = np.min(
+        [box_distance((points - b.center) @ b.rotation, b.half_size) for b in boxes], axis=0
+    )
+    np.testing.assert_allclose(
+        distance(Scene(boxes), points, 0.0), np.minimum(exact, BAND), atol=1e-9
+    )
     found = distance(Scene([as_mesh(box) for box in boxes]), points, np.zeros(4))
     np.testing.assert_allclose(found, np.clip(exact, -BAND, BAND), atol=0.013)
     assert (found < 0).any() and (found == BAND).any()
@@ -186,10 +213,18 @@ def _resting(places):
 
 
 def test_tops_are_those_of_seats_whatever_they_are_made_of():
-    slab = Box(np.array([0.0, 0.0, 0.445]), np.array([0.22, 0.22, 0.02]), name="slab")  # its top is at 0.465 m
+    # its top is at 0.465 m
+    slab = Box(np.array([0.0, 0.0, 0.445]), np.array([0.22, 0.22, 0.02]), name="slab")
     path = _resting([(0.0, 0.0), (0.1, -0.05), (1.0, 0.0)])
-    sheet = Mesh(np.array([(x, y, 0.52) for x in (-0.3, 0.3) for y in (-0.3, 0.3)]), np.array([(0, 1, 2), (1, 3, 2)]))
-    for solid, height, error in ((slab, 0.465, 1e-6), (as_mesh(slab), 0.465, 0.01), (sheet, 0.52, 0.015)):
+    sheet = Mesh(
+        np.array([(x, y, 0.52) for x in (-0.3, 0.3) for y in (-0.3, 0.3)]),
+        np.array([(0, 1, 2), (1, 3, 2)]),
+    )
+    for solid, height, error in (
+        (slab, 0.465, 1e-6),
+        (as_mesh(slab), 0.465, 0.01),
+        (sheet, 0.52, 0.015),
+    ):
         scene, _ = prepared(Scene((solid,)), 0.0)
         tops = tops_under(scene, path)
         assert np.abs(tops[:2] - height).max() < error and np.isnan(tops[2])
@@ -198,7 +233,14 @@ def test_tops_are_those_of_seats_whatever_they_are_made_of():
 
 def test_tops_follow_a_moving_seat_and_an_upper_storey():
     path = RootPath(np.tile([0.0, 0.0, 3.0], (2, 1)), np.zeros(2))
-    lift = Box(np.array([[0.0, 0.0, 3.2], [0.0, 0.0, 3.3]]), np.array([0.3, 0.3, 0.2]), np.tile(np.eye(3), (2, 1, 1)))
+    lift = Box(
+        np.array([[0.0, 0.0, 3.2], [0.0, 0.0, 3.3]]),
+        np.array([0.3, 0.3, 0.2]),
+        np.tile(np.eye(3), (2, 1, 1)),
+    )
     assert np.allclose(tops_under(Scene((lift,)), path), [3.4, 3.5])
     walls = Box(np.array([0.0, 0.0, 4.5]), np.array([0.5, 0.5, 1.5]), name="a pillar one stands in")
-    assert np.isnan(tops_under(Scene((walls,)), path)).all() or (tops_under(Scene((walls,)), path) > 3.85).all()
+    assert (
+        np.isnan(tops_under(Scene((walls,)), path)).all()
+        or (tops_under(Scene((walls,)), path) > 3.85).all()
+    )

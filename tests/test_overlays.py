@@ -1,4 +1,6 @@
-"""Overlays: what they show, as arrays with known answers, and that they are off unless switched on and survive everything."""
+"""Overlays: what they show, as arrays with known answers, and that they are off unless switched on
+and survive everything.
+"""
 
 import ast
 from pathlib import Path
@@ -12,7 +14,9 @@ FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (
 
 
 class Shot:
-    """A character in a scene of this unit scale, a box 40 cm to the left of its root, and takes that tests make up."""
+    """A character in a scene of this unit scale, a box 40 cm to the left of its root, and takes
+    that tests make up.
+    """
 
     def __init__(self, bpy: ModuleType, addon, unit: float = 1.0) -> None:
         self.bpy, self.addon, self.scene, self.unit = bpy, addon, bpy.context.scene, unit
@@ -48,25 +52,38 @@ class Shot:
         from dafnet_addon.core.solids import box_distance
 
         (drawn,) = self.drawn("spheres")
-        return len(drawn.beads) > 25 and bool((box_distance(drawn.beads - centre, np.full(3, 0.2)) < RADIUS).all())
+        return len(drawn.beads) > 25 and bool(
+            (box_distance(drawn.beads - centre, np.full(3, 0.2)) < RADIUS).all()
+        )
 
     def drawn(self, kind: str) -> tuple:
         return self.data.drawings(self.bpy.context, [kind]).get(kind, ())
 
     def add(self, joints: np.ndarray, start: int = 1, play: bool = True, **given):
         """An action that holds a take of these joints (T, 22, 3), metres."""
-        take_module, core = self.addon("dafnet_addon.core.take"), self.addon("dafnet_addon.core.root")
+        take_module, core = (
+            self.addon("dafnet_addon.core.take"),
+            self.addon("dafnet_addon.core.root"),
+        )
         frames = len(joints)
         action_shares = given.pop("action", np.full((frames, 10), 0.1))
         path = core.RootPath(np.c_[joints[:, 0, :2], np.zeros(frames)], np.zeros(frames))
         take = take_module.Take(
-            30.0, joints, np.tile([1.0, 0, 0, 0], (frames, 22, 1)), path.matrices(), action_shares, 1.0,
-            np.zeros((70 + frames, 66)), path,
+            30.0,
+            joints,
+            np.tile([1.0, 0, 0, 0], (frames, 22, 1)),
+            path.matrices(),
+            action_shares,
+            1.0,
+            np.zeros((70 + frames, 66)),
+            path,
         )
         controls = take_module.Controls(30.0, path.matrices(), **given)
         action = self.bpy.data.actions.new("Ann take")
         draw = self.addon("dafnet_addon.core.generate").Draw(0, 0, 0.0, 0.0)
-        self.addon("dafnet_addon.blender.takes").add_take(self.ann, action, take, controls, draw, start)
+        self.addon("dafnet_addon.blender.takes").add_take(
+            self.ann, action, take, controls, draw, start
+        )
         if play:
             self.ann.animation_data_create().action = action
         self.update()
@@ -105,7 +122,11 @@ def test_nothing_is_touched_before_a_switch_goes_on(shot: Shot) -> None:
 
     assert hooks() == [0, 0]
     switches.path = True
-    assert switches.path and overlays.switched_on() == {"path"} and hooks() == [2, len(overlays._LISTENERS)]
+    assert (
+        switches.path
+        and overlays.switched_on() == {"path"}
+        and hooks() == [2, len(overlays._LISTENERS)]
+    )
     switches.circle = True
     assert hooks() == [2, len(overlays._LISTENERS)], "one hook for all"
     switches.path = switches.circle = False
@@ -119,7 +140,9 @@ def test_nothing_is_touched_before_a_switch_goes_on(shot: Shot) -> None:
     assert hooks() == [0, 0]
     body = ast.parse(Path(overlays.__file__).read_text(encoding="utf-8")).body
     top = [node for node in body if isinstance(node, ast.Import | ast.ImportFrom)]
-    named = {alias.name for node in top for alias in node.names} | {getattr(node, "module", "") for node in top}
+    named = {alias.name for node in top for alias in node.names} | {
+        getattr(node, "module", "") for node in top
+    }
     assert not named & {"gpu", "gpu_extras.batch", "blf"}
 
 
@@ -168,7 +191,9 @@ def test_a_box_occupies_the_spheres_that_it_covers(shot: Shot, unit: float) -> N
     known = SPHERES[occupied > 0.15]
     apart = np.linalg.norm(known[:, None] - unit * drawn.beads[None], axis=-1).min(axis=1)
     assert len(known) > 30 and apart.max() < 1e-3
-    assert (box_distance(unit * drawn.beads - centre, np.full(3, 0.2)) < RADIUS).all(), "and no others"
+    assert (box_distance(unit * drawn.beads - centre, np.full(3, 0.2)) < RADIUS).all(), (
+        "and no others"
+    )
     inside = box_distance(unit * drawn.beads - centre, np.full(3, 0.2)) < -0.02
     assert drawn.bead_colours[inside, 0].min() > 0.95, "red where it is full"
     assert np.allclose(unit * drawn.radii[inside], 0.036, atol=1e-4)
@@ -183,7 +208,9 @@ def test_spheres_go_with_the_root_and_the_furniture(shot: Shot) -> None:
     root.rotation_euler.z = np.pi / 2
     shot.update()
     turned = shot.drawn("spheres")
-    assert turned is not before and list(shot.data._rooms.values()) == rooms, "the furniture is not read again for it"
+    assert turned is not before and list(shot.data._rooms.values()) == rooms, (
+        "the furniture is not read again for it"
+    )
     assert shot.is_seen(-0.4, 0.0, 0.3), "the box has not moved"
     shot.box.location = (0.0, 0.5, 0.3)
     shot.update()
@@ -227,7 +254,9 @@ def test_the_root_path_is_the_takes_else_that_of_the_keys(blender, addon, unit: 
     shot.add(standing(30, 0.05), start=11)
     (drawn,) = shot.drawn("path")
     ends = unit * drawn.lines[:29]
-    assert np.allclose(ends[:, 0, 1], 0.05 * np.arange(29), atol=1e-5) and np.allclose(ends[0, 0, 2], 0.01)
+    assert np.allclose(ends[:, 0, 1], 0.05 * np.arange(29), atol=1e-5) and np.allclose(
+        ends[0, 0, 2], 0.01
+    )
     shot.ann.animation_data.action = None
     root.constraints.new("COPY_LOCATION")
     shot.data.note_edit(None)
@@ -251,12 +280,15 @@ def test_planted_feet_and_collisions_are_marked(shot: Shot) -> None:
     assert np.allclose(beads(green)[:, :2], joints[30, [11], :2], atol=1e-5)
     assert not len(beads(orange)) and not len(beads(red))
     beside = np.array((0.12, 0.0, 0.0))
-    shot.box.location = tuple(joints[0, 4] - beside)  # its right side is 8 cm to the right of the left knee
+    # its right side is 8 cm to the right of the left knee
+    shot.box.location = tuple(joints[0, 4] - beside)
     shot.update()
     assert np.allclose(beads(red), joints[30, [4]], atol=1e-5)
     shot.box.location.x -= 0.13
     shot.update()
-    assert np.allclose(beads(orange), joints[30, [4]], atol=1e-5) and not len(beads(red)), "5 cm from it"
+    assert np.allclose(beads(orange), joints[30, [4]], atol=1e-5) and not len(beads(red)), (
+        "5 cm from it"
+    )
     shot.scene.frame_set(41)
     assert shot.drawn("marks") == (), "the take has ended"
 
@@ -268,7 +300,9 @@ def test_the_circle_shows_the_action_of_the_frame(shot: Shot) -> None:
     rim, rays = shot.drawn("circle")
     assert rays.line_colours[:, 3].argmax() == 3 and np.allclose(rays.line_colours[:, 3], shares[3])
     assert [text for _, text, _ in rim.labels] == [str(k) for k in range(1, 11)]
-    assert np.allclose(rays.lines[0, 1], (0.0, 1.0, 0.0)) and rays.lines[1, 1, 0] > 0.5, "clockwise from the top"
+    assert np.allclose(rays.lines[0, 1], (0.0, 1.0, 0.0)) and rays.lines[1, 1, 0] > 0.5, (
+        "clockwise from the top"
+    )
     bright = [text for _, text, colour in rim.labels if colour[0] == 1.0]
     assert bright == ["4"]
     assert shot.drawn("circle")[0] is rim
@@ -280,7 +314,13 @@ def test_hands_are_shown_beside_their_targets(shot: Shot) -> None:
     joints = standing(40)
     target = joints[:, 21] + (0.0, 0.05, 0.0)
     mode = ("FREE",) * 10 + ("EE",) * 30
-    shot.add(joints, hand_right=target, mode=mode, hand_left=joints[:, 20], hand_left_influence=np.zeros(40))
+    shot.add(
+        joints,
+        hand_right=target,
+        mode=mode,
+        hand_left=joints[:, 20],
+        hand_left_influence=np.zeros(40),
+    )
     shot.scene.frame_set(20)
     (drawn,) = shot.drawn("reach")
     assert [text for _, text, _ in drawn.labels] == ["5.0 cm"]
@@ -301,18 +341,24 @@ def test_ghosts_are_the_other_takes_that_are_ticked(shot: Shot) -> None:
     first.dafnet.ghost = third.dafnet.ghost = True
     (drawn,) = shot.drawn("ghosts")
     assert len(drawn.lines) == 21 and drawn.labels[0][1] == third.name
-    assert np.allclose(drawn.lines[0, 0], (standing(20, 0.1) + 2.0)[4, 0], atol=1e-5), "from its own first frame on"
+    assert np.allclose(drawn.lines[0, 0], (standing(20, 0.1) + 2.0)[4, 0], atol=1e-5), (
+        "from its own first frame on"
+    )
     assert shot.drawn("ghosts")[0] is drawn
     second.dafnet.ghost = True
     assert len(shot.drawn("ghosts")) == 2
     shot.scene.frame_set(1)
-    assert np.allclose(shot.drawn("ghosts")[1].lines[0, 0], (standing(20, 0.1) + 2.0)[0, 0], atol=1e-5), "it waits"
+    assert np.allclose(
+        shot.drawn("ghosts")[1].lines[0, 0], (standing(20, 0.1) + 2.0)[0, 0], atol=1e-5
+    ), "it waits"
 
 
 def test_the_growing_figure_is_in_scene_units(blender, addon) -> None:
     shot = Shot(blender, addon, 0.01)
     (drawn,) = shot.data.growing(shot.bpy.context, standing(1)[0])
-    assert drawn.lines.shape == (21, 2, 3) and np.allclose(drawn.lines[:, 1], 100.0 * standing(1)[0, 1:])
+    assert drawn.lines.shape == (21, 2, 3) and np.allclose(
+        drawn.lines[:, 1], 100.0 * standing(1)[0, 1:]
+    )
 
 
 def test_what_is_deleted_while_it_is_shown_does_no_harm(shot: Shot) -> None:
@@ -373,7 +419,9 @@ def test_another_object_may_be_active(shot: Shot) -> None:
     shot.bpy.ops.object.select_all(action="DESELECT")
     objects.active = shot.box
     shot.data.note_edit(None)
-    assert shot.data.watched(shot.bpy.context).name == "Bob", "the last one, while the furniture is worked on"
+    assert shot.data.watched(shot.bpy.context).name == "Bob", (
+        "the last one, while the furniture is worked on"
+    )
 
 
 def test_faulty_frames_are_marked_and_unmarked(shot: Shot) -> None:
@@ -389,11 +437,17 @@ def test_faulty_frames_are_marked_and_unmarked(shot: Shot) -> None:
     assert shot.bpy.ops.dafnet.mark_frames() == {"FINISHED"}
     faults = shot.overlays.shown_faults(action)
     assert shot.scene.frame_current == 17
-    assert np.flatnonzero(faults.sliding).tolist() == list(range(10, 15)) and set(faults.sliding[10:15]) == {2}
+    assert np.flatnonzero(faults.sliding).tolist() == list(range(10, 15)) and set(
+        faults.sliding[10:15]
+    ) == {2}
     assert faults.collisions[:19].max() == 0 and faults.collisions[20:].min() >= 1
     bars = shot.data.strip(faults, 11)
     assert bars.first[0] == 21 and bars.last[0] == 25 and bars.row[0] == 0
-    assert bars.first[1] == 31 and bars.last[bars.row == 1].max() == 40 and bars.colours.shape == (len(bars.row), 4)
+    assert (
+        bars.first[1] == 31
+        and bars.last[bars.row == 1].max() == 40
+        and bars.colours.shape == (len(bars.row), 4)
+    )
     assert set(shot.overlays._drawers) == {"timeline"}
     assert shot.bpy.ops.dafnet.mark_frames() == {"FINISHED"}
     assert shot.overlays.shown_faults(action) is None and not shot.overlays._drawers
@@ -407,9 +461,13 @@ def test_beads_are_closed_and_lit(shot: Shot) -> None:
     corners, colours = shot.overlays.beads_of(drawn)
     faces = corners.reshape(8, 3, 3)
     normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
-    assert ((normals * (faces.mean(axis=1) - (1.0, 2.0, 3.0))).sum(-1) > 0).all(), "all look outward"
+    assert ((normals * (faces.mean(axis=1) - (1.0, 2.0, 3.0))).sum(-1) > 0).all(), (
+        "all look outward"
+    )
     assert np.allclose(np.linalg.norm(corners - (1.0, 2.0, 3.0), axis=1), 0.5)
-    assert colours.shape == (24, 4) and 0.3 < colours[:, 0].min() < 0.6 and colours[:, 0].max() > 0.95
+    assert (
+        colours.shape == (24, 4) and 0.3 < colours[:, 0].min() < 0.6 and colours[:, 0].max() > 0.95
+    )
 
 
 def test_the_corner_avoids_the_sidebar(shot: Shot) -> None:
@@ -418,7 +476,9 @@ def test_the_corner_avoids_the_sidebar(shot: Shot) -> None:
             self.type, self.x, self.width = kind, x, width
 
     window = Region("WINDOW", 100, 800)
-    area = type("Area", (), {"regions": [window, Region("TOOLS", 100, 50), Region("UI", 700, 200)]})()
+    area = type(
+        "Area", (), {"regions": [window, Region("TOOLS", 100, 50), Region("UI", 700, 200)]}
+    )()
     assert shot.overlays.corner_of(area, window, 50.0) == (550.0, 50.0)
     area.regions[2].width, area.regions[2].x = 1, 899
     assert shot.overlays.corner_of(area, window, 50.0) == (750.0, 50.0)

@@ -1,4 +1,6 @@
-"""The frozen test like the paper's: whose motion it is, and that its ground truth walks, sits, works and stays clear."""
+"""The frozen test like the paper's: whose motion it is, and that its ground truth walks, sits,
+works and stays clear.
+"""
 
 import json
 from collections import defaultdict
@@ -23,16 +25,21 @@ from dafnet_addon.data.mocap import read_clips
 from dafnet_addon.data.windows import Motion
 
 MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
-pytestmark = pytest.mark.skipif(not any(MOCAP.glob("*.npz")), reason="the motion files are not here")
+pytestmark = pytest.mark.skipif(
+    not any(MOCAP.glob("*.npz")), reason="the motion files are not here"
+)
 TOES = [joint("left_foot"), joint("right_foot")]
 FEET = [*TOES, joint("left_ankle"), joint("right_ankle")]
 WRISTS = [joint("left_wrist"), joint("right_wrist")]
 SEATS = {  # the heights of seats and desks, metres
-    "low chair": (0.38, 0.42), "high wide chair": (0.50, 0.55), "low chair and desk": (0.38, 0.42),
+    "low chair": (0.38, 0.42),
+    "high wide chair": (0.50, 0.55),
+    "low chair and desk": (0.38, 0.42),
     "high chair and desk": (0.50, 0.55),
 }
 DESKS = {"low chair and desk": (0.65, 0.70), "high chair and desk": (0.75, 0.80)}
-OFF = 0.015  # metres by which a desk is higher or lower than it should be: it is fitted under the hands
+# metres by which a desk is higher or lower than it should be: it is fitted under the hands
+OFF = 0.015
 
 
 @cache
@@ -55,21 +62,31 @@ def _clips() -> list[HeldClip]:
 
 def _over_seat(clip: HeldClip) -> np.ndarray:
     """The pelvis' height in each frame of the rest (N,), metres over the highest box under it."""
-    rest, = clip.rests
+    (rest,) = clip.rests
     pelvis = clip.joints[rest.start : rest.end, 0]
-    under = [row[2] + row[5] for row in clip.boxes if distances(row[None], rest.position * (1, 1, 0) + (0, 0, row[2])) < 0]
+    under = [
+        row[2] + row[5]
+        for row in clip.boxes
+        if distances(row[None], rest.position * (1, 1, 0) + (0, 0, row[2])) < 0
+    ]
     return pelvis[:, 2] - max(under)
 
 
 def _desk(clip: HeldClip) -> np.ndarray:
     """The desk's top, the largest box over the seat that lies flat."""
-    rest, = clip.rests
-    flat = clip.boxes[(clip.boxes[:, 2] > rest.position[2]) & (clip.boxes[:, 5] < 0.05) & (clip.boxes[:, 3:5].min(1) > 0.08)]
+    (rest,) = clip.rests
+    flat = clip.boxes[
+        (clip.boxes[:, 2] > rest.position[2])
+        & (clip.boxes[:, 5] < 0.05)
+        & (clip.boxes[:, 3:5].min(1) > 0.08)
+    ]
     return flat[np.argmax(flat[:, 3] * flat[:, 4])]
 
 
 def _hand_gaps(clip: HeldClip, works: int) -> np.ndarray:
-    """Distances (2, N) of the wrists to the desk's top, or to the board, from frame ``works`` on."""
+    """Distances (2, N) of the wrists to the desk's top, or to the board, from frame ``works``
+    on.
+    """
     surface = clip.boxes[:1] if clip.room == "whiteboard" else _desk(clip)[None]
     hands = clip.joints[works:, WRISTS]
     return distances(surface, hands.reshape(-1, 3))[0].reshape(-1, 2).T
@@ -86,19 +103,32 @@ def test_all_clips_load_and_say_what_they_are():
     assert 4000 <= sum(len(clip.joints) for clip in clips) <= 6500
     assert all(clip.composed and clip.unseen for clip in clips)
     assert {clip.room for clip in clips} == {*SEATS, "whiteboard"}
-    assert all((clip.activity == "reach") == (clip.room == "whiteboard") == (not clip.rests) for clip in clips)
+    assert all(
+        (clip.activity == "reach") == (clip.room == "whiteboard") == (not clip.rests)
+        for clip in clips
+    )
 
 
 def test_no_body_of_training_is_in_it():
     clips = {f"{clip.source}/{clip.name}": clip for clip in read_clips(MOCAP)}
     trained = {f"{clip.source}/{clip.subject}" for clip in clips.values() if clip.split == "train"}
-    parts = {part: {r[part]["clip"] for r in _frozen() if part in r} for part in ("walk", "sit", "upper", "stand")}
+    parts = {
+        part: {r[part]["clip"] for r in _frozen() if part in r}
+        for part in ("walk", "sit", "upper", "stand")
+    }
     assert all(len(names) > 2 for names in parts.values())
     for name in set().union(*parts.values()):
-        assert clips[name].split == "test" and f"{clips[name].source}/{clips[name].subject}" not in trained, name
+        assert (
+            clips[name].split == "test"
+            and f"{clips[name].source}/{clips[name].subject}" not in trained
+        ), name
         assert clips[name].source not in ("cmu69", "snu_ys2010", "hdm05_cuts"), name
     # UI-PRMD's bodies have arms lent by these.
-    lenders = [c for c in clips.values() if c.split == "test" and c.category in ("standing_idle", "seated_chair")]
+    lenders = [
+        c
+        for c in clips.values()
+        if c.split == "test" and c.category in ("standing_idle", "seated_chair")
+    ]
     assert lenders and trained.isdisjoint(f"{clip.source}/{clip.subject}" for clip in lenders)
     bodies = {clip.body for clip in _clips()}
     assert len(bodies) >= 4 and trained.isdisjoint(bodies)
@@ -119,7 +149,9 @@ def test_sides_are_the_furnitures():
     for yaw in (0.0, 2.0):
         turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
         for start, chair, board in (
-            ((0.2, 2.0), "front", "behind"), ((-0.2, -2.0), "behind", "front"), ((2.0, 1.0), "right", "right"),
+            ((0.2, 2.0), "front", "behind"),
+            ((-0.2, -2.0), "behind", "front"),
+            ((2.0, 1.0), "right", "right"),
             ((-2.0, -1.0), "left", "left"),
         ):
             places = np.zeros((60, 3))
@@ -148,12 +180,21 @@ def test_it_sits_on_seats_of_the_right_height():
             assert np.abs(over - SEAT_TO_PELVIS).max() < 0.05, clip.name
             top = clip.rests[0].position[2] - np.median(over)
             assert low - 0.01 < top < high + 0.01, clip.name
-            assert clip.rests[0].end == len(clip.joints) and clip.rests[0].end - clip.rests[0].start >= 45
+            assert (
+                clip.rests[0].end == len(clip.joints)
+                and clip.rests[0].end - clip.rests[0].start >= 45
+            )
         if clip.room == "high wide chair":
             assert clip.boxes[0, 3] >= 0.3, clip.name
     with pytest.raises(AssertionError):
         clip = next(clip for clip in _clips() if clip.rests)
-        assert np.abs(_over_seat(replace(clip, joints=clip.joints + np.array([0, 0, 0.08]))) - SEAT_TO_PELVIS).max() < 0.05
+        assert (
+            np.abs(
+                _over_seat(replace(clip, joints=clip.joints + np.array([0, 0, 0.08])))
+                - SEAT_TO_PELVIS
+            ).max()
+            < 0.05
+        )
 
 
 def test_hands_work_on_the_desk_and_at_the_board():
@@ -186,10 +227,14 @@ def test_motion_that_is_missing_or_not_the_same_is_refused(monkeypatch, tmp_path
     monkeypatch.setattr(p, "FROZEN", tmp_path / "paper_test.json")
     p.FROZEN.write_text(json.dumps({"clips": [recipe]}), encoding="utf-8")
     for changed, told in (
-        ({walk: stretched}, "is not the motion"), ({walk: shorter}, "is not the motion"), ({sit: never}, "is not the motion"),
+        ({walk: stretched}, "is not the motion"),
+        ({walk: shorter}, "is not the motion"),
+        ({sit: never}, "is not the motion"),
         ({walk: None}, f"needs '{walk}', which is not in"),
     ):
-        motions = {name: motion for name, motion in {**captured, **changed}.items() if motion is not None}
+        motions = {
+            name: motion for name, motion in {**captured, **changed}.items() if motion is not None
+        }
         monkeypatch.setattr(p, "_unseen", lambda folder, motions=motions: motions)
         with pytest.raises(InputError, match=told):
             p.paper_test(MOCAP)

@@ -1,4 +1,6 @@
-"""What a root path leads through: named where it does, no word where people walk and sit as they may."""
+"""What a root path leads through: named where it does, no word where people walk and sit as they
+may.
+"""
 
 import json
 from pathlib import Path
@@ -17,8 +19,20 @@ from dafnet_addon.director.seats import seat_of
 from dafnet_addon.director.walks import walk_to
 
 LIBRARY = Path(__file__).resolve().parents[2] / "shared" / "data" / "furniture" / "library"
-FACES = ((0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4),
-         (1, 5, 7), (1, 7, 3))
+FACES = (
+    (0, 1, 3),
+    (0, 3, 2),
+    (4, 6, 7),
+    (4, 7, 5),
+    (0, 4, 5),
+    (0, 5, 1),
+    (2, 3, 7),
+    (2, 7, 6),
+    (0, 2, 6),
+    (0, 6, 4),
+    (1, 5, 7),
+    (1, 7, 3),
+)
 
 
 def block(name: str, low: tuple[float, float, float], high: tuple[float, float, float]) -> Box:
@@ -27,13 +41,19 @@ def block(name: str, low: tuple[float, float, float], high: tuple[float, float, 
 
 
 def as_mesh(box: Box) -> Mesh:
-    corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * box.half_size + box.center
+    corners = (
+        np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * box.half_size
+        + box.center
+    )
     return Mesh(corners, np.array(FACES), name=box.name)
 
 
 def chair(height: float = 0.45, arms: bool = False) -> list[Box]:
     """It looks along +y; one sits over its origin."""
-    parts = [((-0.22, -0.22, height - 0.05), (0.22, 0.22, height)), ((-0.22, -0.26, height), (0.22, -0.22, height + 0.45))]
+    parts = [
+        ((-0.22, -0.22, height - 0.05), (0.22, 0.22, height)),
+        ((-0.22, -0.26, height), (0.22, -0.22, height + 0.45)),
+    ]
     if arms:
         parts += [((x, -0.22, height), (x + 0.05, 0.15, height + 0.2)) for x in (-0.27, 0.22)]
     return [block("Chair", low, high) for low, high in parts]
@@ -41,12 +61,18 @@ def chair(height: float = 0.45, arms: bool = False) -> list[Box]:
 
 def desk(edge: float, top: float = 0.74) -> list[Box]:
     """Before the chair, its near edge at y = ``edge``."""
-    legs = [block("Desk", (x, y, 0.0), (x + 0.05, y + 0.05, top)) for x in (-0.7, 0.65) for y in (edge, edge + 0.6)]
+    legs = [
+        block("Desk", (x, y, 0.0), (x + 0.05, y + 0.05, top))
+        for x in (-0.7, 0.65)
+        for y in (edge, edge + 0.6)
+    ]
     return [block("Desk", (-0.7, edge, top - 0.03), (0.7, edge + 0.68, top)), *legs]
 
 
 def comes(side: float = 2.5) -> Route:
-    return route(Stop((side, -0.8), facing((-side, 0.6)), 0.3), Stop((0.0, 0.0), 0.0, 2.0, seated=True))
+    return route(
+        Stop((side, -0.8), facing((-side, 0.6)), 0.3), Stop((0.0, 0.0), 0.0, 2.0, seated=True)
+    )
 
 
 def said(solids: list[Box] | list[Mesh], walked: Route) -> list[str]:
@@ -60,7 +86,11 @@ def test_a_desk_over_or_before_the_chair_is_named_with_its_time(make, edge: floa
     walked = comes()
     solids = [make(box) for box in chair() + desk(edge)]
     (warning,) = said(solids, walked)
-    assert "'Desk'" in warning and "'Chair'" not in warning and warning.endswith("move the path or the furniture.")
+    assert (
+        "'Desk'" in warning
+        and "'Chair'" not in warning
+        and warning.endswith("move the path or the furniture.")
+    )
     met = met_along(Scene(tuple(solids)), walked.path, 30.0)
     assert {each.name for each in met} == {"Desk"}
     y = walked.path.position[:, 1]
@@ -72,7 +102,10 @@ def test_a_desk_over_or_before_the_chair_is_named_with_its_time(make, edge: floa
 @pytest.mark.parametrize("make", [lambda box: box, as_mesh], ids=["boxes", "meshes"])
 def test_chairs_stools_and_armchairs_are_sat_on_without_a_word(make, height: float) -> None:
     leaving = route(
-        Stop((0.5, 3.0), np.pi, 0.3), Stop((0.0, 0.0), 0.0, 2.0, seated=True), (1.5, 1.2), Stop((3.0, 0.0), 0.0, 1.0),
+        Stop((0.5, 3.0), np.pi, 0.3),
+        Stop((0.0, 0.0), 0.0, 2.0, seated=True),
+        (1.5, 1.2),
+        Stop((3.0, 0.0), 0.0, 1.0),
     )
     for walked in (comes(), comes(-2.5), leaving):
         for solids in (chair(height), chair(height, arms=True), chair(height)[:1]):
@@ -82,8 +115,10 @@ def test_chairs_stools_and_armchairs_are_sat_on_without_a_word(make, height: flo
 def test_a_chair_at_a_desk_with_room_and_a_sofa_with_cushions_are_no_hindrance() -> None:
     assert said(chair() + desk(0.75), comes()) == []
     sofa = [
-        block("Sofa", (-1.0, -0.35, 0.1), (1.0, 0.35, 0.32)), block("Sofa", (-1.0, -0.5, 0.1), (1.0, -0.35, 0.8)),
-        block("Cushion", (-0.5, -0.3, 0.32), (0.5, 0.35, 0.5)), block("Pillow", (0.3, -0.3, 0.5), (0.6, -0.2, 0.8)),
+        block("Sofa", (-1.0, -0.35, 0.1), (1.0, 0.35, 0.32)),
+        block("Sofa", (-1.0, -0.5, 0.1), (1.0, -0.35, 0.8)),
+        block("Cushion", (-0.5, -0.3, 0.32), (0.5, 0.35, 0.5)),
+        block("Pillow", (0.3, -0.3, 0.5), (0.6, -0.2, 0.8)),
     ]
     assert said(sofa, comes()) == [] == said([as_mesh(box) for box in sofa], comes())
     bar = block("Chair", (-0.2, -0.02, 0.2), (0.2, 0.02, 0.24))
@@ -93,17 +128,26 @@ def test_a_chair_at_a_desk_with_room_and_a_sofa_with_cushions_are_no_hindrance()
 def test_on_a_bed_one_may_lie_down_far_from_where_one_sat() -> None:
     bed = [block("Bed", (-1.0, -1.2, 0.2), (1.0, 0.3, 0.5))]
     sits = comes()
-    lies = np.concatenate([sits.path.position, sits.path.position[-1] - np.linspace(0.0, 0.7, 90)[:, None] * (0.0, 1.0, 0.0)])
+    lies = np.concatenate(
+        [
+            sits.path.position,
+            sits.path.position[-1] - np.linspace(0.0, 0.7, 90)[:, None] * (0.0, 1.0, 0.0),
+        ]
+    )
     path = RootPath(lies, np.concatenate([sits.path.yaw, np.full(90, sits.path.yaw[-1])]))
     assert said(bed, Route(path, ())) == []
 
 
-@pytest.mark.parametrize("solid", [
-    block("Table", (-0.5, -0.5, 0.70), (0.5, 0.5, 0.73)),
-    block("Bench", (-0.5, -0.5, 0.0), (0.5, 0.5, 0.55)),
-    block("Cupboard", (-0.3, -0.3, 0.0), (0.3, 0.3, 1.9)),
-    block("Rail", (-0.5, -0.03, 1.0), (0.5, 0.03, 1.05)),
-], ids=lambda box: box.name)
+@pytest.mark.parametrize(
+    "solid",
+    [
+        block("Table", (-0.5, -0.5, 0.70), (0.5, 0.5, 0.73)),
+        block("Bench", (-0.5, -0.5, 0.0), (0.5, 0.5, 0.55)),
+        block("Cupboard", (-0.3, -0.3, 0.0), (0.3, 0.3, 1.9)),
+        block("Rail", (-0.5, -0.03, 1.0), (0.5, 0.03, 1.05)),
+    ],
+    ids=lambda box: box.name,
+)
 def test_who_walks_through_something_is_told(solid: Box) -> None:
     walked = route(Stop((0.0, -2.0), 0.0, 0.2), Stop((0.0, 2.0), 0.0, 0.2))
     for each in (solid, as_mesh(solid)):
@@ -116,7 +160,11 @@ def test_who_walks_through_something_is_told(solid: Box) -> None:
 def test_a_sheet_without_thickness_is_met_and_several_pieces_are_one_sentence() -> None:
     walked = route(Stop((0.0, -2.0), 0.0, 0.2), Stop((0.0, 6.0), 0.0, 0.2))
     sheets = [
-        Mesh(np.array([(x, y, z) for x in (-1.0, 1.0) for z in (0.0, 2.0)]), np.array([(0, 1, 2), (1, 3, 2)]), name=f"Wall {k}")
+        Mesh(
+            np.array([(x, y, z) for x in (-1.0, 1.0) for z in (0.0, 2.0)]),
+            np.array([(0, 1, 2), (1, 3, 2)]),
+            name=f"Wall {k}",
+        )
         for k, y in enumerate((0.0, 1.0, 2.0, 3.0, 4.0))
     ]
     (warning,) = said(sheets, walked)
@@ -126,7 +174,9 @@ def test_a_sheet_without_thickness_is_met_and_several_pieces_are_one_sentence() 
 def test_a_seat_that_rides_along_is_sat_on() -> None:
     path = RootPath(np.c_[np.linspace(0.0, 4.0, 120), np.zeros((120, 2))], np.zeros(120))
     seat = block("Trolley", (-0.22, -0.22, 0.5), (0.22, 0.22, 0.62))
-    moving = Box(seat.center + path.position, seat.half_size, np.tile(np.eye(3), (120, 1, 1)), "Trolley")
+    moving = Box(
+        seat.center + path.position, seat.half_size, np.tile(np.eye(3), (120, 1, 1)), "Trolley"
+    )
     assert passages(Scene((moving,)), path, 30.0, seats_along(Scene((moving,)), path, 30.0)) == ()
     standing = Box(seat.center + np.array([2.0, 0.0, 0.0]), seat.half_size, name="Stool")
     met = passages(Scene((standing,)), path, 30.0, seats_along(Scene((standing,)), path, 30.0))

@@ -1,4 +1,6 @@
-"""Root paths: they go where they are told, at human speeds, and move at a seat as captured people do."""
+"""Root paths: they go where they are told, at human speeds, and move at a seat as captured people
+do.
+"""
 
 import json
 from pathlib import Path
@@ -40,7 +42,8 @@ def test_rests_where_it_was_told_and_moves_as_people_do(name: str) -> None:
     velocity = velocities(smoothed(walked.path)) * 30
     speed = np.linalg.norm(velocity[:, :2], axis=1)
     assert 1.05 < speed.max() < 1.15
-    assert np.degrees(np.abs(velocity[:, 2])).max() < 160  # captured: 170 in a turn of 180 degrees before a seat
+    # captured: 170 in a turn of 180 degrees before a seat
+    assert np.degrees(np.abs(velocity[:, 2])).max() < 160
     steps = np.diff(smoothed(walked.path).position, n=2, axis=0) * 900
     assert np.linalg.norm(steps, axis=1).max() < 2.5
 
@@ -56,7 +59,9 @@ def test_walkers_look_where_they_go_and_back_onto_the_seat() -> None:
 
 
 def test_standing_stop_turns_to_face_its_yaw() -> None:
-    walked = route(Stop((0, 0), 0.0, 1.0), (0.0, 2.0), Stop((2.0, 3.0), facing((0, -1)), 2.0), floor=1.5)
+    walked = route(
+        Stop((0, 0), 0.0, 1.0), (0.0, 2.0), Stop((2.0, 3.0), facing((0, -1)), 2.0), floor=1.5
+    )
     assert np.degrees(np.abs(velocities(walked.path)[:, 2])).max() * 30 < 170
     assert np.cos(walked.path.yaw[-1]) == pytest.approx(-1.0)
     assert (walked.path.position[:, 2] == 1.5).all()
@@ -77,7 +82,9 @@ def test_refuses_paths_that_cannot_be_walked() -> None:
 
 
 def test_a_captured_sit_down_moves_alike() -> None:
-    """Distance to the seat over the last second, against a captured person who comes from the side (held-out clip)."""
+    """Distance to the seat over the last second, against a captured person who comes from the side
+    (held-out clip).
+    """
     folder = Path(__file__).parents[2] / "shared" / "data" / "mocap"
     if not (folder / "snu_tiling.npz").exists():
         pytest.skip("the motion capture is not beside the repository")
@@ -96,11 +103,10 @@ def test_a_captured_sit_down_moves_alike() -> None:
 
     def profile(position: np.ndarray, frame: int, home: np.ndarray) -> np.ndarray:
         distance = np.linalg.norm(position[:, :2] - home[:2], axis=1)
-        near = frame - int(np.argmax(distance[frame::-1] > 0.1))  # aligned where 10 cm are left to go
+        # aligned where 10 cm are left to go
+        near = frame - int(np.argmax(distance[frame::-1] > 0.1))
         return distance[near + seconds]
 
     ours = profile(path.position, made.rests[1].first + 10, np.zeros(3))
     theirs = profile(captured.position, rest, captured.position[rest])
     assert np.abs(ours - theirs).max() < 0.2, f"differs by {np.abs(ours - theirs).max():.2f} m"
-
-

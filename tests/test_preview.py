@@ -1,4 +1,6 @@
-"""Previews: a film that plays at the scene's speed and a sheet whose cells are the frames asked for."""
+"""Previews: a film that plays at the scene's speed and a sheet whose cells are the frames asked
+for.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -31,7 +33,9 @@ def sliding_cube(blender: ModuleType, addon: Callable[[str], Any]) -> Any:
 
 
 def red_column(cell: np.ndarray) -> float:
-    """Middle of what is red in a picture (height, width, 4), from 0 at its left to 1 at its right."""
+    """Middle of what is red in a picture (height, width, 4), from 0 at its left to 1 at its
+    right.
+    """
     red = (cell[..., 0] > 2 * cell[..., 1]) & (cell[..., 0] > 0.2)
     assert red.any()
     return float(np.nonzero(red)[1].mean() / cell.shape[1])

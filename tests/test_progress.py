@@ -66,8 +66,12 @@ def _no_library(name: str) -> Any:
     raise OSError(f"{name}: cannot open shared object file")
 
 
-@pytest.mark.parametrize("library", [_no_library, lambda name: SimpleNamespace()], ids=["none", "another"])
-def test_without_openblas_nothing_is_changed(monkeypatch: pytest.MonkeyPatch, library: Callable[[str], Any]) -> None:
+@pytest.mark.parametrize(
+    "library", [_no_library, lambda name: SimpleNamespace()], ids=["none", "another"]
+)
+def test_without_openblas_nothing_is_changed(
+    monkeypatch: pytest.MonkeyPatch, library: Callable[[str], Any]
+) -> None:
     monkeypatch.setattr(ctypes, "CDLL", library)
     monkeypatch.setattr(threads, "_openblas", _openblas.__wrapped__)
     assert threads._openblas() is None
@@ -75,12 +79,26 @@ def test_without_openblas_nothing_is_changed(monkeypatch: pytest.MonkeyPatch, li
         assert (np.eye(3) @ np.ones(3) == 1.0).all()
 
 
-@pytest.mark.parametrize(("bound", "quota", "expected"), [
-    (1, None, 1), (64, None, 64), (64, "max 100000", 64), (64, "200000 100000", 2), (2, "6400000 100000", 2),
-    (64, "50000 100000", 1), (64, "nonsense", 64), (None, None, 128), (None, "200000 100000", 2),
-])
+@pytest.mark.parametrize(
+    ("bound", "quota", "expected"),
+    [
+        (1, None, 1),
+        (64, None, 64),
+        (64, "max 100000", 64),
+        (64, "200000 100000", 2),
+        (2, "6400000 100000", 2),
+        (64, "50000 100000", 1),
+        (64, "nonsense", 64),
+        (None, None, 128),
+        (None, "200000 100000", 2),
+    ],
+)
 def test_cores_are_those_that_the_process_may_use(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, bound: int | None, quota: str | None, expected: int
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    bound: int | None,
+    quota: str | None,
+    expected: int,
 ) -> None:
     """Of a machine of 128; ``bound`` None: on a system that binds no process to cores."""
     monkeypatch.setattr(os, "cpu_count", lambda: 128)
@@ -90,5 +108,7 @@ def test_cores_are_those_that_the_process_may_use(
     if bound is None:
         monkeypatch.delattr(os, "sched_getaffinity", raising=False)
     else:
-        monkeypatch.setattr(os, "sched_getaffinity", lambda process: set(range(bound)), raising=False)
+        monkeypatch.setattr(
+            os, "sched_getaffinity", lambda process: set(range(bound)), raising=False
+        )
     assert cores() == expected

@@ -1,4 +1,6 @@
-"""A hundred random actions of a careless user: nothing is lost, nothing is left running, and every error is a sentence."""
+"""A hundred random actions of a careless user: nothing is lost, nothing is left running, and every
+error is a sentence.
+"""
 
 from pathlib import Path
 from types import ModuleType
@@ -65,7 +67,10 @@ class Careless:
     def make_takes(self) -> None:
         if self.activate():
             own = self.bpy.context.object.dafnet
-            own.take_count, own.temperature = int(self.random.integers(1, 4)), float(self.random.uniform(0.0, 1.5))
+            own.take_count, own.temperature = (
+                int(self.random.integers(1, 4)),
+                float(self.random.uniform(0.0, 1.5)),
+            )
             own.mode = self.one(["FREE", "FREE", "EE", "FULL"])
             before = self.actions()
             self.bpy.ops.dafnet.generate(task=self.one(["NEW", "NEW", "LEGS", "ONWARD"]))
@@ -82,7 +87,9 @@ class Careless:
             assert self.actions() == before
 
     def interrupted(self) -> None:
-        """Something is deleted, or time goes back, while a take is made; it ends well or with a sentence."""
+        """Something is deleted, or time goes back, while a take is made; it ends well or with a
+        sentence.
+        """
         character = self.one(self.characters())
         if character:
             steps = self.job.steps(self.bpy.context, self.job.settings_of(character, self.scene))
@@ -99,7 +106,9 @@ class Careless:
         if self.activate():
             before = self.actions()
             self.bpy.ops.dafnet.reject_take()
-            assert self.actions() == before, "a rejected take is there until the file is opened again"
+            assert self.actions() == before, (
+                "a rejected take is there until the file is opened again"
+            )
 
     def clean(self) -> None:
         if self.activate():
@@ -145,11 +154,42 @@ class Careless:
 
     def act(self) -> str:
         """One random action; its name."""
-        name = str(self.random.choice(
-            ["make_takes", "cancel", "interrupted", "play", "reject", "clean", "delete", "delete_action", "rename", "new_rate",
-             "undo", "redo", "reload", "add_character"],
-            p=[0.24, 0.06, 0.08, 0.08, 0.06, 0.06, 0.06, 0.03, 0.08, 0.05, 0.08, 0.05, 0.03, 0.04],
-        ))
+        name = str(
+            self.random.choice(
+                [
+                    "make_takes",
+                    "cancel",
+                    "interrupted",
+                    "play",
+                    "reject",
+                    "clean",
+                    "delete",
+                    "delete_action",
+                    "rename",
+                    "new_rate",
+                    "undo",
+                    "redo",
+                    "reload",
+                    "add_character",
+                ],
+                p=[
+                    0.24,
+                    0.06,
+                    0.08,
+                    0.08,
+                    0.06,
+                    0.06,
+                    0.06,
+                    0.03,
+                    0.08,
+                    0.05,
+                    0.08,
+                    0.05,
+                    0.03,
+                    0.04,
+                ],
+            )
+        )
         if not any(character.dafnet.root for character in self.characters()):
             name = "add_character"
         try:
@@ -157,7 +197,9 @@ class Careless:
         except (RuntimeError, self.addon("dafnet_addon.core.errors").InputError) as error:
             said = str(error).removeprefix("Error: ").strip()
             grey = ".poll() " in said
-            assert grey or (said.endswith(".") and "\n" not in said and "Traceback" not in said), said
+            assert grey or (said.endswith(".") and "\n" not in said and "Traceback" not in said), (
+                said
+            )
             self.errors += 1
         if name not in ("undo", "redo"):
             self.remember()

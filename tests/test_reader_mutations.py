@@ -1,7 +1,9 @@
-"""Motion files as strangers, exporters and broken downloads may leave them: real and made-up ones, mutated.
+"""Motion files as strangers, exporters and broken downloads may leave them: real and made-up ones,
+mutated.
 
-Whatever lies in a folder, clips made of numbers come out, or one sentence for each file says why not; within five seconds of
-the processor's time and 200 MB. A third of the mutations at least gets past the parser of its file.
+Whatever lies in a folder, clips made of numbers come out, or one sentence for each file says why
+not; within five seconds of the processor's time and 200 MB. A third of the mutations at least gets
+past the parser of its file.
 """
 
 import json
@@ -36,7 +38,9 @@ def sentence(said: str) -> None:
 
 
 class Folder:
-    """A folder that holds one mutation at a time; how many were read, and how many came past the parser."""
+    """A folder that holds one mutation at a time; how many were read, and how many came past the
+    parser.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path, self.tried, self.past = path, 0, 0
@@ -56,17 +60,32 @@ class Folder:
             except InputError as error:
                 left_out.append(str(error))
             for clip in clips:
-                assert clip.joints.shape[1:] == (22, 3) and len(clip.joints) and np.isfinite(clip.joints).all()
+                assert (
+                    clip.joints.shape[1:] == (22, 3)
+                    and len(clip.joints)
+                    and np.isfinite(clip.joints).all()
+                )
                 try:
                     joints = canonical(clip, calibrate([clip]))
                 except InputError as error:
                     left_out.append(str(error))
                 else:
-                    assert np.isfinite(motion_of(clip.name, clip.source, clip.subject, clip.category, joints).joints).all()
+                    assert np.isfinite(
+                        motion_of(
+                            clip.name, clip.source, clip.subject, clip.category, joints
+                        ).joints
+                    ).all()
         assert clips or left_out
         for said in left_out:
             sentence(said)
-        behind = ("of no known convention", "by name", "grown person", "never stands", "frame rate", " a second,")
+        behind = (
+            "of no known convention",
+            "by name",
+            "grown person",
+            "never stands",
+            "frame rate",
+            " a second,",
+        )
         self.past += bool(clips) or any(words in said for said in left_out for words in behind)
 
     def judge(self) -> None:
@@ -78,15 +97,45 @@ class Folder:
 # Text.
 
 ODD = (
-    "nan", "inf", "-1e308", "1e-320", "1e9", "-0", "7", "99999999999999999999", "1_0", "1,5", "½", "{", "}", "End Site", "ROOT",
-    "JOINT", "MOTION", "Frames:", "CHANNELS", "OFFSET", ":units", ":hierarchy", "begin", "end", "x", "1", "#", "\0", "", "\n",
+    "nan",
+    "inf",
+    "-1e308",
+    "1e-320",
+    "1e9",
+    "-0",
+    "7",
+    "99999999999999999999",
+    "1_0",
+    "1,5",
+    "½",
+    "{",
+    "}",
+    "End Site",
+    "ROOT",
+    "JOINT",
+    "MOTION",
+    "Frames:",
+    "CHANNELS",
+    "OFFSET",
+    ":units",
+    ":hierarchy",
+    "begin",
+    "end",
+    "x",
+    "1",
+    "#",
+    "\0",
+    "",
+    "\n",
 )
 """Words that may stand where others should."""
 
 
 @st.composite
 def changed(draw: st.DrawFn, text: str) -> bytes:
-    """A text with numbers replaced; half of them with any words replaced and pieces lost, doubled or made of other bytes."""
+    """A text with numbers replaced; half of them with any words replaced and pieces lost, doubled
+    or made of other bytes.
+    """
     words = re.split(r"(\s+)", text)
     numbers = [i for i, word in enumerate(words) if re.fullmatch(r"-?\d+\.\d+(e-?\d+)?", word)]
     for _ in range(draw(st.integers(1, 4))):
@@ -128,7 +177,10 @@ def acclaim_texts(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, s
     write_amc(folder / "a.amc", *walk(FRAMES, "y"))
     found = [(folder / "a.asf", folder / "a.amc")]
     if RAW.is_dir():
-        found += [(RAW / "snu_wd2.asf", RAW / "snu_chair.amc"), (RAW / "hdm05_bd.asf", RAW / "hdm05_deposit_floor.amc")]
+        found += [
+            (RAW / "snu_wd2.asf", RAW / "snu_chair.amc"),
+            (RAW / "hdm05_bd.asf", RAW / "hdm05_deposit_floor.amc"),
+        ]
     texts = [tuple(file.read_text(encoding="latin-1") for file in pair) for pair in found]
     return [(asf, amc.partition(f"\n{FRAMES}\n")[0]) for asf, amc in texts]
 
@@ -157,12 +209,27 @@ def test_mutated_acclaim_files_are_read_or_named(acclaim_texts, tmp_path):
     folder.judge()
 
 
-@pytest.mark.parametrize(("name", "text"), [
-    ("clips.csv", "file,licence,subject,split,fps,up\n*.bvh,CC0,anna,train,30,y\ns1/walk[1].bvh,MIT,bert,test,,\n"),
-    ("clips.json", json.dumps({"*.bvh": {"licence": "CC0", "fps": 30}, "walk[1].bvh": {"licence": "MIT", "split": "test"}})),
-])
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        (
+            "clips.csv",
+            "file,licence,subject,split,fps,up\n*.bvh,CC0,anna,train,30,y\ns1/walk[1].bvh,MIT,bert,test,,\n",
+        ),
+        (
+            "clips.json",
+            json.dumps(
+                {
+                    "*.bvh": {"licence": "CC0", "fps": 30},
+                    "walk[1].bvh": {"licence": "MIT", "split": "test"},
+                }
+            ),
+        ),
+    ],
+)
 def test_mutated_lists_of_clips_are_understood_or_refused(tmp_path, name, text):
     """A licence that is given comes from what the list says of this very file."""
+
     @hypothesis.given(changed(text.replace(",", " ,").replace(":", " :")))
     def attempt(data: bytes) -> None:
         (tmp_path / name).write_bytes(data)
@@ -202,7 +269,9 @@ def other_values(draw: st.DrawFn, array: np.ndarray) -> np.ndarray:
     """An array of numbers with some that are as usual, and now and then one that is not."""
     flat, real = array.copy().reshape(-1), array.dtype.kind == "f"
     for _ in range(draw(st.integers(1, 3))):
-        flat[draw(st.integers(0, flat.size - 1))] = draw(st.floats(-3, 3) if real else st.integers(-400, 400))
+        flat[draw(st.integers(0, flat.size - 1))] = draw(
+            st.floats(-3, 3) if real else st.integers(-400, 400)
+        )
     if draw(st.integers(0, 3)) == 0:
         odd = (np.nan, np.inf, -1e300, 1e-9, 0.0, -1.0) if real else (0, -1, 2**15 - 1, -(2**15), 1)
         flat[draw(st.integers(0, flat.size - 1))] = draw(st.sampled_from(odd))
@@ -211,29 +280,55 @@ def other_values(draw: st.DrawFn, array: np.ndarray) -> np.ndarray:
 
 @st.composite
 def other_array(draw: st.DrawFn, array: np.ndarray) -> bytes:
-    """An array with other values, of another type or shape, or with a header or bytes that are not its own."""
+    """An array with other values, of another type or shape, or with a header or bytes that are not
+    its own.
+    """
     kind = draw(st.sampled_from(("value", "type", "shape", "header", "bytes", "odd")))
     if kind == "value" and array.dtype.kind in "fi" and array.size:
         return npy(draw(other_values(array)))
     if kind == "type":
-        type_ = draw(st.sampled_from(("<f2", ">f8", "<i8", "|b1", "<U5", "|S3", "<c16", "<f4", "|O")))
+        type_ = draw(
+            st.sampled_from(("<f2", ">f8", "<i8", "|b1", "<U5", "|S3", "<c16", "<f4", "|O"))
+        )
         return npy(np.zeros(array.shape, type_) if array.dtype.kind == "U" else array.astype(type_))
     if kind == "shape":
-        return npy(draw(st.sampled_from((array[..., None], array.reshape(-1), array.reshape(-1)[:0], array.reshape(-1)[:1]))))
+        return npy(
+            draw(
+                st.sampled_from(
+                    (
+                        array[..., None],
+                        array.reshape(-1),
+                        array.reshape(-1)[:0],
+                        array.reshape(-1)[:1],
+                    )
+                )
+            )
+        )
     data = npy(array)
     at = draw(st.integers(0, min(len(data), 140)))
     if kind == "header":
         sizes = f"({draw(st.integers(-5, 10**13))}, {draw(st.sampled_from((0, 3, 72, 156)))})"
-        start, end = data.index(b"(") if b"(" in data else 0, data.index(b")") + 1 if b")" in data else 0
+        start, end = (
+            data.index(b"(") if b"(" in data else 0,
+            data.index(b")") + 1 if b")" in data else 0,
+        )
         return data[:start] + sizes.encode() + data[end:]
     if kind == "odd":
-        return draw(st.sampled_from((b"", b"\x93NUMPY", b"\x93NUMPY\x03\0" + data[8:], data[:200], data + b"\0")))
-    return data[:at] + draw(st.binary(min_size=1, max_size=8)) + data[at + draw(st.integers(0, 8)) :]
+        return draw(
+            st.sampled_from(
+                (b"", b"\x93NUMPY", b"\x93NUMPY\x03\0" + data[8:], data[:200], data + b"\0")
+            )
+        )
+    return (
+        data[:at] + draw(st.binary(min_size=1, max_size=8)) + data[at + draw(st.integers(0, 8)) :]
+    )
 
 
 @st.composite
 def other_archive(draw: st.DrawFn, arrays: dict[str, np.ndarray]) -> bytes:
-    """An archive with other values; half of them with arrays that are changed in other ways or missing, or other bytes."""
+    """An archive with other values; half of them with arrays that are changed in other ways or
+    missing, or other bytes.
+    """
     members = {name: npy(array) for name, array in arrays.items()}
     bulk = [name for name, array in arrays.items() if array.size > 20]
     name = draw(st.sampled_from(bulk))
@@ -255,7 +350,11 @@ def test_mutated_amass_archives_are_read_or_named(tmp_path):
     rng = np.random.default_rng(0)
     poses = 0.1 * rng.standard_normal((FRAMES, 156))
     poses[:, 0] = np.pi / 2
-    arrays = {"poses": poses, "trans": 0.01 * rng.standard_normal((FRAMES, 3)), "mocap_framerate": np.array(60.0)}
+    arrays = {
+        "poses": poses,
+        "trans": 0.01 * rng.standard_normal((FRAMES, 3)),
+        "mocap_framerate": np.array(60.0),
+    }
     folder = Folder(tmp_path / "mocap")
 
     @hypothesis.given(other_archive(arrays))
@@ -269,8 +368,16 @@ def test_mutated_amass_archives_are_read_or_named(tmp_path):
 def test_mutated_compact_archives_are_read_or_named(tmp_path):
     write_bvh(tmp_path / "a.bvh", *walk(FRAMES, "z"), up="z")
     (clip,) = read_clips(tmp_path)
-    known = {"clip": "walk", "subject": "a", "category": "locomotion", "split": "train", "licence": "CC0"}
-    write_compact(tmp_path / "a.npz", [(known, clip.joints), (known | {"clip": "again"}, clip.joints[::-1])])
+    known = {
+        "clip": "walk",
+        "subject": "a",
+        "category": "locomotion",
+        "split": "train",
+        "licence": "CC0",
+    }
+    write_compact(
+        tmp_path / "a.npz", [(known, clip.joints), (known | {"clip": "again"}, clip.joints[::-1])]
+    )
     with np.load(tmp_path / "a.npz") as whole:
         arrays = dict(whole)
     assert arrays["first_mm"].shape[1] == len(JOINTS)
@@ -290,7 +397,10 @@ def test_mutated_compact_archives_are_read_or_named(tmp_path):
 def _many_joints_few_numbers() -> bytes:
     """A hundred thousand frames of one number each, of a skeleton of four thousand joints."""
     joints = "".join(f"JOINT j{i} {{ OFFSET 0 1 0 " for i in range(4000)) + "}" * 4000
-    head = f"HIERARCHY ROOT Hips {{ OFFSET 0 0 0 CHANNELS 1 Xposition {joints} }} MOTION Frames: 100000 Frame Time: 0.03\n"
+    head = (
+        f"HIERARCHY ROOT Hips {{ OFFSET 0 0 0 CHANNELS 1 Xposition {joints} }} MOTION Frames: "
+        "100000 Frame Time: 0.03\n"
+    )
     return head.encode() + b"0 " * 100_000
 
 
@@ -298,14 +408,28 @@ HEAD = b"HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 1 Xposition } MOTION "
 HUGE: dict[str, Callable[[], dict[str, bytes]]] = {
     "frames that are not there": lambda: {"a.bvh": HEAD + b"Frames: 9999999999999 Frame Time: 1 0"},
     "joints that nothing moves": lambda: {"a.bvh": _many_joints_few_numbers()},
-    "joints without end": lambda: {"a.bvh": b"HIERARCHY " + b"ROOT a { " * 900_000 + b"MOTION Frames: 1 Frame Time: 1 0"},
-    "channels without end": lambda: {"a.bvh": HEAD.replace(b"S 1", b"S 99999999999999") + b"Frames: 1 Frame Time: 1 0"},
+    "joints without end": lambda: {
+        "a.bvh": b"HIERARCHY " + b"ROOT a { " * 900_000 + b"MOTION Frames: 1 Frame Time: 1 0"
+    },
+    "channels without end": lambda: {
+        "a.bvh": HEAD.replace(b"S 1", b"S 99999999999999") + b"Frames: 1 Frame Time: 1 0"
+    },
     "a word without end": lambda: {"a.bvh": HEAD + b"Frames: 1 Frame Time: 1 " + b"1" * 9_000_000},
-    "spaces without end": lambda: {"a.bvh": b"HIERARCHY" + b" " * 9_000_000 + b"MOTION" + b" " * 9_000_000},
+    "spaces without end": lambda: {
+        "a.bvh": b"HIERARCHY" + b" " * 9_000_000 + b"MOTION" + b" " * 9_000_000
+    },
     "frames of nothing": lambda: {
-        "a.asf": b":units\nlength 1\n:root\norder TX\naxis XYZ\nposition 0 0 0\norientation 0 0 0\n:bonedata\n"
-                 + b"".join(b"begin\nname b%d\ndirection 1 0 0\nlength 1\naxis 0 0 0 XYZ\nend\n" % i for i in range(1500))
-                 + b":hierarchy\nbegin\nroot " + b" ".join(b"b%d" % i for i in range(1500)) + b"\nend\n",
+        "a.asf": (
+            b":units\nlength 1\n:root\norder TX\naxis XYZ\nposition 0 0 0\norientation 0 0 "
+            b"0\n:bonedata\n"
+        )
+        + b"".join(
+            b"begin\nname b%d\ndirection 1 0 0\nlength 1\naxis 0 0 0 XYZ\nend\n" % i
+            for i in range(1500)
+        )
+        + b":hierarchy\nbegin\nroot "
+        + b" ".join(b"b%d" % i for i in range(1500))
+        + b"\nend\n",
         "a.amc": b"".join(b"%d\n" % i for i in range(300_000)),
     },
 }
@@ -331,4 +455,6 @@ def test_a_long_recording_takes_little_more_than_its_numbers(tmp_path):
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert len(clip.joints) == 18_000 and peak < size + 200e6, f"{peak / 1e6:.0f} MB for {size / 1e6:.0f} MB"
+    assert len(clip.joints) == 18_000 and peak < size + 200e6, (
+        f"{peak / 1e6:.0f} MB for {size / 1e6:.0f} MB"
+    )

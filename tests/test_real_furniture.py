@@ -21,14 +21,22 @@ LIBRARY = Path(__file__).resolve().parents[2] / "shared" / "data" / "furniture" 
 
 
 def _chair(width: float = 0.46) -> "trimesh.Trimesh":
-    """A chair with its front to −y: a thin seat 0.45 m high on four legs, and a back of two bars."""
+    """A chair with its front to −y: a thin seat 0.45 m high on four legs, and a back of two
+    bars.
+    """
 
-    def part(size: tuple[float, float, float], middle: tuple[float, float, float]) -> "trimesh.Trimesh":
+    def part(
+        size: tuple[float, float, float], middle: tuple[float, float, float]
+    ) -> "trimesh.Trimesh":
         made = trimesh.creation.box(size)
         made.apply_translation(middle)
         return made
 
-    legs = [part((0.04, 0.04, 0.42), (x * (width / 2 - 0.02), y, 0.21)) for x in (-1, 1) for y in (-0.2, 0.2)]
+    legs = [
+        part((0.04, 0.04, 0.42), (x * (width / 2 - 0.02), y, 0.21))
+        for x in (-1, 1)
+        for y in (-0.2, 0.2)
+    ]
     seat = part((width, 0.46, 0.03), (0, 0, 0.435))
     back = [part((width, 0.03, 0.08), (0, 0.215, z)) for z in (0.6, 0.8)]
     posts = [part((0.03, 0.03, 0.45), (x * (width / 2 - 0.02), 0.215, 0.62)) for x in (-1, 1)]
@@ -38,8 +46,14 @@ def _chair(width: float = 0.46) -> "trimesh.Trimesh":
 def _piece(kind: str = "chair", name: str = "one") -> Piece:
     mesh = _chair()
     return Piece(
-        name=name, kind=kind, title=kind, maker="anna", source="made", licence="CC0-1.0",
-        vertices=np.asarray(mesh.vertices, float), triangles=np.asarray(mesh.faces, np.int64),
+        name=name,
+        kind=kind,
+        title=kind,
+        maker="anna",
+        source="made",
+        licence="CC0-1.0",
+        vertices=np.asarray(mesh.vertices, float),
+        triangles=np.asarray(mesh.faces, np.int64),
     )
 
 
@@ -56,8 +70,12 @@ def test_loose_meshes_are_read_with_what_is_stated_of_them(tmp_path: Path) -> No
     stated = {"high*.obj": {"licence": "CC0-1.0", "maker": "anna", "unit": 0.01, "up": "z"}}
     (tmp_path / "pieces.json").write_text(json.dumps(stated), encoding="utf-8")
     pieces, left_out = read_library(tmp_path)
-    assert [(p.name, p.kind, p.maker, p.licence) for p in pieces] == [("high chair", "chair", "anna", "CC0-1.0")]
-    assert np.allclose(np.ptp(pieces[0].vertices, axis=0), np.ptp(_chair().vertices, axis=0), atol=1e-6)
+    assert [(p.name, p.kind, p.maker, p.licence) for p in pieces] == [
+        ("high chair", "chair", "anna", "CC0-1.0")
+    ]
+    assert np.allclose(
+        np.ptp(pieces[0].vertices, axis=0), np.ptp(_chair().vertices, axis=0), atol=1e-6
+    )
     assert left_out == ["'secret.obj' states no licence"]
 
 
@@ -75,9 +93,13 @@ def test_a_sweet_home_library_is_read_at_the_size_that_it_states(tmp_path: Path)
         archive.writestr("PluginFurnitureCatalog.properties", catalogue)
         archive.writestr("a/chair.obj", mesh.export(file_type="obj"))
     pieces, left_out = read_library(tmp_path)
-    assert [(p.title, p.kind, p.maker, p.licence, p.source) for p in pieces] == [("Chair", "chair", "anna", "CC0-1.0", "test")]
+    assert [(p.title, p.kind, p.maker, p.licence, p.source) for p in pieces] == [
+        ("Chair", "chair", "anna", "CC0-1.0", "test")
+    ]
     vertices = pieces[0].vertices
-    assert np.allclose(vertices.min(0), (-0.25, -0.225, 0.0)) and np.allclose(vertices.max(0), (0.25, 0.225, 0.9))
+    assert np.allclose(vertices.min(0), (-0.25, -0.225, 0.0)) and np.allclose(
+        vertices.max(0), (0.25, 0.225, 0.9)
+    )
     high = vertices[vertices[:, 2] > 0.6]
     assert high[:, 1].min() > 0.1, "the back is behind"
     assert len(left_out) == 1 and "Gone sofa" in left_out[0]
@@ -85,7 +107,13 @@ def test_a_sweet_home_library_is_read_at_the_size_that_it_states(tmp_path: Path)
 
 @pytest.mark.parametrize(
     ("title", "kind"),
-    [("Corner sofa", "sofa"), ("Armchair ottoman", "armchair"), ("Piano bench", "bench"), ("Bookcase", "shelf"), ("Lamp", "")],
+    [
+        ("Corner sofa", "sofa"),
+        ("Armchair ottoman", "armchair"),
+        ("Piano bench", "bench"),
+        ("Bookcase", "shelf"),
+        ("Lamp", ""),
+    ],
 )
 def test_titles_tell_kinds(title: str, kind: str) -> None:
     assert kind_of(title) == kind
@@ -115,7 +143,9 @@ def test_a_bank_is_kept(bank: ShapeBank, tmp_path: Path) -> None:
     bank.write(tmp_path / "bank.npz")
     again = ShapeBank.read(tmp_path / "bank.npz")
     for one, two in zip(bank.shapes, again.shapes, strict=True):
-        assert (one.values == two.values).all() and one.name == two.name and one.factor == two.factor
+        assert (
+            (one.values == two.values).all() and one.name == two.name and one.factor == two.factor
+        )
         assert one.seat is not None and two.seat is not None and one.seat.height == two.seat.height
 
 
@@ -145,8 +175,13 @@ def test_the_sensor_sees_placed_shapes_as_the_core_sees_their_meshes(bank: Shape
     alike = bank.occupancy(rows[:1], path) - occupancy(Scene(tuple(bank.meshes(rows[:1]))), path)
     assert np.abs(alike).max() < 1e-3
     points = np.random.default_rng(1).uniform((-1, -1, 0.1), (1, 1, 1), (12, 50, 3))
-    assert np.abs(distance(Scene(tuple(bank.meshes(rows))), points, 0.0).clip(max=FARTHEST)
-                  - bank.distances(rows, points.reshape(-1, 3)).reshape(12, 50)).max() < 0.005
+    assert (
+        np.abs(
+            distance(Scene(tuple(bank.meshes(rows))), points, 0.0).clip(max=FARTHEST)
+            - bank.distances(rows, points.reshape(-1, 3)).reshape(12, 50)
+        ).max()
+        < 0.005
+    )
 
 
 def test_other_devices_see_the_same(bank: ShapeBank) -> None:
@@ -154,12 +189,19 @@ def test_other_devices_see_the_same(bank: ShapeBank) -> None:
     from dafnet_addon.data.shapes import ABSENT_SHAPE
     from dafnet_addon.training.placed_shapes import DeviceBank
 
-    rows = np.stack([[[0, 0.3, 0.5, 0.4, 1.0], [1, -0.6, 0.2, 2.0, 1.04]], [[1, 0.0, 0.1, 1.0, 0.97], ABSENT_SHAPE]])
+    rows = np.stack(
+        [
+            [[0, 0.3, 0.5, 0.4, 1.0], [1, -0.6, 0.2, 2.0, 1.04]],
+            [[1, 0.0, 0.1, 1.0, 0.97], ABSENT_SHAPE],
+        ]
+    )
     angle = np.linspace(0, 3, 12)
     root = np.stack([np.c_[0.5 * np.cos(angle), 0.5 * np.sin(angle), angle]] * 2)
-    seen = DeviceBank(bank, torch.device("cpu")).occupancy(
-        torch.from_numpy(rows).float(), torch.from_numpy(root).float()
-    ).numpy()
+    seen = (
+        DeviceBank(bank, torch.device("cpu"))
+        .occupancy(torch.from_numpy(rows).float(), torch.from_numpy(root).float())
+        .numpy()
+    )
     for window in (0, 1):
         path = RootPath(np.c_[root[window, :, :2], np.zeros(12)], root[window, :, 2])
         there = rows[window][rows[window][:, 0] >= 0]
@@ -180,7 +222,9 @@ def test_a_real_seat_carries_the_pelvis_as_high_as_it_rests(bank: ShapeBank) -> 
     found = seat_shape_for(rng, bank, rest, _free(0.0))
     assert found is not None and len(found.shapes) == 1 and abs(found.shapes[0, 4] - 1.0) <= STRETCH
     under = np.array([rest.position - (0.0, 0.0, PELVIS_OVER["chair"] - 0.02)])
-    assert abs(float(bank.distances(found.shapes, under)[0]) - 0.02) < 0.01, "the seat's surface is where the piece says"
+    assert abs(float(bank.distances(found.shapes, under)[0]) - 0.02) < 0.01, (
+        "the seat's surface is where the piece says"
+    )
     # Its back is behind the sitter, who faces 0.8.
     behind = rest.position + 0.35 * np.array([np.sin(0.8), -np.cos(0.8), 0.0]) + (0.0, 0.0, 0.15)
     assert float(bank.distances(found.shapes, behind[None])[0]) < FARTHEST
@@ -193,7 +237,8 @@ def test_no_real_seat_cuts_the_body(bank: ShapeBank) -> None:
 
     rest = Rest(0, 10, np.array([0.0, 0.0, 0.56]), 0.0)
     blocked = _free(0.0)
-    blocked[:, PROBES.index(("left_ankle", "left_foot", 0.0, 0.05))] = (0.0, -0.02, 0.44)  # an ankle in the seat
+    # an ankle in the seat
+    blocked[:, PROBES.index(("left_ankle", "left_foot", 0.0, 0.05))] = (0.0, -0.02, 0.44)
     assert seat_shape_for(np.random.default_rng(0), bank, rest, blocked) is None
 
 
@@ -208,7 +253,9 @@ def test_one_lies_in_a_real_bed() -> None:
     seat = beds.shapes[0].seat
     assert seat is not None
     line = np.array([[0.0, -0.2, seat.height + LIES_OVER], [0.0, 0.2, seat.height + LIES_OVER]])
-    found = bed_shape_for(np.random.default_rng(0), beds, Use("bed", 0, 30, line, 0.0), _free(0.0), [])
+    found = bed_shape_for(
+        np.random.default_rng(0), beds, Use("bed", 0, 30, line, 0.0), _free(0.0), []
+    )
     assert found is not None
     along = np.array([[0.0, y, seat.height - 0.03] for y in (-0.9, -0.4, 0.0, 0.5)])
     assert (beds.distances(found.shapes, along) < 0.02).all(), "mattress all along the body"

@@ -1,4 +1,6 @@
-"""Motion moved to seats of other heights keeps bones, contacts and balance: made-up sit-downs, and real ones where present."""
+"""Motion moved to seats of other heights keeps bones, contacts and balance: made-up sit-downs, and
+real ones where present.
+"""
 
 from pathlib import Path
 
@@ -17,7 +19,8 @@ BONES = np.linalg.norm(OFFSETS[1:], axis=1)
 SEATED = 0.55
 HEIGHTS = [0.40, 0.48, 0.65, 0.78, 0.92]
 HIPS, KNEES, ANKLES, TOES, SHOULDERS, ELBOWS, WRISTS = (
-    [joint("left_" + n), joint("right_" + n)] for n in ("hip", "knee", "ankle", "foot", "shoulder", "elbow", "wrist")
+    [joint("left_" + n), joint("right_" + n)]
+    for n in ("hip", "knee", "ankle", "foot", "shoulder", "elbow", "wrist")
 )
 
 
@@ -34,8 +37,12 @@ def _on_thighs(joints: np.ndarray) -> np.ndarray:
     return joints[:, HIPS] + 0.3 * (joints[:, KNEES] - joints[:, HIPS])
 
 
-def _sit_down(frames: int = 140, hands: str = "hanging", feet_off_floor: float = 0.0, seated: float = SEATED) -> np.ndarray:
-    """A made-up sit-down: the trunk leans, the pelvis goes back and down, the trunk comes up again; knees a little apart."""
+def _sit_down(
+    frames: int = 140, hands: str = "hanging", feet_off_floor: float = 0.0, seated: float = SEATED
+) -> np.ndarray:
+    """A made-up sit-down: the trunk leans, the pelvis goes back and down, the trunk comes up again;
+    knees a little apart.
+    """
     t = np.arange(frames)
     x = np.clip((t - 40) / 40, 0, 1)
     sits = (x * x * (3 - 2 * x))[:, None]
@@ -45,17 +52,27 @@ def _sit_down(frames: int = 140, hands: str = "hanging", feet_off_floor: float =
     turn[:, 1, 2], turn[:, 2, 1] = np.sin(lean), -np.sin(lean)
     pose = REST.copy()
     for side, sign in (("left_", -1), ("right_", 1)):
-        pose[joint(side + "elbow")] = pose[joint(side + "shoulder")] + 0.26 * np.array([sign * 0.1, -0.1, -np.sqrt(0.98)])
-        pose[joint(side + "wrist")] = pose[joint(side + "elbow")] + 0.25 * np.array([0.0, 0.6, -0.8])
+        pose[joint(side + "elbow")] = pose[joint(side + "shoulder")] + 0.26 * np.array(
+            [sign * 0.1, -0.1, -np.sqrt(0.98)]
+        )
+        pose[joint(side + "wrist")] = pose[joint(side + "elbow")] + 0.25 * np.array(
+            [0.0, 0.6, -0.8]
+        )
     pelvis = REST[0] + np.array([0.0, -0.42, seated - REST[0, 2]]) * sits
     joints = pelvis[:, None] + np.einsum("tij,nj->tni", turn, pose - pose[0])
-    joints[:, ANKLES + TOES] = REST[ANKLES + TOES] + np.array([0.0, 0.0, feet_off_floor]) * sits[:, None]
-    joints[:, KNEES] = (joints[:, HIPS] + joints[:, ANKLES]) / 2 + np.array([[-0.08, 0.3, 0.2], [0.08, 0.3, 0.2]])
+    joints[:, ANKLES + TOES] = (
+        REST[ANKLES + TOES] + np.array([0.0, 0.0, feet_off_floor]) * sits[:, None]
+    )
+    joints[:, KNEES] = (joints[:, HIPS] + joints[:, ANKLES]) / 2 + np.array(
+        [[-0.08, 0.3, 0.2], [0.08, 0.3, 0.2]]
+    )
     joints = pose_legs(joints)
     if hands == "on thighs":
         resting = _on_thighs(joints) + np.array([0.0, 0.0, 0.09])
         wrists = joints[:, WRISTS] + sits[:, None] * (resting - joints[:, WRISTS])
-        joints[:, ELBOWS], joints[:, WRISTS] = two_bone(joints[:, SHOULDERS], wrists, joints[:, ELBOWS], 0.26, 0.25)
+        joints[:, ELBOWS], joints[:, WRISTS] = two_bone(
+            joints[:, SHOULDERS], wrists, joints[:, ELBOWS], 0.26, 0.25
+        )
     assert np.abs(_lengths(joints) - BONES).max() < 1e-6
     return joints
 
@@ -78,7 +95,9 @@ def test_planted_toes_stay_and_on_a_high_seat_heels_lift_before_them(wanted):
     else:
         assert np.abs(moved[:, TOES] - joints[:, TOES]).max() < 0.06
         assert (moved[-1, ANKLES, 2] > joints[-1, ANKLES, 2] + 0.02).all()
-    assert (moved[:, ANKLES, 2] > joints[:, ANKLES, 2] - 1e-9).all() and moved[:, TOES, 2].min() > TOE_HEIGHT - 1e-9
+    assert (moved[:, ANKLES, 2] > joints[:, ANKLES, 2] - 1e-9).all() and moved[
+        :, TOES, 2
+    ].min() > TOE_HEIGHT - 1e-9
 
 
 def test_a_motion_moved_to_its_own_height_is_itself():
@@ -93,7 +112,12 @@ def test_it_knows_neither_left_from_right_nor_which_way_time_runs_nor_how_often_
     moved = at_seat_height(joints, SEATED, wanted)
     assert np.abs(at_seat_height(joints[::-1], SEATED, wanted) - moved[::-1]).max() < 1e-9
     flip = np.array([-1.0, 1.0, 1.0])
-    assert np.abs(at_seat_height(joints[:, MIRROR] * flip, SEATED, wanted) - moved[:, MIRROR] * flip).max() < 1e-9
+    assert (
+        np.abs(
+            at_seat_height(joints[:, MIRROR] * flip, SEATED, wanted) - moved[:, MIRROR] * flip
+        ).max()
+        < 1e-9
+    )
     twice = at_seat_height(np.concatenate([joints, joints[::-1], joints]), SEATED, wanted)
     assert np.abs(twice[:140] - moved).max() < 1e-9 and np.abs(twice[280:] - moved).max() < 1e-9
 
@@ -106,7 +130,9 @@ def test_the_trunk_leans_further_to_a_lower_seat_less_to_a_higher_one_and_as_bef
     for moved in (low, high):
         assert np.abs(_lean(moved)[-20:] - _lean(joints)[-20:]).max() < np.radians(1)
     head = low[:, joint("head")] - low[:, joint("neck")]
-    assert np.abs(head - (joints[:, joint("head")] - joints[:, joint("neck")])).max() < 1e-9, "the face looks where it did"
+    assert np.abs(head - (joints[:, joint("head")] - joints[:, joint("neck")])).max() < 1e-9, (
+        "the face looks where it did"
+    )
 
 
 @pytest.mark.parametrize("wanted", [0.40, 0.65, 0.75])
@@ -116,7 +142,9 @@ def test_balance_is_kept_while_no_seat_carries_the_body(wanted):
     free = joints[:, 0, 2] > SEATED + 0.12
     trunk = [0, joint("spine2"), joint("spine3"), joint("head"), *HIPS, *SHOULDERS]
     assert np.abs((moved - joints)[free][:, trunk].mean(1)[:, :2]).max() < 0.015
-    assert np.abs((moved - joints)[-30:, 0, :2]).max() < 1e-6, "on the seat the pelvis does not slide"
+    assert np.abs((moved - joints)[-30:, 0, :2]).max() < 1e-6, (
+        "on the seat the pelvis does not slide"
+    )
 
 
 def test_knees_keep_their_plane():
@@ -141,14 +169,20 @@ def test_hands_go_with_what_they_are_near_to(wanted):
     assert np.linalg.norm(shift, axis=-1).max() < 0.02, "a hand that rests on a thigh stays on it"
     assert np.abs((moved - joints)[-30:, right, 2]).max() < abs(wanted - SEATED) - 0.02
     raised = moved[:, joint("left_wrist")] - moved[:, joint("left_shoulder")]
-    assert np.abs(raised - (joints[:, joint("left_wrist")] - joints[:, joint("left_shoulder")])).max() < 1e-6
+    assert (
+        np.abs(raised - (joints[:, joint("left_wrist")] - joints[:, joint("left_shoulder")])).max()
+        < 1e-6
+    )
 
 
 def test_hanging_feet_come_down_with_the_seat_to_the_floor():
     joints = _sit_down(feet_off_floor=0.22, seated=0.80)
     lower, lowest = (at_seat_height(joints, 0.80, wanted) for wanted in (0.70, 0.45))
     assert np.abs(lower[-1, TOES, 2] - (joints[-1, TOES, 2] - 0.10)).max() < 1e-6
-    assert np.abs(lowest[-1, TOES, 2] - TOE_HEIGHT).max() < 1e-6 and lowest[:, TOES, 2].min() > TOE_HEIGHT - 1e-6
+    assert (
+        np.abs(lowest[-1, TOES, 2] - TOE_HEIGHT).max() < 1e-6
+        and lowest[:, TOES, 2].min() > TOE_HEIGHT - 1e-6
+    )
 
 
 @pytest.fixture(scope="module")
@@ -169,8 +203,16 @@ def test_real_sit_downs_stay_smooth_and_planted(real_sit_downs, wanted):
         moved = at_seat_height(joints, resting, wanted)
         assert np.abs(_lengths(moved) - BONES).max() < 1e-6
         assert np.abs(moved[joints[:, 0, 2] < resting + 0.002, 0, 2] - wanted).max() < 0.02
-        speed, before = (np.linalg.norm(np.diff(j, axis=0), axis=-1).max() * 30 for j in (moved, joints))
+        speed, before = (
+            np.linalg.norm(np.diff(j, axis=0), axis=-1).max() * 30 for j in (moved, joints)
+        )
         assert speed < before + 0.6 and jerk(moved, 30) < 1.35 * jerk(joints, 30)
-        assert foot_sliding(moved, 30).sum() <= foot_sliding(joints, 30).sum() + (0 if wanted < 0.85 else 5)
-        planted = (joints[:, TOES, 2] < 0.04) & (np.linalg.norm(np.gradient(joints[:, TOES], axis=0), axis=-1) < 0.003)
-        assert np.abs(moved[:, TOES] - joints[:, TOES])[planted].max() < (0.005 if wanted < 0.85 else 0.05)
+        assert foot_sliding(moved, 30).sum() <= foot_sliding(joints, 30).sum() + (
+            0 if wanted < 0.85 else 5
+        )
+        planted = (joints[:, TOES, 2] < 0.04) & (
+            np.linalg.norm(np.gradient(joints[:, TOES], axis=0), axis=-1) < 0.003
+        )
+        assert np.abs(moved[:, TOES] - joints[:, TOES])[planted].max() < (
+            0.005 if wanted < 0.85 else 0.05
+        )

@@ -1,4 +1,6 @@
-"""The animator's own rig: hands, feet, head and pelvis land where the character's do, on every convention; and back again."""
+"""The animator's own rig: hands, feet, head and pelvis land where the character's do, on every
+convention; and back again.
+"""
 
 import importlib
 import sys
@@ -12,8 +14,8 @@ import pytest
 import rig_builders
 
 CENTIMETRE = 0.01
-# What is measured, by bone: wrists, ankles, head, and the hip joints, whose middle is the pelvis' place. Written out here so
-# that a wrong map cannot hide.
+# What is measured, by bone: wrists, ankles, head, and the hip joints, whose middle is the pelvis'
+# place. Written out here so that a wrong map cannot hide.
 
 
 def sided(pattern: str, *words: str) -> list[str]:
@@ -22,31 +24,45 @@ def sided(pattern: str, *words: str) -> list[str]:
 
 MEASURED: dict[str, dict[str, list[str]]] = {
     "mixamo": {
-        "wrists": sided("mixamorig:{}Hand", "Left", "Right"), "ankles": sided("mixamorig:{}Foot", "Left", "Right"),
-        "head": ["mixamorig:Head"], "pelvis": sided("mixamorig:{}UpLeg", "Left", "Right"),
+        "wrists": sided("mixamorig:{}Hand", "Left", "Right"),
+        "ankles": sided("mixamorig:{}Foot", "Left", "Right"),
+        "head": ["mixamorig:Head"],
+        "pelvis": sided("mixamorig:{}UpLeg", "Left", "Right"),
     },
     "rigify": {
-        "wrists": sided("DEF-hand.{}", "L", "R"), "ankles": sided("DEF-foot.{}", "L", "R"), "head": ["DEF-spine.006"],
+        "wrists": sided("DEF-hand.{}", "L", "R"),
+        "ankles": sided("DEF-foot.{}", "L", "R"),
+        "head": ["DEF-spine.006"],
         "pelvis": sided("DEF-thigh.{}", "L", "R"),
     },
     "rigify_metarig": {
-        "wrists": sided("hand.{}", "L", "R"), "ankles": sided("foot.{}", "L", "R"), "head": ["spine.006"],
+        "wrists": sided("hand.{}", "L", "R"),
+        "ankles": sided("foot.{}", "L", "R"),
+        "head": ["spine.006"],
         "pelvis": sided("thigh.{}", "L", "R"),
     },
     "smpl_x": {
-        "wrists": sided("{}_wrist", "left", "right"), "ankles": sided("{}_ankle", "left", "right"), "head": ["head"],
+        "wrists": sided("{}_wrist", "left", "right"),
+        "ankles": sided("{}_ankle", "left", "right"),
+        "head": ["head"],
         "pelvis": sided("{}_hip", "left", "right"),
     },
     "unreal": {
-        "wrists": sided("hand_{}", "l", "r"), "ankles": sided("foot_{}", "l", "r"), "head": ["head"],
+        "wrists": sided("hand_{}", "l", "r"),
+        "ankles": sided("foot_{}", "l", "r"),
+        "head": ["head"],
         "pelvis": sided("thigh_{}", "l", "r"),
     },
     "vrm": {
-        "wrists": sided("{}Hand", "left", "right"), "ankles": sided("{}Foot", "left", "right"), "head": ["head"],
+        "wrists": sided("{}Hand", "left", "right"),
+        "ankles": sided("{}Foot", "left", "right"),
+        "head": ["head"],
         "pelvis": sided("{}UpperLeg", "left", "right"),
     },
     "odd": {
-        "wrists": sided("Hand {}", "li", "re"), "ankles": sided("Fuss {}", "li", "re"), "head": ["Kopf"],
+        "wrists": sided("Hand {}", "li", "re"),
+        "ankles": sided("Fuss {}", "li", "re"),
+        "head": ["Kopf"],
         "pelvis": sided("Schenkel {}", "li", "re"),
     },
 }
@@ -56,15 +72,26 @@ JOINTS = {"wrists": (20, 21), "ankles": (7, 8), "head": (15,), "pelvis": (1, 2)}
 @pytest.fixture(scope="module")
 def takes(extension: str) -> dict[str, Any]:
     """A walk, a sitting down on a box and a writing on a board, by the weights that ship."""
-    module: Callable[[str], Any] = lambda name: importlib.import_module(f"{extension}.dafnet_addon.core.{name}")  # noqa: E731
+
+    def module(name: str) -> Any:
+        return importlib.import_module(f"{extension}.dafnet_addon.core.{name}")
+
     paths, solids, controls = module("paths"), module("solids"), module("take").Controls
     weights = module("weights").load_weights()
 
     def box(center: tuple, half_size: tuple) -> Any:
-        return solids.Scene((solids.Box(center=np.array(center), half_size=np.array(half_size), rotation=np.eye(3)),))
+        return solids.Scene(
+            (
+                solids.Box(
+                    center=np.array(center), half_size=np.array(half_size), rotation=np.eye(3)
+                ),
+            )
+        )
 
     def made(scene: Any, root: Any, **given: Any) -> Any:
-        return module("generate").generate(scene, controls(fps=30, root=root.path.matrices(), **given), weights, seed=0)
+        return module("generate").generate(
+            scene, controls(fps=30, root=root.path.matrices(), **given), weights, seed=0
+        )
 
     walk = paths.route(paths.Stop((0, 0), 0.0, 0.2), (0.5, 0.9), paths.Stop((1.2, 1.4), -1.2, 0.2))
     sit = paths.route(paths.Stop((0, 1.4), np.pi, 0.1), paths.Stop((0, 0.2), 0.0, 0.8, seated=True))
@@ -114,23 +141,33 @@ class Stage:
         return self.rigs.detected(rig)
 
     def bake(self, kind: str, rig: Any, **options: Any) -> Any:
-        return self.onto.bake_onto_rig(self.bpy.context, self.ann, rig, self.map(kind, rig), **options)
+        return self.onto.bake_onto_rig(
+            self.bpy.context, self.ann, rig, self.map(kind, rig), **options
+        )
 
     def heads(self, rig: Any, names: list[str], frame: int) -> np.ndarray:
         self.scene.frame_set(frame)
         evaluated = rig.evaluated_get(self.bpy.context.evaluated_depsgraph_get())
-        return np.array([evaluated.matrix_world @ evaluated.pose.bones[name].head for name in names])
+        return np.array(
+            [evaluated.matrix_world @ evaluated.pose.bones[name].head for name in names]
+        )
 
     def played(self, rig: Any, names: list[str], step: int = 9) -> np.ndarray:
-        return np.array([self.heads(rig, names, frame) for frame in range(1, len(self.take) + 1, step)])
+        return np.array(
+            [self.heads(rig, names, frame) for frame in range(1, len(self.take) + 1, step)]
+        )
 
-    def errors(self, kind: str, rig: Any, source: np.ndarray | None = None, step: int = 9) -> dict[str, np.ndarray]:
+    def errors(
+        self, kind: str, rig: Any, source: np.ndarray | None = None, step: int = 9
+    ) -> dict[str, np.ndarray]:
         """Distances in every ``step``-th frame between the rig's bones and the source's joints."""
         source = (self.take.joints if source is None else source)[::step]
         found = {}
         for part, names in MEASURED[kind].items():
             off = self.played(rig, names, step) - source[:, JOINTS[part]]
-            found[part] = np.linalg.norm(off.mean(axis=1, keepdims=True) if part == "pelvis" else off, axis=-1)
+            found[part] = np.linalg.norm(
+                off.mean(axis=1, keepdims=True) if part == "pelvis" else off, axis=-1
+            )
         return found
 
 
@@ -139,15 +176,28 @@ def stage(blender: ModuleType, addon: Callable[[str], Any], takes: dict[str, Any
     return Stage(blender, addon, takes)
 
 
-def test_a_body_of_its_own_keeps_the_motion(addon: Callable[[str], Any], takes: dict[str, Any]) -> None:
-    """Onto itself nothing changes; the same body at rest in an A-pose, with fewer joints, reaches the same places."""
+def test_a_body_of_its_own_keeps_the_motion(
+    addon: Callable[[str], Any], takes: dict[str, Any]
+) -> None:
+    """Onto itself nothing changes; the same body at rest in an A-pose, with fewer joints, reaches
+    the same places.
+    """
     retargeting, kinematics, rotations, skeleton = (
-        addon(f"dafnet_addon.core.{name}") for name in ("retargeting", "kinematics", "rotations", "skeleton"))
+        addon(f"dafnet_addon.core.{name}")
+        for name in ("retargeting", "kinematics", "rotations", "skeleton")
+    )
     take = takes["write"]
     frames = kinematics.global_from_local(rotations.matrix_from_quaternion(take.rotations))
-    motion, body, root = retargeting.Motion(take.joints, frames), retargeting.canonical_body(1.0), take.root[:, :3, 3]
+    motion, body, root = (
+        retargeting.Motion(take.joints, frames),
+        retargeting.canonical_body(1.0),
+        take.root[:, :3, 3],
+    )
     same = retargeting.onto(motion, body, body, root)
-    assert np.abs(same.motion.joints - take.joints).max() < 2e-3 and np.abs(same.motion.frames - frames).max() < 0.02
+    assert (
+        np.abs(same.motion.joints - take.joints).max() < 2e-3
+        and np.abs(same.motion.frames - frames).max() < 0.02
+    )
     down = np.array(skeleton.REST)
     for shoulder, elbow, wrist, sign in ((16, 18, 20, 1.0), (17, 19, 21, -1.0)):
         turn = rotations.matrix_from_vector(np.array([0.0, -0.8 * sign, 0.0]))
@@ -172,17 +222,31 @@ def test_hands_feet_head_and_pelvis_land(stage: Stage, kind: str, limbs: str) ->
         baked = stage.bake(kind, rig, limbs=limbs)
         assert baked.ratio == 1.0
         for part, distances in stage.errors(kind, rig).items():
-            assert distances.mean() < CENTIMETRE, f"{take}: {part} off by {100 * distances.mean():.2f} cm"
-            assert baked.errors[part][0] == pytest.approx(distances.mean(), abs=0.004), "the report is honest"
+            assert distances.mean() < CENTIMETRE, (
+                f"{take}: {part} off by {100 * distances.mean():.2f} cm"
+            )
+            assert baked.errors[part][0] == pytest.approx(distances.mean(), abs=0.004), (
+                "the report is honest"
+            )
 
 
-@pytest.mark.parametrize(("kind", "arms", "legs"), [
-    ("mixamo", 1.1, 1.0), ("mixamo", 0.9, 1.0), ("mixamo", 1.0, 1.1), ("mixamo", 1.0, 0.9), ("rigify", 0.9, 1.0),
-    ("rigify", 1.1, 0.9),
-])
-def test_limbs_of_other_lengths_still_reach(stage: Stage, kind: str, arms: float, legs: float) -> None:
-    """Other legs make another size: the source is scaled about its root, but steps keep their length, and the head lies over
-    the hips by the trunk's size. Short arms with long legs are left out: they would have to reach a fifth further than they do.
+@pytest.mark.parametrize(
+    ("kind", "arms", "legs"),
+    [
+        ("mixamo", 1.1, 1.0),
+        ("mixamo", 0.9, 1.0),
+        ("mixamo", 1.0, 1.1),
+        ("mixamo", 1.0, 0.9),
+        ("rigify", 0.9, 1.0),
+        ("rigify", 1.1, 0.9),
+    ],
+)
+def test_limbs_of_other_lengths_still_reach(
+    stage: Stage, kind: str, arms: float, legs: float
+) -> None:
+    """Other legs make another size: the source is scaled about its root, but steps keep their
+    length, and the head lies over the hips by the trunk's size. Short arms with long legs are left
+    out: they would have to reach a fifth further than they do.
     """
     rig = stage.build(kind, arms=arms, legs=legs)
     for take in ("walk", "write"):
@@ -193,7 +257,10 @@ def test_limbs_of_other_lengths_still_reach(stage: Stage, kind: str, arms: float
         source = root + baked.ratio * (stage.take.joints - root)
         source[:, [7, 8], :2] = stage.take.joints[:, [7, 8], :2]
         if baked.ratio != 1.0:
-            hips, upright = source[:, [1, 2]].mean(axis=1), stage.take.joints[:, 15] - stage.take.joints[:, [1, 2]].mean(axis=1)
+            hips, upright = (
+                source[:, [1, 2]].mean(axis=1),
+                stage.take.joints[:, 15] - stage.take.joints[:, [1, 2]].mean(axis=1),
+            )
             source[:, 15] = hips + upright
         errors = stage.errors(kind, rig, source)
         assert errors["ankles"].mean() < CENTIMETRE
@@ -213,25 +280,49 @@ def test_a_small_rig_plays_the_motion_at_its_size(stage: Stage) -> None:
     source[:, [7, 8], :2] = stage.take.joints[:, [7, 8], :2]
     errors = stage.errors("mixamo", rig, source)
     assert max(errors[part].mean() for part in ("wrists", "head", "pelvis")) < CENTIMETRE
-    assert np.allclose(stage.heads(rig, ["mixamorig:Hips"], 1)[0, :2], stage.take.root[0, :2, 3], atol=0.06)
+    assert np.allclose(
+        stage.heads(rig, ["mixamorig:Hips"], 1)[0, :2], stage.take.root[0, :2, 3], atol=0.06
+    )
 
 
 TURNED = {  # hand and middle finger, foot and toe by side, head
-    "unreal": (("hand_l", "middle_01_l", "foot_l", "ball_l"), ("hand_r", "middle_01_r", "foot_r", "ball_r"), "head"),
-    "mixamo": (*(tuple(f"mixamorig:{word}{name}" for name in ("Hand", "HandMiddle1", "Foot", "ToeBase"))
-                 for word in ("Left", "Right")), "mixamorig:Head"),
-    "rigify": (*(tuple(f"DEF-{name}.{side}" for name in ("hand", "f_middle.01", "foot", "toe")) for side in "LR"),
-               "DEF-spine.006"),
+    "unreal": (
+        ("hand_l", "middle_01_l", "foot_l", "ball_l"),
+        ("hand_r", "middle_01_r", "foot_r", "ball_r"),
+        "head",
+    ),
+    "mixamo": (
+        *(
+            tuple(f"mixamorig:{word}{name}" for name in ("Hand", "HandMiddle1", "Foot", "ToeBase"))
+            for word in ("Left", "Right")
+        ),
+        "mixamorig:Head",
+    ),
+    "rigify": (
+        *(
+            tuple(f"DEF-{name}.{side}" for name in ("hand", "f_middle.01", "foot", "toe"))
+            for side in "LR"
+        ),
+        "DEF-spine.006",
+    ),
 }
 
 
-@pytest.mark.parametrize(("kind", "limbs"), [("unreal", "FK"), ("mixamo", "FK"), ("rigify", "FK"), ("rigify", "IK")])
+@pytest.mark.parametrize(
+    ("kind", "limbs"), [("unreal", "FK"), ("mixamo", "FK"), ("rigify", "FK"), ("rigify", "IK")]
+)
 def test_hands_and_feet_turn_as_the_characters(stage: Stage, kind: str, limbs: str) -> None:
-    """From A-pose as from T-pose: fingers point, soles tilt and faces look where the source's do."""
+    """From A-pose as from T-pose: fingers point, soles tilt and faces look where the source's
+    do.
+    """
     stage.play("write")
     skeleton = stage.addon("dafnet_addon.core.skeleton")
-    kinematics, rotations = (stage.addon(f"dafnet_addon.core.{name}") for name in ("kinematics", "rotations"))
-    frames = kinematics.global_from_local(rotations.matrix_from_quaternion(stage.take.rotations))[60]
+    kinematics, rotations = (
+        stage.addon(f"dafnet_addon.core.{name}") for name in ("kinematics", "rotations")
+    )
+    frames = kinematics.global_from_local(rotations.matrix_from_quaternion(stage.take.rotations))[
+        60
+    ]
     rig = stage.build(kind)
     # The room's axes of a rig that looks along -y, turned to look along +y.
     upright = np.diag([-1.0, -1.0, 1.0]) @ np.array(rig.matrix_world.to_3x3().normalized())
@@ -241,7 +332,9 @@ def test_hands_and_feet_turn_as_the_characters(stage: Stage, kind: str, limbs: s
         wrist, tip, ankle, toe = stage.heads(rig, list(names), 61)
         finger = frames[skeleton.joint(f"{word}_wrist")] @ [out, 0, 0]
         assert np.dot(rotations.normalised(tip - wrist), finger) > np.cos(np.radians(10))
-        foot = frames[skeleton.joint(f"{word}_ankle")] @ rotations.normalised(skeleton.OFFSETS[skeleton.joint(f"{word}_foot")])
+        foot = frames[skeleton.joint(f"{word}_ankle")] @ rotations.normalised(
+            skeleton.OFFSETS[skeleton.joint(f"{word}_foot")]
+        )
         assert np.dot(rotations.normalised(toe - ankle), foot) > np.cos(np.radians(3))
     evaluated = rig.evaluated_get(stage.bpy.context.evaluated_depsgraph_get())
     turned = (evaluated.matrix_world @ evaluated.pose.bones[head].matrix).to_3x3().normalized()
@@ -254,9 +347,16 @@ def test_hand_edits_are_baked(stage: Stage) -> None:
     arm = 'pose.bones["right_shoulder"].rotation_quaternion'
     for curve in stage.addon("dafnet_addon.blender.compat").action_curves(stage.ann):
         if curve.data_path == arm:
-            curve.keyframe_points.foreach_set("co", np.array([
-                (point.co.x, (0.8, 0.6, 0.0, 0.0)[curve.array_index]) for point in curve.keyframe_points
-            ], np.float32).ravel())
+            curve.keyframe_points.foreach_set(
+                "co",
+                np.array(
+                    [
+                        (point.co.x, (0.8, 0.6, 0.0, 0.0)[curve.array_index])
+                        for point in curve.keyframe_points
+                    ],
+                    np.float32,
+                ).ravel(),
+            )
             curve.update()
     rig = stage.build("mixamo")
     stage.bake("mixamo", rig)
@@ -289,7 +389,9 @@ def test_every_root_motion_gives_the_same_places(stage: Stage, kind: str) -> Non
     assert np.abs(places["HIPS"] - places["OBJECT"]).max() < 2e-3
 
 
-def test_units_of_the_scene(blender: ModuleType, addon: Callable[[str], Any], takes: dict[str, Any]) -> None:
+def test_units_of_the_scene(
+    blender: ModuleType, addon: Callable[[str], Any], takes: dict[str, Any]
+) -> None:
     """In a scene of centimetres a Mixamo rig has the scale 1; errors are told in metres."""
     blender.context.scene.unit_settings.scale_length = 0.01
     stage = Stage(blender, addon, takes)
@@ -315,7 +417,9 @@ def test_a_parent_that_moves_is_undone(stage: Stage) -> None:
     rig.parent = cart
     for motion in ("OBJECT", "HIPS"):
         stage.bake("mixamo", rig, root_motion=motion)
-        assert max(distances.mean() for distances in stage.errors("mixamo", rig).values()) < CENTIMETRE
+        assert (
+            max(distances.mean() for distances in stage.errors("mixamo", rig).values()) < CENTIMETRE
+        )
 
 
 def test_rotation_modes_give_the_same_pose(stage: Stage) -> None:
@@ -331,11 +435,15 @@ def test_rotation_modes_give_the_same_pose(stage: Stage) -> None:
         rig.rotation_mode = modes[shift]
         stage.bake("vrm", rig)
         assert np.abs(stage.played(rig, names, 18) - meant[::2]).max() < 1e-3
-    assert {bone.rotation_mode for bone in rig.pose.bones} == set(modes), "the modes are the animator's"
+    assert {bone.rotation_mode for bone in rig.pose.bones} == set(modes), (
+        "the modes are the animator's"
+    )
 
 
 def test_controls_that_are_turned_by_several_are_found_frame_by_frame(stage: Stage) -> None:
-    """Rigify's neck that follows the torso by half is rigid on nothing; the head lands and looks ahead all the same."""
+    """Rigify's neck that follows the torso by half is rigid on nothing; the head lands and looks
+    ahead all the same.
+    """
     stage.play("write")
     rig = stage.build("rigify")
     stage.bake("rigify", rig)
@@ -351,7 +459,9 @@ def test_controls_that_are_turned_by_several_are_found_frame_by_frame(stage: Sta
 
 
 def test_rigify_is_switched_and_old_poses_do_not_leak(stage: Stage) -> None:
-    """An older action has keyed IK, the chest and a limb's parent; the new one plays right after it, whatever was shown."""
+    """An older action has keyed IK, the chest and a limb's parent; the new one plays right after
+    it, whatever was shown.
+    """
     stage.play("walk")
     rig = stage.build("rigify")
     arm = rig.pose.bones["upper_arm_parent.L"]
@@ -382,7 +492,9 @@ def test_earlier_actions_stay_as_they_are(stage: Stage) -> None:
         bone.keyframe_insert("rotation_quaternion", frame=frame)
     compat = stage.addon("dafnet_addon.blender.compat")
     mine = rig.animation_data.action
-    before = [[tuple(point.co) for point in curve.keyframe_points] for curve in compat.action_curves(rig)]
+    before = [
+        [tuple(point.co) for point in curve.keyframe_points] for curve in compat.action_curves(rig)
+    ]
     theirs = stage.ann.animation_data.action
     stage.scene.frame_set(17)
     first = stage.bake("mixamo", rig).action
@@ -390,9 +502,15 @@ def test_earlier_actions_stay_as_they_are(stage: Stage) -> None:
     assert len({mine, first, second}) == 3 and rig.animation_data.action == second
     assert all(action.use_fake_user for action in (mine, first, second))
     assert stage.scene.frame_current == 17 and stage.ann.animation_data.action == theirs
-    assert {point.interpolation for curve in compat.action_curves(rig) for point in curve.keyframe_points} == {"LINEAR"}
+    assert {
+        point.interpolation
+        for curve in compat.action_curves(rig)
+        for point in curve.keyframe_points
+    } == {"LINEAR"}
     compat.assign_action(rig, mine)
-    assert [[tuple(point.co) for point in curve.keyframe_points] for curve in compat.action_curves(rig)] == before
+    assert [
+        [tuple(point.co) for point in curve.keyframe_points] for curve in compat.action_curves(rig)
+    ] == before
 
 
 def test_what_cannot_be_baked_is_refused_and_left_alone(stage: Stage) -> None:
@@ -401,9 +519,14 @@ def test_what_cannot_be_baked_is_refused_and_left_alone(stage: Stage) -> None:
     rig.pose.bones["mixamorig:Spine"].location = (1.0, 2.0, 3.0)
 
     def refused(match: str, rig: Any = rig, rig_map: Any = None, **options: Any) -> None:
-        actions, pose = set(stage.bpy.data.actions), [bone.matrix_basis.copy() for bone in rig.pose.bones]
+        actions, pose = (
+            set(stage.bpy.data.actions),
+            [bone.matrix_basis.copy() for bone in rig.pose.bones],
+        )
         with pytest.raises(stage.error, match=match) as caught:
-            stage.onto.bake_onto_rig(stage.bpy.context, stage.ann, rig, rig_map or stage.rigs.detected(rig), **options)
+            stage.onto.bake_onto_rig(
+                stage.bpy.context, stage.ann, rig, rig_map or stage.rigs.detected(rig), **options
+            )
         assert str(caught.value).count(". ") == 0
         assert set(stage.bpy.data.actions) == actions and rig.animation_data is None
         assert [bone.matrix_basis for bone in rig.pose.bones] == pose
@@ -411,8 +534,12 @@ def test_what_cannot_be_baked_is_refused_and_left_alone(stage: Stage) -> None:
     detected = stage.rigs.detected(rig)
     joints = {joint: bone for joint, bone in detected.joints.items() if joint != "left_knee"}
     refused("no bone for the left knee", rig_map=type(detected)("Mine", joints=joints))
-    refused("both left_elbow and left_knee", rig_map=type(detected)(
-        "Mine", joints=detected.joints | {"left_knee": detected.joints["left_elbow"]}))
+    refused(
+        "both left_elbow and left_knee",
+        rig_map=type(detected)(
+            "Mine", joints=detected.joints | {"left_knee": detected.joints["left_elbow"]}
+        ),
+    )
     refused("No IK controls", limbs="IK")
     refused("no root bone", root_motion="BONE")
     rig.scale.x *= 2.0
@@ -437,7 +564,8 @@ def test_an_object_that_drivers_move_is_refused(stage: Stage) -> None:
 
 
 def test_hips_beside_the_trunk_do_not_tear_it(stage: Stage) -> None:
-    """A bone "pelvis" for the hips' own turns, and the trunk, both on "hip": the guess takes that; the other is refused.
+    """A bone "pelvis" for the hips' own turns, and the trunk, both on "hip": the guess takes that;
+    the other is refused.
 
     What was played before is played again then, in its own slot.
     """
@@ -445,14 +573,23 @@ def test_hips_beside_the_trunk_do_not_tear_it(stage: Stage) -> None:
     rig = rig_builders.mixamo(stage.bpy, prefix="")
     stage.bpy.ops.object.mode_set(mode="EDIT")
     bones = rig.data.edit_bones
-    for old, new in (("Hips", "pelvis"), ("Spine", "abdomenLower"), ("Spine1", "abdomenUpper"), ("Spine2", "chest")):
+    for old, new in (
+        ("Hips", "pelvis"),
+        ("Spine", "abdomenLower"),
+        ("Spine1", "abdomenUpper"),
+        ("Spine2", "chest"),
+    ):
         bones[old].name = new
     hip = bones.new("hip")
     hip.head, hip.tail = bones["pelvis"].head, bones["pelvis"].tail
     bones["pelvis"].parent = bones["abdomenLower"].parent = hip
     stage.bpy.ops.object.mode_set(mode="OBJECT")
     found = stage.rigs.detected(rig)
-    assert (found.name, found.joints["pelvis"], found.joints["spine1"]) == ("Guessed", "hip", "abdomenLower")
+    assert (found.name, found.joints["pelvis"], found.joints["spine1"]) == (
+        "Guessed",
+        "hip",
+        "abdomenLower",
+    )
 
     rig.pose.bones["Head"].keyframe_insert("location", frame=1)
     data = rig.animation_data
@@ -466,7 +603,10 @@ def test_hips_beside_the_trunk_do_not_tear_it(stage: Stage) -> None:
     assert all(bone.matrix_basis == bone.matrix_basis.Identity(4) for bone in rig.pose.bones)
 
     stage.onto.bake_onto_rig(stage.bpy.context, stage.ann, rig, found)
-    assert np.abs(stage.heads(rig, ["Head", "LeftHand"], 30) - stage.take.joints[29, [15, 20]]).max() < CENTIMETRE
+    assert (
+        np.abs(stage.heads(rig, ["Head", "LeftHand"], 30) - stage.take.joints[29, [15, 20]]).max()
+        < CENTIMETRE
+    )
 
 
 def test_constraints_that_move_keyed_bones_are_named(stage: Stage) -> None:
@@ -484,8 +624,12 @@ def test_constraints_that_move_keyed_bones_are_named(stage: Stage) -> None:
 
 
 DETECTED = {
-    "mixamo": ("Mixamo", 22), "rigify": ("Rigify", 21), "rigify_metarig": ("Rigify metarig", 22), "smpl_x": ("SMPL-X", 22),
-    "unreal": ("Unreal mannequin (UE4)", 22), "vrm": ("VRM 1.0", 21),
+    "mixamo": ("Mixamo", 22),
+    "rigify": ("Rigify", 21),
+    "rigify_metarig": ("Rigify metarig", 22),
+    "smpl_x": ("SMPL-X", 22),
+    "unreal": ("Unreal mannequin (UE4)", 22),
+    "vrm": ("VRM 1.0", 21),
 }
 
 
@@ -515,10 +659,20 @@ def test_five_spine_bones_of_unreal(stage: Stage) -> None:
 
 
 GUESSED = {
-    "mixamorig:Hips": "hip_ctrl", "mixamorig:Spine": "spine_lower", "mixamorig:Spine1": "Spine-Mid",
-    "mixamorig:Spine2": "Chest", "mixamorig:Neck": "neck", "mixamorig:Head": "Head", "Shoulder": "Clavicle_{}",
-    "Arm": "UpperArm_{}", "ForeArm": "LowerArm_{}", "Hand": "hand.{}", "UpLeg": "{}_thigh", "Leg": "{}_shin",
-    "Foot": "Foot{}", "ToeBase": "Toe.{}",
+    "mixamorig:Hips": "hip_ctrl",
+    "mixamorig:Spine": "spine_lower",
+    "mixamorig:Spine1": "Spine-Mid",
+    "mixamorig:Spine2": "Chest",
+    "mixamorig:Neck": "neck",
+    "mixamorig:Head": "Head",
+    "Shoulder": "Clavicle_{}",
+    "Arm": "UpperArm_{}",
+    "ForeArm": "LowerArm_{}",
+    "Hand": "hand.{}",
+    "UpLeg": "{}_thigh",
+    "Leg": "{}_shin",
+    "Foot": "Foot{}",
+    "ToeBase": "Toe.{}",
 }
 
 
@@ -532,7 +686,9 @@ def test_names_of_no_convention_are_guessed(stage: Stage) -> None:
                 new[joint] = GUESSED[bone.split(word)[1]].format(side)
         new.setdefault(joint, GUESSED.get(bone, bone))
         rig.data.bones[bone].name = new[joint]
-    new["left_ankle"], new["right_ankle"] = (rig.data.bones[new[f"{side}_ankle"]].name for side in ("left", "right"))
+    new["left_ankle"], new["right_ankle"] = (
+        rig.data.bones[new[f"{side}_ankle"]].name for side in ("left", "right")
+    )
     found = stage.rigs.detected(rig)
     assert found.name == "Guessed"
     assert found.joints == new
@@ -540,12 +696,16 @@ def test_names_of_no_convention_are_guessed(stage: Stage) -> None:
 
 @pytest.fixture
 def user_maps(tmp_path: Path, addon: Callable[[str], Any], monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(addon("dafnet_addon.blender.rigs"), "user_folder", lambda create=False: tmp_path)
+    monkeypatch.setattr(
+        addon("dafnet_addon.blender.rigs"), "user_folder", lambda create=False: tmp_path
+    )
     return tmp_path
 
 
 def test_presets_are_saved_and_found_again(stage: Stage, user_maps: Path) -> None:
-    """By the operators: detect, correct by hand, save; another rig of these names is then detected, and can load it."""
+    """By the operators: detect, correct by hand, save; another rig of these names is then detected,
+    and can load it.
+    """
     properties = stage.addon("dafnet_addon.blender.rig_properties")
     rig = stage.build("odd")
     stage.bpy.context.view_layer.objects.active = rig
@@ -560,7 +720,9 @@ def test_presets_are_saved_and_found_again(stage: Stage, user_maps: Path) -> Non
     found = stage.rigs.detected(other)
     assert (found.name, found.joints, found.root) == ("Otto's Rig", rig_builders.ODD, "Wurzel")
     key = next(key for key, name, _ in properties.presets(None, None) if name == "Otto's Rig")
-    assert key.startswith("my_") and "mixamo" in {key for key, _, _ in properties.presets(None, None)}
+    assert key.startswith("my_") and "mixamo" in {
+        key for key, _, _ in properties.presets(None, None)
+    }
     stage.bpy.context.view_layer.objects.active = other
     assert stage.bpy.ops.dafnet.load_rig_map(preset=key) == {"FINISHED"}
     assert properties.map_of(other).joints == rig_builders.ODD
@@ -581,6 +743,7 @@ def test_the_panel_shows_a_row_for_each_joint(stage: Stage) -> None:
             def note(*values: Any, **options: Any) -> Any:
                 drawn.append((name, *(value for value in values if isinstance(value, str))))
                 return Layout()
+
             return note
 
     rig = stage.build("vrm")
@@ -588,13 +751,20 @@ def test_the_panel_shows_a_row_for_each_joint(stage: Stage) -> None:
     panels = stage.addon("panels.rig")
     owner = type("Owner", (), {"layout": Layout()})()
     panels.DAFNET_PT_rig.draw(owner, stage.bpy.context)
-    assert ("operator", "dafnet.bake_to_rig") in drawn and not any(each[0] == "template_list" for each in drawn)
+    assert ("operator", "dafnet.bake_to_rig") in drawn and not any(
+        each[0] == "template_list" for each in drawn
+    )
     stage.bpy.ops.dafnet.detect_rig()
     rig.dafnet_rig.root_motion = "BONE"
     panels.DAFNET_PT_rig.draw(owner, stage.bpy.context)
-    assert any(each[0] == "template_list" for each in drawn) and ("prop_search", "root_bone", "bones") in drawn
+    assert (
+        any(each[0] == "template_list" for each in drawn)
+        and ("prop_search", "root_bone", "bones") in drawn
+    )
     for row in rig.dafnet_rig.rows:
-        panels.DAFNET_UL_rig.draw_item(None, stage.bpy.context, Layout(), rig.dafnet_rig, row, 0, None, "")
+        panels.DAFNET_UL_rig.draw_item(
+            None, stage.bpy.context, Layout(), rig.dafnet_rig, row, 0, None, ""
+        )
     assert drawn.count(("prop_search", "bone", "bones")) == 22
 
 
@@ -605,19 +775,26 @@ def test_presets_lie_in_the_extensions_folder(stage: Stage) -> None:
 
 
 def test_a_corrected_row_of_rigify_keeps_the_rest(stage: Stage) -> None:
-    """A control chosen by hand replaces the preset's, with its place; IK stays for the other limbs' controls only."""
+    """A control chosen by hand replaces the preset's, with its place; IK stays for the other limbs'
+    controls only.
+    """
     rig = stage.build("rigify")
     properties = stage.addon("dafnet_addon.blender.rig_properties")
     properties.show_map(rig, stage.rigs.detected(rig))
     assert properties.map_of(rig) == stage.rigs.detected(rig)
     rig.dafnet_rig.rows["left_wrist"].bone = "hand_tweak.L"
     changed = properties.map_of(rig)
-    assert changed.place("left_wrist") == "hand_tweak.L" and changed.place("right_wrist") == "ORG-hand.R"
+    assert (
+        changed.place("left_wrist") == "hand_tweak.L"
+        and changed.place("right_wrist") == "ORG-hand.R"
+    )
     assert changed.limbs.keys() == {"right_arm", "left_leg", "right_leg"}
 
 
 def test_the_panel_and_the_button(stage: Stage) -> None:
-    """One press bakes and reports; one undo takes it back. The character is the only one, the selected or the chosen one."""
+    """One press bakes and reports; one undo takes it back. The character is the only one, the
+    selected or the chosen one.
+    """
     bpy = stage.bpy
     panel = stage.addon("panels.rig").DAFNET_PT_rig
     stage.play("walk")
@@ -651,11 +828,16 @@ def test_the_panel_and_the_button(stage: Stage) -> None:
 
 @pytest.mark.parametrize("kind", ["mixamo", "rigify", "odd"])
 def test_full_mode_copies_from_any_rig(stage: Stage, kind: str) -> None:
-    """The rig plays what Bob plays; Ann's upper body copied from either is the same within about a centimetre."""
+    """The rig plays what Bob plays; Ann's upper body copied from either is the same within about a
+    centimetre.
+    """
     bpy = stage.bpy
     stage.play("write")
     stage.ann.dafnet.root = None  # the source's root is found from its joints, as a rig's is
-    bob, stage.ann = stage.ann, stage.addon("dafnet_addon.blender.armature").create_character(bpy.context, "Ann")
+    bob, stage.ann = (
+        stage.ann,
+        stage.addon("dafnet_addon.blender.armature").create_character(bpy.context, "Ann"),
+    )
     stage.ann, source = bob, stage.ann
     rig = stage.build(kind)
     stage.bake(kind, rig)
@@ -666,11 +848,18 @@ def test_full_mode_copies_from_any_rig(stage: Stage, kind: str) -> None:
     for each in (bob, rig):
         source.dafnet.upper_body_source = each
         settings = stage.addon("dafnet_addon.blender.properties").settings_of(source, stage.scene)
-        read[each.name] = stage.addon("dafnet_addon.blender.scene_reader").read_scene(bpy.context, settings).controls.upper_body
+        read[each.name] = (
+            stage.addon("dafnet_addon.blender.scene_reader")
+            .read_scene(bpy.context, settings)
+            .controls.upper_body
+        )
     off = np.linalg.norm(read[rig.name] - read[bob.name], axis=-1)
-    # Without collars the chest turns with the reaching arm, and with it the heading that the root is found from.
+    # Without collars the chest turns with the reaching arm, and with it the heading that the root
+    # is found from.
     assert off.mean() < (2.0 if kind == "odd" else 1.2) * CENTIMETRE
-    assert off[:, [7, 12, 13]].mean() < (2.0 if kind == "odd" else 1.0) * CENTIMETRE, "head and wrists"
+    assert off[:, [7, 12, 13]].mean() < (2.0 if kind == "odd" else 1.0) * CENTIMETRE, (
+        "head and wrists"
+    )
 
 
 def test_full_mode_refuses_what_it_does_not_know(stage: Stage) -> None:
@@ -684,8 +873,11 @@ def test_full_mode_refuses_what_it_does_not_know(stage: Stage) -> None:
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 ENDS = {
-    "upper arms": ((16, 18), (17, 19)), "forearms": ((18, 20), (19, 21)), "thighs": ((1, 4), (2, 5)),
-    "shins": ((4, 7), (5, 8)), "shoulders": ((16, 17),),
+    "upper arms": ((16, 18), (17, 19)),
+    "forearms": ((18, 20), (19, 21)),
+    "thighs": ((1, 4), (2, 5)),
+    "shins": ((4, 7), (5, 8)),
+    "shoulders": ((16, 17),),
 }
 BENT = {"elbows": ((16, 18, 20), (17, 19, 21)), "knees": ((1, 4, 7), (2, 5, 8))}
 
@@ -697,16 +889,31 @@ def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def seen_off(joints: np.ndarray, source: np.ndarray) -> dict[str, np.ndarray]:
-    """What an eye sees of two motions (T, 22, 3): by how many degrees limbs, trunk and head lie otherwise, and bend."""
-    off = {name: np.concatenate([between(joints[:, b] - joints[:, a], source[:, b] - source[:, a]) for a, b in pairs])
-           for name, pairs in ENDS.items()}
+    """What an eye sees of two motions (T, 22, 3): by how many degrees limbs, trunk and head lie
+    otherwise, and bend.
+    """
+    off = {
+        name: np.concatenate(
+            [between(joints[:, b] - joints[:, a], source[:, b] - source[:, a]) for a, b in pairs]
+        )
+        for name, pairs in ENDS.items()
+    }
     for name, triples in BENT.items():
-        off[name] = np.concatenate([
-            np.abs(between(ours[:, 0] - ours[:, 1], ours[:, 2] - ours[:, 1])
-                   - between(theirs[:, 0] - theirs[:, 1], theirs[:, 2] - theirs[:, 1]))
-            for ours, theirs in ((joints[:, limb], source[:, limb]) for limb in map(list, triples))])
+        off[name] = np.concatenate(
+            [
+                np.abs(
+                    between(ours[:, 0] - ours[:, 1], ours[:, 2] - ours[:, 1])
+                    - between(theirs[:, 0] - theirs[:, 1], theirs[:, 2] - theirs[:, 1])
+                )
+                for ours, theirs in (
+                    (joints[:, limb], source[:, limb]) for limb in map(list, triples)
+                )
+            ]
+        )
     hips, theirs = joints[:, [1, 2]].mean(axis=1), source[:, [1, 2]].mean(axis=1)
-    off["trunk"] = between(joints[:, [16, 17]].mean(axis=1) - hips, source[:, [16, 17]].mean(axis=1) - theirs)
+    off["trunk"] = between(
+        joints[:, [16, 17]].mean(axis=1) - hips, source[:, [16, 17]].mean(axis=1) - theirs
+    )
     off["head"] = between(joints[:, 15] - hips, source[:, 15] - theirs)
     return off
 
@@ -721,7 +928,10 @@ class World:
     def played(self, frames: range) -> np.ndarray:
         known = [j for j, name in enumerate(self.names) if self.map.place(name)]
         joints = np.full((len(frames), 22, 3), np.nan)
-        joints[:, known] = [self.stage.heads(self.rig, [self.map.place(self.names[j]) for j in known], f) for f in frames]
+        joints[:, known] = [
+            self.stage.heads(self.rig, [self.map.place(self.names[j]) for j in known], f)
+            for f in frames
+        ]
         return joints
 
     def read(self, frames: range) -> np.ndarray:
@@ -732,20 +942,25 @@ class World:
             self.stage.scene.frame_set(frame)
             evaluated = self.rig.evaluated_get(self.stage.bpy.context.evaluated_depsgraph_get())
             bodies.append(np.array(evaluated.matrix_world))
-            poses.append(reading.pose_matrices(evaluated, [self.map.place(name) for name in self.names]))
+            poses.append(
+                reading.pose_matrices(evaluated, [self.map.place(name) for name in self.names])
+            )
         return reading.joints_of(self.rig, self.map, np.array(bodies), np.array(poses), 1.0)[0]
 
 
 @pytest.mark.parametrize("rest", rig_builders.RESTS)
 @pytest.mark.parametrize("kind", ["mixamo", "unreal", "vrm"])
 def test_the_rest_pose_does_not_matter(stage: Stage, kind: str, rest: str) -> None:
-    """Arms hanging or ahead, sitting, twisted, bent, leaning: limbs, trunk and head lie in the room as the character's.
+    """Arms hanging or ahead, sitting, twisted, bent, leaning: limbs, trunk and head lie in the room
+    as the character's.
 
     And FULL reads them back so.
     """
     stage.play("write")
     rig = stage.build(kind)
-    rig_builders.rested(stage.bpy, rig, *rig_builders.rest_pose(rest, stage.rigs.detected(rig).joints))
+    rig_builders.rested(
+        stage.bpy, rig, *rig_builders.rest_pose(rest, stage.rigs.detected(rig).joints)
+    )
     baked = stage.bake(kind, rig)
     for part, distances in stage.errors(kind, rig).items():
         assert distances.mean() < CENTIMETRE, part
@@ -783,8 +998,14 @@ def test_bones_may_point_anywhere_and_objects_stand_anyhow(stage: Stage, size: f
         assert off.max() < 6.0, f"{part} {off.mean():.1f} ({off.max():.1f})"
 
 
-BVH = ["accad_male1_B3_walk", "accad_male1_A9_lie_down", "cmu69_69_02_1", "cmu_daz_14_12_wash_windows",
-       "cmu_daz_14_30_sit_stepstool", "snu_ys2010_walk_turn_180"]
+BVH = [
+    "accad_male1_B3_walk",
+    "accad_male1_A9_lie_down",
+    "cmu69_69_02_1",
+    "cmu_daz_14_12_wash_windows",
+    "cmu_daz_14_30_sit_stepstool",
+    "snu_ys2010_walk_turn_180",
+]
 
 
 def imported(stage: Stage, name: str) -> Any:
@@ -800,22 +1021,33 @@ def imported(stage: Stage, name: str) -> Any:
 
 @pytest.mark.parametrize("name", BVH)
 def test_full_mode_reads_real_imports_as_they_are_seen(stage: Stage, name: str) -> None:
-    """Whatever pose they rest in: trunks bent by a right angle, arms ahead, legs astride, collars on one side only."""
+    """Whatever pose they rest in: trunks bent by a right angle, arms ahead, legs astride, collars
+    on one side only.
+    """
     rig = imported(stage, name)
     end = int(rig.animation_data.action.frame_range[1])
     world, frames = World(stage, rig), range(2, end, max(1, end // 40))
     source, read = world.played(frames), world.read(frames)
     for part, off in seen_off(read, source).items():
-        most = 0.1 if part in ("upper arms", "forearms", "elbows", "thighs", "shins", "knees") else 6.0
+        most = (
+            0.1 if part in ("upper arms", "forearms", "elbows", "thighs", "shins", "knees") else 6.0
+        )
         assert off.max() < most, f"{part} {off.mean():.1f} ({off.max():.1f})"
     way = [joints[:, 15] - joints[:, [1, 2]].mean(axis=1) for joints in (read, source)]
     size = np.linalg.norm(way[0], axis=1).max() / np.linalg.norm(way[1], axis=1).max()
-    assert np.linalg.norm(way[0] - size * way[1], axis=1).max() < 4.0 * CENTIMETRE, "the head over the hips"
+    assert np.linalg.norm(way[0] - size * way[1], axis=1).max() < 4.0 * CENTIMETRE, (
+        "the head over the hips"
+    )
 
 
-REAL = {  # mean degrees of arms, legs and trunk that the bakes may be off; proportions that differ are all that is left
-    "mixamo_gltf_woman": (1.0, 4.0, 4.0), "mixamo_gltf_soldier": (1.0, 6.0, 4.0), "vrm_b": (1.0, 20.0, 5.0),
-    "robot_gltf": (1.0, 13.0, 5.0), "chibi_gltf": (1.0, 28.0, 6.0),
+# mean degrees of arms, legs and trunk that the bakes may be off; proportions that differ are all
+# that is left
+REAL = {
+    "mixamo_gltf_woman": (1.0, 4.0, 4.0),
+    "mixamo_gltf_soldier": (1.0, 6.0, 4.0),
+    "vrm_b": (1.0, 20.0, 5.0),
+    "robot_gltf": (1.0, 13.0, 5.0),
+    "chibi_gltf": (1.0, 28.0, 6.0),
 }
 
 
@@ -829,28 +1061,47 @@ def test_real_characters_keep_the_motions_shape(stage: Stage, name: str, take: s
     rig = rig_builders.of_file(stage.bpy, file)
     stage.play(take)
     baked = stage.bake(name, rig)
-    assert baked.errors["ankles"][0] < CENTIMETRE, "feet are on the floor, also those that hang on no leg"
+    assert baked.errors["ankles"][0] < CENTIMETRE, (
+        "feet are on the floor, also those that hang on no leg"
+    )
     step = 3
-    off = seen_off(World(stage, rig).played(range(1, len(stage.take) + 1, step)), stage.take.joints[::step])
+    off = seen_off(
+        World(stage, rig).played(range(1, len(stage.take) + 1, step)), stage.take.joints[::step]
+    )
     arms, legs, trunk = REAL[name]
-    for parts, most in ((("upper arms", "forearms", "elbows"), arms), (("thighs", "shins", "knees"), legs),
-                        (("trunk", "head"), trunk)):
+    for parts, most in (
+        (("upper arms", "forearms", "elbows"), arms),
+        (("thighs", "shins", "knees"), legs),
+        (("trunk", "head"), trunk),
+    ):
         for part in parts:
             assert off[part].mean() < most, f"{part} {off[part].mean():.1f} ({off[part].max():.1f})"
-    for limb, parts in (("arm", ("upper arms", "forearms", "elbows")), ("leg", ("thighs", "shins", "knees"))):
+    for limb, parts in (
+        ("arm", ("upper arms", "forearms", "elbows")),
+        ("leg", ("thighs", "shins", "knees")),
+    ):
         told = max(baked.angles[f"{side} {limb}"][0] for side in ("left", "right"))
-        assert told > max(off[part].mean() for part in parts) - 2.5, "the report is no better than what is seen"
+        assert told > max(off[part].mean() for part in parts) - 2.5, (
+            "the report is no better than what is seen"
+        )
 
 
 @pytest.mark.parametrize("rest", rig_builders.RESTS)
 def test_hands_feet_and_face_turn_the_same_from_any_rest_pose(stage: Stage, rest: str) -> None:
-    """Fingers, palms, soles and face as the character's in the room, by where bones are that nobody keyed."""
+    """Fingers, palms, soles and face as the character's in the room, by where bones are that nobody
+    keyed.
+    """
     stage.play("write")
     kinematics, rotations, skeleton = (
-        stage.addon(f"dafnet_addon.core.{name}") for name in ("kinematics", "rotations", "skeleton"))
-    frames = kinematics.global_from_local(rotations.matrix_from_quaternion(stage.take.rotations))[60]
+        stage.addon(f"dafnet_addon.core.{name}") for name in ("kinematics", "rotations", "skeleton")
+    )
+    frames = kinematics.global_from_local(rotations.matrix_from_quaternion(stage.take.rotations))[
+        60
+    ]
     rig = stage.build("mixamo")
-    rig_builders.rested(stage.bpy, rig, *rig_builders.rest_pose(rest, stage.rigs.detected(rig).joints))
+    rig_builders.rested(
+        stage.bpy, rig, *rig_builders.rest_pose(rest, stage.rigs.detected(rig).joints)
+    )
     stage.bake("mixamo", rig)
 
     def way(start: str, end: str) -> np.ndarray:
@@ -861,33 +1112,57 @@ def test_hands_feet_and_face_turn_the_same_from_any_rest_pose(stage: Stage, rest
         fingers = way(f"{word}Hand", f"{word}HandMiddle1") + way(f"{word}Hand", f"{word}HandRing1")
         assert between(fingers, hand @ [out, 0.0, 0.0]) < 1.0
         assert between(way(f"{word}HandPinky1", f"{word}HandIndex1"), hand @ [0.0, 1.0, 0.0]) < 5.0
-        assert between(way(f"{word}Foot", f"{word}ToeBase"), ankle @ skeleton.OFFSETS[skeleton.joint(f"{side}_foot")]) < 1.0
-    assert between(way("Head", "HeadTop_End"), frames[skeleton.joint("head")] @ [0.0, 0.0, 1.0]) < 2.0
+        assert (
+            between(
+                way(f"{word}Foot", f"{word}ToeBase"),
+                ankle @ skeleton.OFFSETS[skeleton.joint(f"{side}_foot")],
+            )
+            < 1.0
+        )
+    assert (
+        between(way("Head", "HeadTop_End"), frames[skeleton.joint("head")] @ [0.0, 0.0, 1.0]) < 2.0
+    )
 
 
 def test_full_mode_tells_what_it_cannot_follow(stage: Stage) -> None:
-    """A trunk folded by bones that the map does not know: in words, per limb, in degrees; nothing where all is followed."""
+    """A trunk folded by bones that the map does not know: in words, per limb, in degrees; nothing
+    where all is followed.
+    """
     stage.play("walk")
     rig = stage.build("mixamo")
     stage.ann.dafnet.upper_body_source = rig
     stage.ann.dafnet.mode = "FULL"
     stage.scene.frame_start, stage.scene.frame_end = 1, 20
-    properties, reader = (stage.addon(f"dafnet_addon.blender.{name}") for name in ("properties", "scene_reader"))
+    properties, reader = (
+        stage.addon(f"dafnet_addon.blender.{name}") for name in ("properties", "scene_reader")
+    )
 
     def warnings() -> str:
-        return " ".join(reader.read_scene(stage.bpy.context, properties.settings_of(stage.ann, stage.scene)).warnings)
+        return " ".join(
+            reader.read_scene(
+                stage.bpy.context, properties.settings_of(stage.ann, stage.scene)
+            ).warnings
+        )
 
     rig.pose.bones["mixamorig:Spine1"].rotation_quaternion = (0.966, 0.259, 0.0, 0.0)
     assert "is followed" not in warnings()
     known = stage.rigs.detected(rig)
-    joints = {joint: bone for joint, bone in known.joints.items() if "spine" not in joint and "collar" not in joint}
-    stage.addon("dafnet_addon.blender.rig_properties").show_map(rig, type(known)("Mine", joints=joints))
+    joints = {
+        joint: bone
+        for joint, bone in known.joints.items()
+        if "spine" not in joint and "collar" not in joint
+    }
+    stage.addon("dafnet_addon.blender.rig_properties").show_map(
+        rig, type(known)("Mine", joints=joints)
+    )
     rig.pose.bones["mixamorig:Spine1"].rotation_quaternion = (0.383, 0.0, 0.924, 0.0)
     assert "'Mixamo' is followed, but the trunk by" in warnings() and "degrees off" in warnings()
 
 
 def test_a_bake_that_is_off_is_warned_about(stage: Stage) -> None:
-    """Long arms: the hands land, so the elbows are bent, and the report names the arms in degrees."""
+    """Long arms: the hands land, so the elbows are bent, and the report names the arms in
+    degrees.
+    """
     stage.play("walk")
     rig = stage.build("mixamo", arms=1.2)
     stage.bpy.context.view_layer.objects.active = rig
@@ -901,7 +1176,9 @@ def test_a_bake_that_is_off_is_warned_about(stage: Stage) -> None:
     assert operator.execute(Reporter(), stage.bpy.context) == {"FINISHED"}
     warned = [message for kind, message in messages if kind == {"WARNING"}]
     assert len(warned) == 1 and "left arm by" in warned[0] and "degrees" in warned[0]
-    assert "wrists 0.0" in messages[-1][1] and "left arm" in messages[-1][1], "places and angles are told together"
+    assert "wrists 0.0" in messages[-1][1] and "left arm" in messages[-1][1], (
+        "places and angles are told together"
+    )
     messages.clear()
     stage.bpy.context.view_layer.objects.active = stage.build("mixamo")
     operator.execute(Reporter(), stage.bpy.context)

@@ -1,4 +1,6 @@
-"""A bake that fails between its first and its last write leaves the file as it was, wherever and however it fails."""
+"""A bake that fails between its first and its last write leaves the file as it was, wherever and
+however it fails.
+"""
 
 import linecache
 import sys
@@ -23,7 +25,13 @@ class _Injected(Exception):
 def _plain(value: Any) -> object:
     if isinstance(value, str | int | float | bytes | set | None):
         return value
-    return value.name_full if hasattr(value, "name_full") else repr(value[:]) if hasattr(value, "__getitem__") else repr(value)
+    return (
+        value.name_full
+        if hasattr(value, "name_full")
+        else repr(value[:])
+        if hasattr(value, "__getitem__")
+        else repr(value)
+    )
 
 
 def _told(struct: Any) -> dict[str, object]:
@@ -37,22 +45,41 @@ def _told(struct: Any) -> dict[str, object]:
 def _names(kind: type) -> list[str]:
     known = kind.bl_rna.properties  # type: ignore[attr-defined]
     kinds = {each.identifier: each.type for each in known}
-    return [name for name, kind in kinds.items() if kind not in ("COLLECTION", "POINTER") and name != "use_nodes"]
+    return [
+        name
+        for name, kind in kinds.items()
+        if kind not in ("COLLECTION", "POINTER") and name != "use_nodes"
+    ]
 
 
 def everything(bpy: ModuleType, addon: Addon, armature: Any) -> dict[str, object]:
-    """What must be as it was: the armature, what it plays and lists, every action and its keys, the scene."""
+    """What must be as it was: the armature, what it plays and lists, every action and its keys, the
+    scene.
+    """
     bpy.context.view_layer.update()
     data, own = armature.animation_data, armature.dafnet
     return {
-        "armature": _told(armature), "data": _told(data), "plays": data and data.action and data.action.name,
+        "armature": _told(armature),
+        "data": _told(data),
+        "plays": data and data.action and data.action.name,
         "slot": getattr(data, "action_slot", None) and data.action_slot.identifier,
-        "bones": [(bone.rotation_mode, *bone.matrix_basis, dict(bone.items())) for bone in armature.pose.bones],
+        "bones": [
+            (bone.rotation_mode, *bone.matrix_basis, dict(bone.items()))
+            for bone in armature.pose.bones
+        ],
         "knee": _told(armature.pose.bones["left_knee"]),
-        "rows": [row.action and row.action.name for row in own.takes], "settings": _told(own),
-        "actions": {action.name: (_told(action), _told(action.dafnet), list(action.keys())) for action in bpy.data.actions},
+        "rows": [row.action and row.action.name for row in own.takes],
+        "settings": _told(own),
+        "actions": {
+            action.name: (_told(action), _told(action.dafnet), list(action.keys()))
+            for action in bpy.data.actions
+        },
         "keys": [
-            (curve.data_path, curve.array_index, [tuple(point.co) for point in curve.keyframe_points])
+            (
+                curve.data_path,
+                curve.array_index,
+                [tuple(point.co) for point in curve.keyframe_points],
+            )
             for curve in addon("dafnet_addon.blender.compat").action_curves(armature)
         ],
         "scene": _told(bpy.context.scene),
@@ -61,9 +88,14 @@ def everything(bpy: ModuleType, addon: Addon, armature: Any) -> dict[str, object
 
 @contextmanager
 def _traced(visit: Callable[[Place, str], None]) -> Iterator[None]:
-    """Call ``visit`` before every line of the add-on that writes a bake; what it raises, the line is as if it raised."""
+    """Call ``visit`` before every line of the add-on that writes a bake; what it raises, the line
+    is as if it raised.
+    """
     writing = {
-        "job.py": {"_bake_steps"}, "baker.py": None, "takes.py": None, "curves.py": None,
+        "job.py": {"_bake_steps"},
+        "baker.py": None,
+        "takes.py": None,
+        "curves.py": None,
         "compat.py": {"new_action", "add", "assign_action"},
     }
     seen: dict[str, int] = {}
@@ -93,12 +125,19 @@ def _nothing(bpy: ModuleType, armature: Any) -> None:
 
 
 def _played(bpy: ModuleType, armature: Any) -> None:
-    """A character that plays the animator's own action in part, with a keyed mode and a bone posed by hand."""
+    """A character that plays the animator's own action in part, with a keyed mode and a bone posed
+    by hand.
+    """
     armature.dafnet.keyframe_insert("mode", frame=1)
     armature.animation_data.action_influence = 0.5
     armature.animation_data.action_blend_type = "ADD"
     bone = armature.pose.bones["left_knee"]
-    bone.rotation_mode, bone.rotation_euler, bone.location, bone["mine"] = "XZY", (0.1, 0.2, 0.3), (0, 0, 0.1), 3
+    bone.rotation_mode, bone.rotation_euler, bone.location, bone["mine"] = (
+        "XZY",
+        (0.1, 0.2, 0.3),
+        (0, 0, 0.1),
+        3,
+    )
     armature.location = (1, 2, 3)
 
 
@@ -113,15 +152,22 @@ def _listed(bpy: ModuleType, armature: Any) -> None:
 
 @pytest.mark.parametrize("prepared", [_nothing, _played, _listed])
 def test_a_failure_at_any_write_leaves_the_file_as_it_was(
-    blender: ModuleType, addon: Addon, prepared: Callable[[ModuleType, Any], None],
+    blender: ModuleType,
+    addon: Addon,
+    prepared: Callable[[ModuleType, Any], None],
 ) -> None:
     job, take_of = addon("dafnet_addon.blender.job"), addon("dafnet_addon.core.take")
     generate = addon("dafnet_addon.core.generate")
     armature = addon("dafnet_addon.blender.armature").create_character(blender.context, "Ann")
     prepared(blender, armature)
-    controls, draws = take_of.Controls(30.0, np.tile(np.eye(4), (3, 1, 1))), [generate.Draw(seed) for seed in range(2)]
+    controls, draws = (
+        take_of.Controls(30.0, np.tile(np.eye(4), (3, 1, 1))),
+        [generate.Draw(seed) for seed in range(2)],
+    )
     scene, weights = addon("dafnet_addon.core.solids").Scene(), addon("dafnet_addon").load_weights()
-    made = addon("dafnet_addon.core.progress").drained(generate.takes_steps(scene, controls, weights, draws))
+    made = addon("dafnet_addon.core.progress").drained(
+        generate.takes_steps(scene, controls, weights, draws)
+    )
     settings = job.settings_of(armature, blender.context.scene)
 
     def bake() -> None:
@@ -146,7 +192,12 @@ def test_a_failure_at_any_write_leaves_the_file_as_it_was(
     prepared(blender, armature)
     settings = job.settings_of(armature, blender.context.scene)
     before = everything(blender, addon, armature)
-    assert len(places) > 60 and {line.split(":")[0] for line in places} >= {"job.py", "baker.py", "takes.py", "compat.py"}
+    assert len(places) > 60 and {line.split(":")[0] for line in places} >= {
+        "job.py",
+        "baker.py",
+        "takes.py",
+        "compat.py",
+    }
     for line, times in places.items():
         for at in {1, times}:
 
@@ -157,4 +208,6 @@ def test_a_failure_at_any_write_leaves_the_file_as_it_was(
             with pytest.raises(_Injected), _traced(fail):
                 bake()
             after = everything(blender, addon, armature)
-            assert {key: after[key] for key in after if after[key] != before[key]} == {}, f"{line}, visit {at}"
+            assert {key: after[key] for key in after if after[key] != before[key]} == {}, (
+                f"{line}, visit {at}"
+            )

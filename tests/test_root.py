@@ -33,7 +33,10 @@ RNG = np.random.default_rng(7)
 
 def winding_path(frames: int = 200) -> RootPath:
     t = np.linspace(0.0, 6.0, frames)
-    return RootPath(np.stack([np.sin(t), 0.5 * t, np.zeros(frames)], axis=1), 1.5 * t + 0.3 * np.sin(3 * t) + 0.4)
+    return RootPath(
+        np.stack([np.sin(t), 0.5 * t, np.zeros(frames)], axis=1),
+        1.5 * t + 0.3 * np.sin(3 * t) + 0.4,
+    )
 
 
 def test_integrating_velocities_gives_the_path_back():
@@ -44,8 +47,12 @@ def test_integrating_velocities_gives_the_path_back():
 
 
 def test_velocity_is_right_forward_and_counter_clockwise_turn():
-    facing_minus_x = RootPath(np.array([[0, 0, 0], [-0.1, 0.02, 0]]), np.array([np.pi / 2, np.pi / 2 + 0.05]))
-    np.testing.assert_allclose(velocities(facing_minus_x), [[0, 0, 0], [0.02, 0.1, 0.05]], atol=1e-12)
+    facing_minus_x = RootPath(
+        np.array([[0, 0, 0], [-0.1, 0.02, 0]]), np.array([np.pi / 2, np.pi / 2 + 0.05])
+    )
+    np.testing.assert_allclose(
+        velocities(facing_minus_x), [[0, 0, 0], [0.02, 0.1, 0.05]], atol=1e-12
+    )
 
 
 def test_world_and_root_are_inverse_for_any_number_of_points():
@@ -105,7 +112,9 @@ def test_matrices_round_trip_and_tilt_is_flattened():
 def test_sensor_has_2640_spheres_in_15_layers_of_176():
     assert SPHERES.shape == (2640, 3)
     layers = SPHERES.reshape(15, 176, 3)
-    np.testing.assert_allclose(layers[:, :, 2], np.arange(15)[:, None] / 7 * np.ones(176), atol=1e-12)
+    np.testing.assert_allclose(
+        layers[:, :, 2], np.arange(15)[:, None] / 7 * np.ones(176), atol=1e-12
+    )
     for layer in layers[1:]:
         np.testing.assert_array_equal(layer[:, :2], layers[0, :, :2])
     assert layers[-1, 0, 2] == pytest.approx(HEIGHT)
@@ -137,10 +146,16 @@ def random_rotations(n: int) -> np.ndarray:
 
 
 def test_quaternions_and_matrices_are_inverse():
-    matrices = np.concatenate([random_rotations(500), [np.diag(d) for d in ([1, 1, 1], [1, -1, -1], [-1, -1, 1])]])
-    np.testing.assert_allclose(matrices @ transpose(matrices), np.broadcast_to(np.eye(3), matrices.shape), atol=1e-12)
+    matrices = np.concatenate(
+        [random_rotations(500), [np.diag(d) for d in ([1, 1, 1], [1, -1, -1], [-1, -1, 1])]]
+    )
+    np.testing.assert_allclose(
+        matrices @ transpose(matrices), np.broadcast_to(np.eye(3), matrices.shape), atol=1e-12
+    )
     np.testing.assert_allclose(np.linalg.det(matrices), 1.0)
-    np.testing.assert_allclose(matrix_from_quaternion(quaternion_from_matrix(matrices)), matrices, atol=1e-12)
+    np.testing.assert_allclose(
+        matrix_from_quaternion(quaternion_from_matrix(matrices)), matrices, atol=1e-12
+    )
 
 
 def test_quaternion_of_a_known_turn():

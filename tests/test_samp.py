@@ -1,4 +1,6 @@
-"""SAMP, the baseline: what its state says of known motions, that its network mixes experts and learns, and that it walks on."""
+"""SAMP, the baseline: what its state says of known motions, that its network mixes experts and
+learns, and that it walks on.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +11,14 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from dafnet_addon.baselines import samp, samp_features, samp_state  # noqa: E402
-from dafnet_addon.baselines.samp import Blended, MotionNet, SampConfig, SampTraining, network_of, takes  # noqa: E402
+from dafnet_addon.baselines.samp import (  # noqa: E402
+    Blended,
+    MotionNet,
+    SampConfig,
+    SampTraining,
+    network_of,
+    takes,
+)
 from dafnet_addon.core.conditions import Shot  # noqa: E402
 from dafnet_addon.core.root import RootPath, ahead, velocities  # noqa: E402
 from dafnet_addon.core.rotations import rotate, yaw_matrix  # noqa: E402
@@ -44,7 +53,11 @@ def _path(step: float, frames: int, place: tuple[float, float], yaw: float) -> R
 
 
 def _windows(
-    pose: np.ndarray, step: float = STEP, place: tuple[float, float] = (0.0, 0.0), yaw: float = 0.0, count: int = 1,
+    pose: np.ndarray,
+    step: float = STEP,
+    place: tuple[float, float] = (0.0, 0.0),
+    yaw: float = 0.0,
+    count: int = 1,
     boxes: np.ndarray = NO_BOXES,
 ) -> dict[str, np.ndarray]:
     """Windows of a body that is carried along like a statue."""
@@ -53,8 +66,10 @@ def _windows(
     rows[: len(boxes)] = boxes
     window = {
         "poses": np.round(np.tile(pose.reshape(66), (80, 1)) / POSE_UNIT).astype(np.int16),
-        "velocity": velocities(path)[1:81], "ahead": ahead(path)[11:81],
-        "root": np.c_[path.position[11:81, :2], path.yaw[11:81]], "boxes": rows,
+        "velocity": velocities(path)[1:81],
+        "ahead": ahead(path)[11:81],
+        "root": np.c_[path.position[11:81, :2], path.yaw[11:81]],
+        "boxes": rows,
         "shapes": np.tile(ABSENT_SHAPE, (SHAPES, 1)),
     }
     return {name: np.stack([a] * count) for name, a in window.items()}
@@ -73,7 +88,11 @@ def test_a_state_has_the_papers_size():
 def test_shares_of_experts_sum_to_one():
     net = network_of("samp", TINY)
     shares = net.shares(torch.randn(5, 8), torch.randn(5, 647))
-    assert shares.shape == (5, 3) and torch.allclose(shares.sum(-1), torch.ones(5)) and (shares >= 0).all()
+    assert (
+        shares.shape == (5, 3)
+        and torch.allclose(shares.sum(-1), torch.ones(5))
+        and (shares >= 0).all()
+    )
 
 
 def test_one_expert_is_a_linear_layer():
@@ -101,20 +120,30 @@ def test_a_straight_walk_is_sampled_where_it_was_and_will_be():
     assert torch.allclose(pose[0, 3:9], torch.tensor([0.0, 1, 0, 0, 0, 1]), atol=1e-3)
     assert torch.allclose(pose[:, 9:], torch.tensor([0.0, STEP * 30, 0.0]), atol=1e-3)
     goal = parts.goal[..., samp_state.NOW, :]
-    assert (goal[..., 0].abs() < 1e-5).all() and torch.allclose(goal[..., 3:5], torch.tensor([0.0, 1.0]), atol=1e-5)
-    assert goal[..., 1].min() > 29 * STEP and goal[..., 1].max() < 81 * STEP, "a way point is one to 2.7 seconds ahead"
+    assert (goal[..., 0].abs() < 1e-5).all() and torch.allclose(
+        goal[..., 3:5], torch.tensor([0.0, 1.0]), atol=1e-5
+    )
+    assert goal[..., 1].min() > 29 * STEP and goal[..., 1].max() < 81 * STEP, (
+        "a way point is one to 2.7 seconds ahead"
+    )
     assert torch.allclose(from_goal[..., samp_state.NOW, 1], -goal[..., 1], atol=1e-5)
 
 
 def test_states_do_not_know_where_in_the_world_they_are():
     at_seat = {"pose": _seated(), "step": 0.0}
     for kind in ({"pose": REST}, at_seat):
-        here, there = _inputs(_windows(**kind)), _inputs(_windows(**kind, place=(3.0, -2.0), yaw=2.3))
+        here, there = (
+            _inputs(_windows(**kind)),
+            _inputs(_windows(**kind, place=(3.0, -2.0), yaw=2.3)),
+        )
         assert (here - there).abs().max() < 2e-3
     seat = box((0.0, 0.0, 0.215), (0.5, 0.4, 0.43))
     turned = box((3.0, -2.0, 0.215), (0.5, 0.4, 0.43), 2.3)
     seen = []
-    for windows in (_windows(**at_seat, boxes=seat[None]), _windows(**at_seat, place=(3.0, -2.0), yaw=2.3, boxes=turned[None])):
+    for windows in (
+        _windows(**at_seat, boxes=seat[None]),
+        _windows(**at_seat, place=(3.0, -2.0), yaw=2.3, boxes=turned[None]),
+    ):
         track, at = samp_features.of_windows(windows, np.zeros(1))
         aim = samp_features.parts_of(track, at, at).goal[:, :, samp_state.NOW]
         seen.append(samp_state.sensor_of(track.solid[track.which[:, at]], aim))
@@ -129,13 +158,18 @@ def test_a_seated_body_sits_at_its_goal():
     goal = parts.goal[..., samp_state.NOW, :]
     assert torch.allclose(goal[..., :3], torch.tensor([0.0, 0.0, 0.43]), atol=1e-3)
     sits = samp_state.ACTIONS.index("sit")
-    assert torch.allclose(goal[..., 6 + sits], torch.tensor(1.0)) and (parts.trajectory[..., 4 + sits] > 0.99).all()
+    assert (
+        torch.allclose(goal[..., 6 + sits], torch.tensor(1.0))
+        and (parts.trajectory[..., 4 + sits] > 0.99).all()
+    )
     assert (parts.contacts[..., 4] == 1).all() and (parts.contacts[..., :2] == 1).all()
 
 
 def test_a_root_that_will_stay_over_a_seat_goes_there_to_sit():
     windows = _windows(REST)
-    end = RootPath(np.c_[windows["root"][0, :, :2], np.zeros(70)], windows["root"][0, :, 2]).position[-1]
+    end = RootPath(
+        np.c_[windows["root"][0, :, :2], np.zeros(70)], windows["root"][0, :, 2]
+    ).position[-1]
     windows["ahead"] = np.minimum(windows["ahead"], (end[1] - windows["root"][:, :, 1])[..., None])
     windows["boxes"][0, 0] = box((end[0], end[1], 0.2), (0.5, 0.5, 0.4))
     goal = samp_state.split(_inputs(windows))[0].goal[0, -1, samp_state.NOW]
@@ -234,7 +268,10 @@ def _statue(step: float) -> MotionNet:
             parameter.zero_()
     track, at = samp_features.of_windows(_windows(REST, step=step), np.zeros(1))
     now, then = samp_features.parts_of(track, at, at), samp_features.parts_of(track, at + 1, at)
-    last, aim = now.trajectory[:, :, samp_state.LAST, :4], samp_state.goal_place(now.goal[:, :, samp_state.NOW])
+    last, aim = (
+        now.trajectory[:, :, samp_state.LAST, :4],
+        samp_state.goal_place(now.goal[:, :, samp_state.NOW]),
+    )
     net.measure("out", samp_state.state_of(then, last, aim), 1e-3)
     return net
 
@@ -243,7 +280,9 @@ def test_samp_goes_its_own_way_and_samp_a_the_clips(walk):
     clip, _ = walk
     slow = _statue(0.5 * STEP)
     with_root, own = (takes(slow, *walk, [None], kind)[0] for kind in ("samp-a", "samp"))
-    assert np.linalg.norm(with_root[:, 0, :2] - clip.path.position[:, :2], axis=-1).max() < 1.1 * STEP
+    assert (
+        np.linalg.norm(with_root[:, 0, :2] - clip.path.position[:, :2], axis=-1).max() < 1.1 * STEP
+    )
     moved = np.linalg.norm(own[-1, 0, :2] - own[0, 0, :2])
     assert abs(moved - 39 * 0.5 * STEP) < 0.05, "half as fast as the clip"
 

@@ -1,4 +1,6 @@
-"""The sampler against the torch model it was exported from, NumPy against torch, resuming, and seeds."""
+"""The sampler against the torch model it was exported from, NumPy against torch, resuming, and
+seeds.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -25,7 +27,9 @@ def _conditions(frames: int, seed: int = 0) -> Conditions:
 
 def test_orders_are_inverse():
     poses = np.arange(66.0)
-    assert (smpl_order(model_order(poses)) == poses).all() and not (model_order(poses) == poses).all()
+    assert (smpl_order(model_order(poses)) == poses).all() and not (
+        model_order(poses) == poses
+    ).all()
 
 
 def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
@@ -38,14 +42,26 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     from dafnet_addon.training.export import tensors_of
 
     torch.manual_seed(3)
-    config = ModelConfig(predictor_code=8, predictor_width=16, width=12, code=8, shared_encoder=False, mask=True, ahead=18)
+    config = ModelConfig(
+        predictor_code=8,
+        predictor_width=16,
+        width=12,
+        code=8,
+        shared_encoder=False,
+        mask=True,
+        ahead=18,
+    )
     flow, predictor = TwoPartFlow(config), ActionPredictor(config)
     with torch.no_grad():
         for p in [*flow.parameters(), *predictor.parameters()]:
             p += 0.05 * torch.randn_like(p)
     rng = np.random.default_rng(0)
     statistics = Statistics(
-        rng.normal(size=66), rng.uniform(0.1, 0.3, 66), rng.normal(size=3) * 0.01, np.full(3, 0.02), rng.normal(size=18) * 0.1,
+        rng.normal(size=66),
+        rng.uniform(0.1, 0.3, 66),
+        rng.normal(size=3) * 0.01,
+        np.full(3, 0.02),
+        rng.normal(size=18) * 0.1,
         np.full(18, 0.2),
     )
     flow.double(), predictor.double()
@@ -55,20 +71,33 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     conditions, z = _conditions(30), rng.normal(size=(2, 66))
     made, actions, density, _ = drained(Sampler(weights, dtype="float64").run(conditions, z))
 
-    # The same, by the model's own forward: poses must go back to the noise that they were made from.
-    poses = torch.from_numpy((model_order(made).transpose(1, 0, 2) - tensors["pose_mean"]) / tensors["pose_std"])
-    velocity = torch.from_numpy((conditions.velocity - tensors["velocity_mean"]) / tensors["velocity_std"])
+    # The same, by the model's own forward: poses must go back to the noise that they were made
+    # from.
+    poses = torch.from_numpy(
+        (model_order(made).transpose(1, 0, 2) - tensors["pose_mean"]) / tensors["pose_std"]
+    )
+    velocity = torch.from_numpy(
+        (conditions.velocity - tensors["velocity_mean"]) / tensors["velocity_std"]
+    )
     velocity = torch.cat([velocity[:1].repeat(10, 1), velocity]).repeat(2, 1, 1)
     past = past_of(torch.cat([torch.zeros(2, 10, 66, dtype=torch.float64), poses], 1), velocity, 10)
     occupancy = torch.from_numpy(conditions.occupancy).repeat(2, 1, 1)
     with torch.no_grad():
         probabilities = predictor(past, occupancy)
         given = torch.from_numpy(conditions.given).repeat(2, 1, 1)
-        scaled = (conditions.observation - tensors["pose_mean"]) / tensors["pose_std"] * np.repeat(conditions.given, 3, -1)
-        way = torch.from_numpy((conditions.ahead - tensors["ahead_mean"]) / tensors["ahead_std"]).repeat(2, 1, 1)
+        scaled = (
+            (conditions.observation - tensors["pose_mean"])
+            / tensors["pose_std"]
+            * np.repeat(conditions.given, 3, -1)
+        )
+        way = torch.from_numpy(
+            (conditions.ahead - tensors["ahead_mean"]) / tensors["ahead_std"]
+        ).repeat(2, 1, 1)
         base = torch.cat([probabilities, velocity[:, 10:], way], -1)
         observation = torch.from_numpy(scaled).repeat(2, 1, 1)
-        z_upper, z_lower, det_upper, det_lower = flow(poses[..., :42], poses[..., 42:], base, occupancy, observation, given)
+        z_upper, z_lower, det_upper, det_lower = flow(
+            poses[..., :42], poses[..., 42:], base, occupancy, observation, given
+        )
     assert np.abs(actions - probabilities.transpose(0, 1).numpy()).max() < 1e-9
     noise = torch.cat([z_upper, z_lower], -1).numpy()
     assert np.abs(noise - z[:, None]).max() < 1e-8
@@ -79,7 +108,9 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     log_det = np.stack([d for _, _, d in taken], axis=1)
     assert np.abs(log_det - (det_upper + det_lower).numpy()).max() < 1e-8
     gaussian = -0.5 * (z**2).sum(-1) - 33.0 * np.log(2.0 * np.pi)
-    assert np.abs(density.T - gaussian[:, None] - log_det).max() < 1e-8, "what it says of itself as it makes it"
+    assert np.abs(density.T - gaussian[:, None] - log_det).max() < 1e-8, (
+        "what it says of itself as it makes it"
+    )
 
 
 @pytest.mark.parametrize("system", ["ap-p", "moglow", "lower-first"])
@@ -95,7 +126,13 @@ def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: 
 
     torch.manual_seed(3)
     config = ModelConfig(
-        system=system, predictor_code=8, predictor_width=16, width=12, code=8, mask=True, steps_whole=4,
+        system=system,
+        predictor_code=8,
+        predictor_width=16,
+        width=12,
+        code=8,
+        mask=True,
+        steps_whole=4,
         shared_encoder=system == "moglow",
     )
     flow = flow_of(config).double()
@@ -105,28 +142,46 @@ def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: 
             p += 0.05 * torch.randn_like(p)
     rng = np.random.default_rng(0)
     statistics = Statistics(
-        rng.normal(size=66), rng.uniform(0.1, 0.3, 66), rng.normal(size=3) * 0.01, np.full(3, 0.02), np.zeros(18), np.ones(18)
+        rng.normal(size=66),
+        rng.uniform(0.1, 0.3, 66),
+        rng.normal(size=3) * 0.01,
+        np.full(3, 0.02),
+        np.zeros(18),
+        np.ones(18),
     )
     tensors = tensors_of(flow, predictor, statistics)
     description = {"model": config.as_dict(), "fps": 30, "offsets": OFFSETS.tolist()}
     conditions, z = _conditions(30), rng.normal(size=(2, 66))
-    sampler = {"ap-p": WholeBodySampler, "moglow": MoGlowSampler, "lower-first": LowerFirstSampler}[system](
-        Weights(tensors, description, {"format": FORMAT}, tmp_path), dtype="float64"
-    )
+    sampler = {"ap-p": WholeBodySampler, "moglow": MoGlowSampler, "lower-first": LowerFirstSampler}[
+        system
+    ](Weights(tensors, description, {"format": FORMAT}, tmp_path), dtype="float64")
     made, actions, density, _ = drained(sampler.run(conditions, z))
     assert actions.shape == (30, 2, 0 if system == "moglow" else 10)
 
-    # The same, by the model's own forward: poses must go back to the noise that they were made from.
-    poses = torch.from_numpy((model_order(made).transpose(1, 0, 2) - tensors["pose_mean"]) / tensors["pose_std"])
-    velocity = torch.from_numpy((conditions.velocity - tensors["velocity_mean"]) / tensors["velocity_std"])
+    # The same, by the model's own forward: poses must go back to the noise that they were made
+    # from.
+    poses = torch.from_numpy(
+        (model_order(made).transpose(1, 0, 2) - tensors["pose_mean"]) / tensors["pose_std"]
+    )
+    velocity = torch.from_numpy(
+        (conditions.velocity - tensors["velocity_mean"]) / tensors["velocity_std"]
+    )
     velocity = torch.cat([velocity[:1].repeat(10, 1), velocity]).repeat(2, 1, 1)
     past = past_of(torch.cat([torch.zeros(2, 10, 66, dtype=torch.float64), poses], 1), velocity, 10)
     occupancy = torch.from_numpy(conditions.occupancy).repeat(2, 1, 1)
     given = torch.from_numpy(conditions.given).repeat(2, 1, 1)
-    scaled = (conditions.observation - tensors["pose_mean"]) / tensors["pose_std"] * np.repeat(conditions.given, 3, -1)
+    scaled = (
+        (conditions.observation - tensors["pose_mean"])
+        / tensors["pose_std"]
+        * np.repeat(conditions.given, 3, -1)
+    )
     observation = torch.from_numpy(scaled).repeat(2, 1, 1)
     with torch.no_grad():
-        told = past if predictor is None else torch.cat([predictor(past, occupancy), velocity[:, 10:]], -1)
+        told = (
+            past
+            if predictor is None
+            else torch.cat([predictor(past, occupancy), velocity[:, 10:]], -1)
+        )
         log_det = torch.zeros(2, 30)
         for name, columns in flow.places.items():
             condition = flow.condition(name, told, observation, given, poses)
@@ -189,14 +244,23 @@ def test_lower_noise_leaves_the_upper_body_alone_at_the_first_frame(weights):
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"layers": 0}, "'layers'"), ({"steps_upper": -1}, "'steps_upper'"), ({"width": float("inf")}, "'width'"),
-        ({"code": "many"}, "'code'"), ({"history": True}, "'history'"), ({"mask": 1}, "'mask'"), ({"ahead": 18.0}, "'ahead'"),
-        ({"history": 65536}, "'history'"), ({"system": ["dafnet"]}, "system"),
-        ({"action_temperature": 0}, "temperature"), ({"action_temperature": float("nan")}, "temperature"),
+        ({"layers": 0}, "'layers'"),
+        ({"steps_upper": -1}, "'steps_upper'"),
+        ({"width": float("inf")}, "'width'"),
+        ({"code": "many"}, "'code'"),
+        ({"history": True}, "'history'"),
+        ({"mask": 1}, "'mask'"),
+        ({"ahead": 18.0}, "'ahead'"),
+        ({"history": 65536}, "'history'"),
+        ({"system": ["dafnet"]}, "system"),
+        ({"action_temperature": 0}, "temperature"),
+        ({"action_temperature": float("nan")}, "temperature"),
     ],
 )
 def test_a_model_that_cannot_be_is_refused(weights, changed, words):
-    odd = replace(weights, config={**weights.config, "model": {**weights.config["model"], **changed}})
+    odd = replace(
+        weights, config={**weights.config, "model": {**weights.config["model"], **changed}}
+    )
     with pytest.raises(WeightsError, match=words):
         Sampler(odd)
 
@@ -207,27 +271,45 @@ def test_another_skeleton_or_rate_is_refused(weights):
             Sampler(replace(weights, config={**weights.config, **changed}))
 
 
-@pytest.mark.parametrize("name", ["pose_std", "velocity_std", "upper.0.weight", "lower.1.log_scale"])
+@pytest.mark.parametrize(
+    "name", ["pose_std", "velocity_std", "upper.0.weight", "lower.1.log_scale"]
+)
 def test_numbers_that_cannot_be_inverted_are_refused(weights, name):
-    spoilt = np.full_like(weights.tensors[name], 2000.0) if name.endswith("log_scale") else weights.tensors[name] * 0.0
+    spoilt = (
+        np.full_like(weights.tensors[name], 2000.0)
+        if name.endswith("log_scale")
+        else weights.tensors[name] * 0.0
+    )
     with pytest.raises(WeightsError, match="cannot be used"):
         Sampler(replace(weights, tensors={**weights.tensors, name: spoilt}))
 
 
-@pytest.mark.parametrize("offsets", ["here", None, [[0.0], [0.0, 1.0]], [[None] * 3] * 22, np.zeros((22, 3)).tolist()])
+@pytest.mark.parametrize(
+    "offsets", ["here", None, [[0.0], [0.0, 1.0]], [[None] * 3] * 22, np.zeros((22, 3)).tolist()]
+)
 def test_another_skeleton_is_refused_however_it_is_written(weights, offsets):
     with pytest.raises(WeightsError, match="another skeleton or frame rate \\('offsets'\\)"):
         Sampler(replace(weights, config={**weights.config, "offsets": offsets}))
 
 
-@pytest.mark.parametrize(("name", "value", "words"), [
-    ("upper.0.weight", 0.0, "'upper.0' cannot be inverted"), ("lower.1.log_scale", 50.0, "'lower.1' cannot be inverted"),
-    ("upper.0.weight", 1e-35, "'upper.0' cannot be inverted"), ("pose_std", 0.0, "'pose_std' is not positive"),
-    ("velocity_std", -1.0, "'velocity_std' is not positive"), ("lower.0.bias", 1e30, "'lower.0.bias' holds 1e\\+30"),
-])
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("upper.0.weight", 0.0, "'upper.0' cannot be inverted"),
+        ("lower.1.log_scale", 50.0, "'lower.1' cannot be inverted"),
+        ("upper.0.weight", 1e-35, "'upper.0' cannot be inverted"),
+        ("pose_std", 0.0, "'pose_std' is not positive"),
+        ("velocity_std", -1.0, "'velocity_std' is not positive"),
+        ("lower.0.bias", 1e30, "'lower.0.bias' holds 1e\\+30"),
+    ],
+)
 def test_tensors_that_no_training_gives_are_named(weights, name, value, words):
     tensor = weights.tensors[name]
-    changed = np.eye(len(tensor), dtype=np.float32) * np.float32(value) if tensor.ndim == 2 else np.full_like(tensor, value)
+    changed = (
+        np.eye(len(tensor), dtype=np.float32) * np.float32(value)
+        if tensor.ndim == 2
+        else np.full_like(tensor, value)
+    )
     with pytest.raises(WeightsError, match=words):
         Sampler(replace(weights, tensors={**weights.tensors, name: changed}))
 
@@ -235,7 +317,17 @@ def test_tensors_that_no_training_gives_are_named(weights, name, value, words):
 def test_poses_that_are_no_bodys_are_refused_before_they_are_shown(weights):
     far = replace(weights, tensors={**weights.tensors, "pose_mean": np.full(66, 1e5, np.float32)})
     sampler, shown = Sampler(far), []
-    conditions = Conditions(np.zeros((3, 3)), np.zeros((3, 18)), np.zeros((3, 2640)), np.zeros((3, 66)), np.zeros((3, 22)))
-    with pytest.raises(WeightsError, match="their poses are no numbers, or farther than 100 metres"):
-        drained(sampler.run(conditions, np.zeros((1, 66)), None, lambda frame, pose: shown.append(pose)))
+    conditions = Conditions(
+        np.zeros((3, 3)),
+        np.zeros((3, 18)),
+        np.zeros((3, 2640)),
+        np.zeros((3, 66)),
+        np.zeros((3, 22)),
+    )
+    with pytest.raises(
+        WeightsError, match="their poses are no numbers, or farther than 100 metres"
+    ):
+        drained(
+            sampler.run(conditions, np.zeros((1, 66)), None, lambda frame, pose: shown.append(pose))
+        )
     assert not shown

@@ -1,4 +1,6 @@
-"""Scanned furniture of a real room: a stool, a sofa and a table, imported, walked to and sat on through ``dafnet bake``."""
+"""Scanned furniture of a real room: a stool, a sofa and a table, imported, walked to and sat on
+through ``dafnet bake``.
+"""
 
 import json
 import os
@@ -13,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SCANS = ROOT.parent / "shared" / "data" / "furniture"
 SEATS = {"Stool": ((-1.6, 0.6), 0.58), "Sofa": ((1.4, 0.34), 0.52)}
 
-BUILD = '''
+BUILD = """
 import sys
 sys.path.insert(0, {root!r})
 import bpy
@@ -42,7 +44,8 @@ for name, file, place, turn in (
             collection.objects.unlink(ob)
         furniture.objects.link(ob)
         if ob.parent is None:
-            ob.matrix_world = Matrix.Translation((*place, 0.0)) @ Matrix.Rotation(turn, 4, "Z") @ ob.matrix_world
+            turned = Matrix.Translation((*place, 0.0)) @ Matrix.Rotation(turn, 4, "Z")
+            ob.matrix_world = turned @ ob.matrix_world
         ob.name = name
 armature = create_character(bpy.context, "Walker")
 walked = route(
@@ -61,7 +64,7 @@ bpy.ops.wm.save_as_mainfile(filepath={out!r})
 print("RESTS", [(rest.stop.name, rest.first, rest.last) for rest in walked.rests], flush=True)
 import os
 os._exit(0)  # see cli.run
-'''
+"""
 
 
 @pytest.mark.skipif(not SCANS.is_dir(), reason=f"needs the scanned furniture at {SCANS}")
@@ -69,13 +72,21 @@ def test_scanned_furniture_is_sat_on(tmp_path: Path) -> None:
     bpy = pytest.importorskip("bpy")
     if bpy.app.binary_path:
         pytest.skip("runs the Python module in processes of its own")
-    room, baked = Path(os.environ.get("DAFNET_PICTURES", tmp_path)) / "scans.blend", tmp_path / "baked.blend"
+    room, baked = (
+        Path(os.environ.get("DAFNET_PICTURES", tmp_path)) / "scans.blend",
+        tmp_path / "baked.blend",
+    )
     script = BUILD.format(root=str(ROOT), scans=str(SCANS), out=str(room))
     environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")}
 
     def run(*command: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            [sys.executable, *command], capture_output=True, text=True, cwd=ROOT, env=environment, check=True,
+            [sys.executable, *command],
+            capture_output=True,
+            text=True,
+            cwd=ROOT,
+            env=environment,
+            check=True,
         )
 
     built = run("-c", script)
@@ -94,5 +105,6 @@ def test_scanned_furniture_is_sat_on(tmp_path: Path) -> None:
             scene.frame_set(frame + 1)
             heights.append((armature.matrix_world @ armature.pose.bones["pelvis"].head).z)
         error = float(np.median(heights)) - (SEATS[name][1] + 0.12)
-        # A soft sofa may be sat into: its pelvis is 8 to 12 cm nearer to the top than a hard seat's.
+        # A soft sofa may be sat into: its pelvis is 8 to 12 cm nearer to the top than a hard
+        # seat's.
         assert -0.20 < error < 0.10 if name == "Sofa" else abs(error) < 0.10, (name, error)

@@ -1,4 +1,6 @@
-"""From an empty scene to a take: root paths from curves, objects and points, furniture found, targets, and the examples."""
+"""From an empty scene to a take: root paths from curves, objects and points, furniture found,
+targets, and the examples.
+"""
 
 import importlib
 from pathlib import Path
@@ -14,12 +16,21 @@ from dafnet_addon.core.trails import followed, trail
 
 
 def test_a_straight_line_is_walked_in_the_time_that_people_take() -> None:
-    made = trail(np.array([[0.0, 0.0], [0.0, 1.0], [0.0, 4.0]]), speed=1.2, fps=30.0, seconds=1.0, floor=0.5)
+    made = trail(
+        np.array([[0.0, 0.0], [0.0, 1.0], [0.0, 4.0]]), speed=1.2, fps=30.0, seconds=1.0, floor=0.5
+    )
     assert abs(len(made.path) / 30 - (4.0 / 1.2 + 0.6 * (1 / 1.4 + 1 / 1.2) + 1.0)) < 0.1
     speed = np.linalg.norm(np.diff(made.path.position, axis=0), axis=1) * 30
-    assert speed.max() < 1.21 and speed[0] < 0.2 and abs(speed[60] - 1.2) < 0.02 and (speed[-29:] == 0).all()
+    assert (
+        speed.max() < 1.21
+        and speed[0] < 0.2
+        and abs(speed[60] - 1.2) < 0.02
+        and (speed[-29:] == 0).all()
+    )
     assert np.abs(made.path.yaw).max() < 1e-6 and np.abs(made.path.position[:, 0]).max() < 1e-6
-    assert (made.path.position[:, 2] == 0.5).all() and np.allclose(made.path.position[-1], (0, 4, 0.5), atol=1e-3)
+    assert (made.path.position[:, 2] == 0.5).all() and np.allclose(
+        made.path.position[-1], (0, 4, 0.5), atol=1e-3
+    )
 
 
 def test_corners_are_rounded_and_taken_slowly() -> None:
@@ -36,31 +47,49 @@ def test_one_may_start_elsewhere_or_keep_looking_where_one_looks() -> None:
     line = np.array([[0.0, 1.0], [0.0, 4.0]])
     turned = trail(line, Stop((0.0, 0.0), np.pi, 0.2), fps=30.0)
     assert abs(turned.path.yaw[0] - np.pi) < 1e-9 and abs(np.cos(turned.path.yaw[-1]) - 1.0) < 1e-6
-    assert np.allclose(turned.path.position[0, :2], 0.0) and np.degrees(np.abs(np.diff(turned.path.yaw)).max() * 30) < 185
+    assert (
+        np.allclose(turned.path.position[0, :2], 0.0)
+        and np.degrees(np.abs(np.diff(turned.path.yaw)).max() * 30) < 185
+    )
     kept = trail(line, yaw=1.0)
     assert np.allclose(kept.path.yaw, 1.0)
 
 
-@pytest.mark.parametrize("points, speed, words", [
-    ([[0.0, 0.0], [0.3, 0.0]], 1.0, "only 0.30 m long"), ([[0.0, 0.0]], 1.0, "only 0.00 m"),
-    ([[0.0, 0.0], [np.nan, 0.0]], 1.0, "not a number"), ([[0.0, 0.0], [2.0, 0.0]], 5.0, "People walk at 0.4 to 3.0"),
-])
-def test_lines_that_cannot_be_walked_are_refused(points: list[list[float]], speed: float, words: str) -> None:
+@pytest.mark.parametrize(
+    "points, speed, words",
+    [
+        ([[0.0, 0.0], [0.3, 0.0]], 1.0, "only 0.30 m long"),
+        ([[0.0, 0.0]], 1.0, "only 0.00 m"),
+        ([[0.0, 0.0], [np.nan, 0.0]], 1.0, "not a number"),
+        ([[0.0, 0.0], [2.0, 0.0]], 5.0, "People walk at 0.4 to 3.0"),
+    ],
+)
+def test_lines_that_cannot_be_walked_are_refused(
+    points: list[list[float]], speed: float, words: str
+) -> None:
     with pytest.raises(InputError, match=words):
         trail(np.array(points), speed=speed)
 
 
 def test_what_moved_becomes_a_root_that_looks_where_it_goes() -> None:
     rng = np.random.default_rng(0)
-    there, back = np.linspace(0.0, 3.0, 91)[:, None] * (1.0, 0.0), np.linspace(3.0, 0.0, 91)[:, None] * (1.0, 0.0)
+    there, back = (
+        np.linspace(0.0, 3.0, 91)[:, None] * (1.0, 0.0),
+        np.linspace(3.0, 0.0, 91)[:, None] * (1.0, 0.0),
+    )
     way = np.concatenate([np.zeros((60, 2)), there, np.tile([3.0, 0.0], (75, 1)), back])
     made = followed(way + rng.normal(scale=0.003, size=way.shape), 30.0, yaw=0.5)
     assert len(made.path) == len(way) and np.abs(made.path.position[:, :2] - way).max() < 0.09
-    assert [(abs(rest.first - a) < 12, abs(rest.last - b) < 12) for rest, a, b in zip(
-        made.rests, (0, 150), (60, 225), strict=True)] == [(True, True)] * 2
+    assert [
+        (abs(rest.first - a) < 12, abs(rest.last - b) < 12)
+        for rest, a, b in zip(made.rests, (0, 150), (60, 225), strict=True)
+    ] == [(True, True)] * 2
     yaw = made.path.yaw
     assert abs(yaw[5] - 0.5) < 0.05 and abs(yaw[100] + np.pi / 2) < 0.05, "held, then turned"
-    assert abs(np.cos(yaw[-20] - np.pi / 2) - 1.0) < 0.01 and np.degrees(np.abs(np.diff(yaw)).max() * 30) < 161
+    assert (
+        abs(np.cos(yaw[-20] - np.pi / 2) - 1.0) < 0.01
+        and np.degrees(np.abs(np.diff(yaw)).max() * 30) < 161
+    )
     rest = made.rests[1]
     assert np.abs(np.diff(made.path.position[rest.first : rest.last + 1], axis=0)).max() < 5e-3
     with pytest.raises(InputError, match="hardly moves"):
@@ -77,7 +106,9 @@ class Set:
         self.ann = bpy.context.object
         self.root = self.ann.dafnet.root
 
-    def curve(self, points: list[tuple[float, float, float]], kind: str = "POLY", name: str = "Path") -> Any:
+    def curve(
+        self, points: list[tuple[float, float, float]], kind: str = "POLY", name: str = "Path"
+    ) -> Any:
         data = self.bpy.data.curves.new(name, "CURVE")
         data.dimensions = "3D"
         spline = data.splines.new(kind)
@@ -102,10 +133,21 @@ class Set:
         self.bpy.context.view_layer.update()
         return made
 
-    def box(self, name: str, low: tuple[float, float, float], high: tuple[float, float, float]) -> Any:
+    def box(
+        self, name: str, low: tuple[float, float, float], high: tuple[float, float, float]
+    ) -> Any:
         mesh = self.bpy.data.meshes.new(name)
-        corners = [(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
-        mesh.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
+        corners = [
+            (x, y, z)
+            for x in (low[0], high[0])
+            for y in (low[1], high[1])
+            for z in (low[2], high[2])
+        ]
+        mesh.from_pydata(
+            corners,
+            [],
+            [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)],
+        )
         return self.add(self.bpy.data.objects.new(name, mesh))
 
     def select(self, *objects: Any) -> None:
@@ -140,9 +182,13 @@ def test_a_curve_is_walked_along_on_the_floor(stage: Set, kind: str) -> None:
     assert stage.bpy.ops.dafnet.walk_along_curve(speed=1.2, seconds=1.0) == {"FINISHED"}
     assert stage.scene.frame_current == 11
     end = stage.scene.frame_end
-    assert abs((end - 10) / 30 - (4.0 / 1.2 + 0.6 * (1 / 1.4 + 1 / 1.2) + 1.0)) < 0.3, "the curve rises, the floor does not"
+    assert abs((end - 10) / 30 - (4.0 / 1.2 + 0.6 * (1 / 1.4 + 1 / 1.2) + 1.0)) < 0.3, (
+        "the curve rises, the floor does not"
+    )
     path = stage.path(11, end)
-    assert np.allclose(path[0], (1, 0, 0, 0), atol=1e-3) and np.allclose(path[-1], (1, 4, 0, 0), atol=1e-3)
+    assert np.allclose(path[0], (1, 0, 0, 0), atol=1e-3) and np.allclose(
+        path[-1], (1, 4, 0, 0), atol=1e-3
+    )
     assert np.abs(path[:, [0, 2, 3]] - (1, 0, 0)).max() < 0.01 and np.diff(path[:, 1]).min() > -1e-3
 
 
@@ -153,7 +199,9 @@ def test_a_curve_with_a_bevel_and_a_transform_counts_as_its_line(stage: Set) -> 
     stage.select(stage.ann, curve)
     assert stage.bpy.ops.dafnet.walk_along_curve(backwards=True, keep_facing=True) == {"FINISHED"}
     path = stage.path(1, stage.scene.frame_end)
-    assert np.allclose(path[0], (0, 3, 0, 0), atol=1e-3) and np.allclose(path[-1], 0.0, atol=1e-3), "it goes backwards"
+    assert np.allclose(path[0], (0, 3, 0, 0), atol=1e-3) and np.allclose(
+        path[-1], 0.0, atol=1e-3
+    ), "it goes backwards"
     assert (len(stage.bpy.data.objects), len(stage.bpy.data.curves)) == before
 
 
@@ -167,14 +215,23 @@ def test_what_was_keyed_before_the_start_stays_and_what_comes_after_goes(stage: 
     assert np.allclose(stage.path(1, 40), before, atol=1e-4)
     path = stage.path(40, stage.scene.frame_end)
     assert np.allclose(path[-1, :2], (3.0, 6.0), atol=1e-3)
-    assert np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1).max() < 0.06 and np.abs(np.diff(path[:, 3])).max() < 0.12
+    assert (
+        np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1).max() < 0.06
+        and np.abs(np.diff(path[:, 3])).max() < 0.12
+    )
     near = np.linalg.norm(path[:, :2] - (3.0, 2.0), axis=1).min()
     assert near < 0.2, "first it goes to the curve"
 
 
 def test_an_object_that_has_only_places_becomes_a_root(stage: Set) -> None:
     mover = stage.empty("Mover", (0.0, 0.0, 1.0))
-    for frame, x, y in ((20, 0.0, 0.0), (50, 0.0, 0.0), (140, 3.0, 0.0), (200, 3.0, 0.0), (290, 3.0, 3.0)):
+    for frame, x, y in (
+        (20, 0.0, 0.0),
+        (50, 0.0, 0.0),
+        (140, 3.0, 0.0),
+        (200, 3.0, 0.0),
+        (290, 3.0, 3.0),
+    ):
         mover.location = (x, y, 1.4)
         mover.keyframe_insert("location", frame=frame)
     stage.key(5, 0.0, -1.0, 0.3)
@@ -184,13 +241,23 @@ def test_an_object_that_has_only_places_becomes_a_root(stage: Set) -> None:
     assert np.allclose(stage.place(19), (0, -1, 0, 0.3), atol=1e-4), "it rests where it was"
     path = stage.path(20, 290)
     assert np.allclose(path[[0, -1], :3], [(0, 0, 0), (3, 3, 0)], atol=0.02)
-    assert abs(path[75, 3] + np.pi / 2) < 0.1 and abs(path[-10, 3]) < 0.1 and np.abs(np.diff(path[:, 3])).max() * 30 < 3.0
+    assert (
+        abs(path[75, 3] + np.pi / 2) < 0.1
+        and abs(path[-10, 3]) < 0.1
+        and np.abs(np.diff(path[:, 3])).max() * 30 < 3.0
+    )
     assert np.ptp(path[135:165, :2], axis=0).max() < 0.02, "it stands"
 
 
 def test_selected_empties_are_walked_through_in_the_order_of_their_names(stage: Set) -> None:
-    points = [stage.empty(name, place) for name, place in (
-        ("Point.10", (-2.0, 3.0, 0.0)), ("Point.2", (2.0, 3.0, 1.0)), ("Point.1", (2.0, 0.5, 0.0)))]
+    points = [
+        stage.empty(name, place)
+        for name, place in (
+            ("Point.10", (-2.0, 3.0, 0.0)),
+            ("Point.2", (2.0, 3.0, 1.0)),
+            ("Point.1", (2.0, 0.5, 0.0)),
+        )
+    ]
     furniture = stage.bpy.data.collections.new("Furniture")
     stage.scene.collection.children.link(furniture)
     block = stage.box("Block", (-0.4, 2.5, 0.0), (0.4, 3.4, 1.0))
@@ -199,7 +266,9 @@ def test_selected_empties_are_walked_through_in_the_order_of_their_names(stage: 
     stage.select(stage.ann, *points)
     assert stage.bpy.ops.dafnet.walk_through_points(speed=1.3, seconds=0.5) == {"FINISHED"}
     path = stage.path(1, stage.scene.frame_end)
-    nearest = [np.linalg.norm(path[:, :2] - p, axis=1) for p in ((2.0, 0.5), (2.0, 3.0), (-2.0, 3.0))]
+    nearest = [
+        np.linalg.norm(path[:, :2] - p, axis=1) for p in ((2.0, 0.5), (2.0, 3.0), (-2.0, 3.0))
+    ]
     times = [int(np.argmin(d)) for d in nearest]
     assert max(d.min() for d in nearest) < 0.3 and times == sorted(times)
     speed = np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1) * 30
@@ -209,17 +278,24 @@ def test_selected_empties_are_walked_through_in_the_order_of_their_names(stage: 
     stage.select(stage.ann)
     stage.scene.cursor.location = (-2.0, 0.0, 0.0)
     assert stage.bpy.ops.dafnet.walk_through_points() == {"FINISHED"}
-    assert np.allclose(stage.place(stage.scene.frame_end)[:2], (-2.0, 0.0), atol=1e-3), "none is selected: the cursor"
+    assert np.allclose(stage.place(stage.scene.frame_end)[:2], (-2.0, 0.0), atol=1e-3), (
+        "none is selected: the cursor"
+    )
     start, stage.scene.cursor.location = stage.scene.frame_end, (-2.0, -3.0, 0.0)
     stage.select(stage.ann, points[2])
     assert stage.bpy.ops.dafnet.walk_through_points(to_cursor=True) == {"FINISHED"}
     path = stage.path(start, stage.scene.frame_end)
-    assert np.linalg.norm(path[:, :2] - (2.0, 0.5), axis=1).min() < 0.4 and np.allclose(path[-1, :2], (-2, -3), atol=1e-3)
+    assert np.linalg.norm(path[:, :2] - (2.0, 0.5), axis=1).min() < 0.4 and np.allclose(
+        path[-1, :2], (-2, -3), atol=1e-3
+    )
 
 
 def test_what_cannot_be_walked_changes_nothing(stage: Set, tmp_path: Path) -> None:
     bpy = stage.bpy
-    short, line = stage.curve([(0.0, 0.0, 0.0), (0.2, 0.0, 0.0)], name="Short"), stage.curve([(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)])
+    short, line = (
+        stage.curve([(0.0, 0.0, 0.0), (0.2, 0.0, 0.0)], name="Short"),
+        stage.curve([(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)]),
+    )
     still = stage.empty("Still", (1.0, 0.0, 0.0))
     still.keyframe_insert("location", frame=1)
 
@@ -249,15 +325,23 @@ def test_what_cannot_be_walked_changes_nothing(stage: Set, tmp_path: Path) -> No
     stage.ann.dafnet.root = stage.add(linked.objects[0])
     refused("'Far Root' is linked", bpy.ops.dafnet.walk_along_curve)
     stage.ann.dafnet.root = None
-    assert not any(getattr(bpy.ops.dafnet, name).poll() for name in ("walk_along_curve", "find_furniture", "add_targets"))
+    assert not any(
+        getattr(bpy.ops.dafnet, name).poll()
+        for name in ("walk_along_curve", "find_furniture", "add_targets")
+    )
     for o in list(stage.scene.objects):
         if o.type == "ARMATURE":
             bpy.data.objects.remove(o)
-    assert not bpy.ops.dafnet.walk_along_curve.poll() and not bpy.ops.dafnet.walk_through_points.poll(), "no character"
+    assert (
+        not bpy.ops.dafnet.walk_along_curve.poll() and not bpy.ops.dafnet.walk_through_points.poll()
+    ), "no character"
 
 
 def test_a_generated_walk_keeps_to_the_curve(stage: Set) -> None:
-    stage.select(stage.ann, stage.curve([(0.0, 0.0, 0.0), (1.5, 1.5, 0.0), (0.0, 3.0, 0.0), (1.5, 5.0, 0.0)], "BEZIER"))
+    stage.select(
+        stage.ann,
+        stage.curve([(0.0, 0.0, 0.0), (1.5, 1.5, 0.0), (0.0, 3.0, 0.0), (1.5, 5.0, 0.0)], "BEZIER"),
+    )
     assert stage.bpy.ops.dafnet.walk_along_curve() == {"FINISHED"}
     stage.select(stage.ann)
     assert stage.bpy.ops.dafnet.generate() == {"FINISHED"}
@@ -265,22 +349,35 @@ def test_a_generated_walk_keeps_to_the_curve(stage: Set) -> None:
     off = []
     for frame in range(1, stage.scene.frame_end + 1, 5):
         root = stage.place(frame)
-        off.append(np.linalg.norm(np.array(stage.ann.matrix_world @ stage.ann.pose.bones["pelvis"].head)[:2] - root[:2]))
+        off.append(
+            np.linalg.norm(
+                np.array(stage.ann.matrix_world @ stage.ann.pose.bones["pelvis"].head)[:2]
+                - root[:2]
+            )
+        )
     assert np.mean(off) < 0.01 and max(off) < 0.03
     stage.root.animation_data_clear()
     stage.root.location, stage.root.rotation_euler, stage.scene.frame_end = (0, 0, 0), (0, 0, 0), 40
     stage.scene.frame_set(1)
-    points = [stage.empty(f"Point {k}", place) for k, place in enumerate([(1.5, 1.5, 0), (0, 3, 0), (1.5, 5, 0)])]
+    points = [
+        stage.empty(f"Point {k}", place)
+        for k, place in enumerate([(1.5, 1.5, 0), (0, 3, 0), (1.5, 5, 0)])
+    ]
     stage.select(stage.ann, *points)
     assert stage.bpy.ops.dafnet.walk_through_points(seconds=1.0) == {"FINISHED"}
     assert stage.bpy.ops.dafnet.generate() == {"FINISHED"}
-    assert sliding < 1.25 * stage.ann.dafnet.takes[1].action.dafnet.sliding, "feet slide as on any other walk"
+    assert sliding < 1.25 * stage.ann.dafnet.takes[1].action.dafnet.sliding, (
+        "feet slide as on any other walk"
+    )
 
 
 def test_find_furniture_takes_what_stands_beside_the_path(stage: Set) -> None:
     stage.key(1, 0.0, 0.0)
     stage.key(40, 0.0, 3.0)
-    near = [stage.box("Chair", (0.8, 1.0, 0.0), (1.3, 1.5, 0.5)), stage.box("Shelf", (-1.6, 2.8, 0.0), (-1.2, 3.4, 1.9))]
+    near = [
+        stage.box("Chair", (0.8, 1.0, 0.0), (1.3, 1.5, 0.5)),
+        stage.box("Shelf", (-1.6, 2.8, 0.0), (-1.2, 3.4, 1.9)),
+    ]
     stage.box("Floor", (-9.0, -9.0, -0.1), (9.0, 9.0, 0.0))
     stage.box("Lamp", (0.0, 1.0, 2.3), (0.3, 1.3, 2.5))
     stage.box("Far", (3.0, 1.0, 0.0), (3.4, 1.4, 1.0))
@@ -290,15 +387,27 @@ def test_find_furniture_takes_what_stands_beside_the_path(stage: Set) -> None:
     stage.scene.cursor.location = (0.6, 0.6, 0.0)
     stage.bpy.ops.dafnet.add_character(name="Bob")
     stage.select(stage.ann)
-    found = stage.addon("dafnet_addon.blender.surroundings").find_furniture(stage.bpy.context, stage.ann)
-    assert found.taken == ("Chair", "Shelf") and {o.name for o in found.collection.objects} == {"Chair", "Shelf"}
-    assert stage.ann.dafnet.furniture == found.collection and found.collection.name == "Ann Furniture"
+    found = stage.addon("dafnet_addon.blender.surroundings").find_furniture(
+        stage.bpy.context, stage.ann
+    )
+    assert found.taken == ("Chair", "Shelf") and {o.name for o in found.collection.objects} == {
+        "Chair",
+        "Shelf",
+    }
+    assert (
+        stage.ann.dafnet.furniture == found.collection and found.collection.name == "Ann Furniture"
+    )
     assert all(stage.scene.collection in o.users_collection for o in near), "linked, not moved"
-    for words in ("Hidden beside the path, so not there for the character: 'Hidden'", "does not see it: 'Shelf'."):
+    for words in (
+        "Hidden beside the path, so not there for the character: 'Hidden'",
+        "does not see it: 'Shelf'.",
+    ):
         assert any(words in sentence for sentence in found.warnings), words
     stage.bpy.data.objects["Far"].location.x = -1.6
     assert stage.bpy.ops.dafnet.find_furniture() == {"FINISHED"}
-    assert {o.name for o in found.collection.objects} == {"Chair", "Shelf", "Far"}, "the same collection again"
+    assert {o.name for o in found.collection.objects} == {"Chair", "Shelf", "Far"}, (
+        "the same collection again"
+    )
     stage.root.animation_data_clear()
     stage.root.location = (40.0, 0.0, 0.0)
     with pytest.raises(RuntimeError, match="No visible mesh lies within"):
@@ -317,7 +426,9 @@ def test_missing_targets_are_added_where_head_and_hands_are(stage: Set) -> None:
     own = stage.ann.dafnet
     assert own.hand_left == kept and own.head is not None
     for bone, target in (("right_wrist", own.hand_right), ("head", own.head)):
-        assert (target.location - stage.ann.matrix_world @ stage.ann.pose.bones[bone].head).length < 1e-5
+        assert (
+            target.location - stage.ann.matrix_world @ stage.ann.pose.bones[bone].head
+        ).length < 1e-5
         assert target.name in stage.ann.users_collection[0].objects
 
 
@@ -328,7 +439,9 @@ def test_a_missing_root_is_added_where_the_character_stands(stage: Set) -> None:
     stage.ann.location, stage.ann.rotation_euler.z = (1.0, 2.0, 0.0), np.pi + 0.5
     assert stage.bpy.ops.dafnet.add_root() == {"FINISHED"}
     root = stage.ann.dafnet.root
-    assert (root.location - stage.ann.location).length < 1e-6 and root.rotation_euler.z == pytest.approx(0.5)
+    assert (
+        root.location - stage.ann.location
+    ).length < 1e-6 and root.rotation_euler.z == pytest.approx(0.5)
     assert stage.bpy.ops.dafnet.generate.poll() and not stage.bpy.ops.dafnet.add_root.poll()
 
 
@@ -367,7 +480,9 @@ def test_the_desk_example_sits_and_writes(bare: Set) -> None:
     pelvis = joints(bare, made, range(end - 60, end + 1, 10), "pelvis") - MIDDLE
     assert np.abs(pelvis[:, :2]).max() < 0.05 and np.abs(pelvis[:, 2] - 0.57).max() < 0.05
     hand = joints(bare, made, range(end - 60, end + 1, 3), "right_wrist") - MIDDLE
-    assert np.abs(hand[:, 2] - 0.785).max() < 0.04 and np.ptp(hand[:, 0]) > 0.08, "over the desk, along a line"
+    assert np.abs(hand[:, 2] - 0.785).max() < 0.04 and np.ptp(hand[:, 0]) > 0.08, (
+        "over the desk, along a line"
+    )
     assert {o.name for o in made.dafnet.furniture.objects} == {"Chair", "Desk"}
     assert made.dafnet.takes[0].action.dafnet.collisions < 1.0
 
@@ -378,11 +493,19 @@ def test_the_whiteboard_example_writes_at_the_board(bare: Set) -> None:
     for frame in range(1, bare.scene.frame_end + 1, 2):
         bare.scene.frame_set(frame)
         if made.dafnet.mode == "EE":
-            writes.append((np.array(made.matrix_world @ made.pose.bones["right_wrist"].head) - MIDDLE,
-                           np.array(made.dafnet.hand_right.matrix_world.translation) - MIDDLE))
+            writes.append(
+                (
+                    np.array(made.matrix_world @ made.pose.bones["right_wrist"].head) - MIDDLE,
+                    np.array(made.dafnet.hand_right.matrix_world.translation) - MIDDLE,
+                )
+            )
     hand, asked = np.array(writes)[8:-8].transpose(1, 0, 2)
     assert np.linalg.norm(hand - asked, axis=1).mean() < 0.02 and len(hand) > 50
-    assert (np.abs(hand[:, 1] - 0.36) < 0.1).all() and np.ptp(hand[:, 0]) > 0.25 and np.ptp(hand[:, 2]) > 0.12
+    assert (
+        (np.abs(hand[:, 1] - 0.36) < 0.1).all()
+        and np.ptp(hand[:, 0]) > 0.25
+        and np.ptp(hand[:, 2]) > 0.12
+    )
     assert made.dafnet.mode == "FREE" and made.dafnet.head_influence == 0.0
     assert made.dafnet.takes[0].action.dafnet.collisions < 0.5
 
@@ -390,21 +513,36 @@ def test_the_whiteboard_example_writes_at_the_board(bare: Set) -> None:
 def test_the_sofa_example_sits_and_gets_up(bare: Set) -> None:
     made = example(bare, "SOFA")
     height = joints(bare, made, range(1, bare.scene.frame_end + 1, 4), "pelvis")[:, 2] - MIDDLE[2]
-    assert height[0] > 0.8 and height[-1] > 0.8 and 0.42 < height.min() < 0.6 and (height < 0.62).sum() * 4 > 60
+    assert (
+        height[0] > 0.8
+        and height[-1] > 0.8
+        and 0.42 < height.min() < 0.6
+        and (height < 0.62).sum() * 4 > 60
+    )
 
 
 def test_the_bed_example_lies_down(bare: Set) -> None:
     made, end = example(bare, "BED"), bare.scene.frame_end
-    head, pelvis, left, right = (joints(bare, made, range(end - 40, end + 1, 10), name) - MIDDLE for name in (
-        "head", "pelvis", "left_ankle", "right_ankle"))
+    head, pelvis, left, right = (
+        joints(bare, made, range(end - 40, end + 1, 10), name) - MIDDLE
+        for name in ("head", "pelvis", "left_ankle", "right_ankle")
+    )
     assert np.abs(pelvis - (0.0, -0.3, 0.60)).max() < 0.08
     assert (head[:, 0] > 0.5).all() and (head[:, 2] < 0.72).all(), "on the pillow"
     for ankle in (left, right):
         assert (ankle[:, 0] < -0.6).all() and (ankle[:, 2] > 0.46).all(), "the legs are on the bed"
     for side in ("left", "right"):
-        knee, ankle = (joints(bare, made, range(90, end + 1), f"{side}_{name}") - MIDDLE for name in ("knee", "ankle"))
+        knee, ankle = (
+            joints(bare, made, range(90, end + 1), f"{side}_{name}") - MIDDLE
+            for name in ("knee", "ankle")
+        )
         shin = knee + np.linspace(0.0, 1.0, 9)[:, None, None] * (ankle - knee)
-        inside = (shin[..., 1] < 0.12) & (shin[..., 1] > -0.72) & (shin[..., 2] < 0.42) & (shin[..., 2] > 0.15)
+        inside = (
+            (shin[..., 1] < 0.12)
+            & (shin[..., 1] > -0.72)
+            & (shin[..., 2] < 0.42)
+            & (shin[..., 2] > 0.15)
+        )
         assert not inside.any(), "and came onto it, not through it"
 
 
@@ -413,7 +551,9 @@ def test_examples_keep_the_scene_s_units(bare: Set) -> None:
     bare.scene.cursor.location = MIDDLE * 100
     assert bare.bpy.ops.dafnet.add_example(kind="SOFA") == {"FINISHED"}
     sofa = bare.bpy.data.objects["Sofa"]
-    assert abs(sofa.dimensions.x - 197) < 3 and np.allclose(sofa.location, MIDDLE * 100 - (40.5, 0, 0), atol=1e-3)
+    assert abs(sofa.dimensions.x - 197) < 3 and np.allclose(
+        sofa.location, MIDDLE * 100 - (40.5, 0, 0), atol=1e-3
+    )
     root = bare.bpy.context.object.dafnet.root
     assert np.allclose(root.location, MIDDLE * 100 + (-170, 220, 0), atol=1e-2)
 
@@ -425,7 +565,12 @@ def test_each_is_one_step_to_undo(stage: Set) -> None:
         ann = bpy.data.objects["Ann"]
         root, furniture = ann.dafnet.root, ann.dafnet.furniture
         keyed = bool(root.animation_data and root.animation_data.action)
-        return sorted(o.name for o in bpy.data.objects), bpy.context.scene.frame_end, keyed, furniture.name if furniture else ""
+        return (
+            sorted(o.name for o in bpy.data.objects),
+            bpy.context.scene.frame_end,
+            keyed,
+            furniture.name if furniture else "",
+        )
 
     def undone(operator: Any, **arguments: Any) -> None:
         bpy.ops.ed.undo_push(message="before")
@@ -446,7 +591,9 @@ def test_the_menu_and_the_panel_are_there(stage: Set) -> None:
     panels = stage.addon("panels.setup")
     drawn = stage.bpy.types.VIEW3D_MT_add._dyn_ui_initialize()
     assert drawn.count(panels.add_menu) == 1
-    children = [cls.bl_idname for cls in stage.addon("panels").CLASSES if getattr(cls, "bl_parent_id", "")]
+    children = [
+        cls.bl_idname for cls in stage.addon("panels").CLASSES if getattr(cls, "bl_parent_id", "")
+    ]
     assert children[0] == "DAFNET_PT_setup"
     stage.select(stage.empty("Other", (0, 0, 0)))
     assert panels.DAFNET_PT_setup.poll(stage.bpy.context), "the only character is meant"
@@ -466,10 +613,19 @@ def test_the_menu_and_the_panel_are_there(stage: Set) -> None:
     curve = stage.curve([(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)])
     stage.select(stage.ann, curve, stage.empty("One", (0, 0, 0)), stage.empty("Two", (1, 0, 0)))
     panels.DAFNET_PT_setup.draw(type("Owner", (), {"layout": Layout()})(), stage.bpy.context)
-    assert {"Walk along Path", "Walk through 2 Points", "Sit on Selected", "dafnet.find_furniture"} <= set(Layout.drawn)
+    assert {
+        "Walk along Path",
+        "Walk through 2 Points",
+        "Sit on Selected",
+        "dafnet.find_furniture",
+    } <= set(Layout.drawn)
     Layout.drawn = []
     panels.DAFNET_MT_add.draw(type("Owner", (), {"layout": Layout()})(), stage.bpy.context)
-    assert Layout.drawn.count("dafnet.add_example") == 4 and {"Character", "Chair and Desk", "Bed"} <= set(Layout.drawn)
+    assert Layout.drawn.count("dafnet.add_example") == 4 and {
+        "Character",
+        "Chair and Desk",
+        "Bed",
+    } <= set(Layout.drawn)
 
 
 def test_the_menu_is_gone_after_unregister(stage: Set, extension: str) -> None:

@@ -1,4 +1,6 @@
-"""Takes as a file keeps them: they come back as they were, and what is damaged or hostile is refused before it is unpacked."""
+"""Takes as a file keeps them: they come back as they were, and what is damaged or hostile is
+refused before it is unpacked.
+"""
 
 import json
 import tracemalloc
@@ -23,9 +25,18 @@ def made() -> tuple[Take, Controls]:
     root, place = np.tile(np.eye(4), (FRAMES, 1, 1)), np.tile([0.3, 0.4, 1.1], (FRAMES, 1))
     place[0] = np.nan
     controls = Controls(
-        25.0, root, ["EE"] * (FRAMES - 1) + ["FREE"], head=place, hand_left=place, hand_right=place,
-        upper_body=np.zeros((FRAMES, len(UPPER), 3)), head_rotation=np.tile(np.eye(3), (FRAMES, 1, 1)),
-        hand_left_influence=np.linspace(0, 1, FRAMES), pelvis_given=False, blend=0.1, scale=0.9,
+        25.0,
+        root,
+        ["EE"] * (FRAMES - 1) + ["FREE"],
+        head=place,
+        hand_left=place,
+        hand_right=place,
+        upper_body=np.zeros((FRAMES, len(UPPER), 3)),
+        head_rotation=np.tile(np.eye(3), (FRAMES, 1, 1)),
+        hand_left_influence=np.linspace(0, 1, FRAMES),
+        pelvis_given=False,
+        blend=0.1,
+        scale=0.9,
     )
     scene = Scene([Box([0.0, 1.0, 0.2], [0.2, 0.2, 0.2])])
     return generate(scene, controls, load_weights(), clean_up=CleanUp(feet=1.0)), controls
@@ -52,11 +63,13 @@ def _npy(array: np.ndarray) -> bytes:
 
 def _words(**changes: Any) -> Any:
     """A change of what is no array; None takes the word out."""
+
     def change(members: dict[str, bytes]) -> dict[str, bytes]:
         said = json.loads(np.load(BytesIO(members["plain"])).tobytes())
         said.update({name.replace("__", "."): value for name, value in changes.items()})
         said = {name: value for name, value in said.items() if value is not None}
         return {**members, "plain": _npy(np.frombuffer(json.dumps(said).encode(), np.uint8))}
+
     return change
 
 
@@ -67,7 +80,9 @@ def test_a_take_comes_back_as_it_was(made: tuple[Take, Controls]) -> None:
             if each.name == "path":
                 one, other = np.c_[one.position, one.yaw], np.c_[other.position, other.yaw]
             if isinstance(one, np.ndarray):
-                np.testing.assert_array_equal(one.astype(np.float32), other.astype(np.float32), err_msg=each.name)
+                np.testing.assert_array_equal(
+                    one.astype(np.float32), other.astype(np.float32), err_msg=each.name
+                )
             else:
                 assert one == other, each.name
 
@@ -77,7 +92,9 @@ def test_what_was_packed_before_there_were_versions_is_read(made: tuple[Take, Co
 
 
 def test_figures_that_are_no_numbers_are_kept_as_unknown(made: tuple[Take, Controls]) -> None:
-    odd = replace(made[0], log_likelihood=float("nan"), metrics={"jerk": float("inf"), "skate_cm": None})
+    odd = replace(
+        made[0], log_likelihood=float("nan"), metrics={"jerk": float("inf"), "skate_cm": None}
+    )
     take, _ = unpacked(packed(odd, made[1]))
     assert np.isnan(take.log_likelihood) and take.metrics == {"jerk": None, "skate_cm": None}
 
@@ -94,26 +111,46 @@ DAMAGED: dict[str, tuple[Any, str]] = {
     "figures of words": (_words(take__metrics={"jerk": "high"}), "'take.metrics'"),
     "an unknown mode": (_words(controls__mode="HALF"), "mode 'HALF'"),
     "a blend of words": (_words(controls__blend="long"), "blend"),
-    "no JSON": (lambda m: {**m, "plain": _npy(np.frombuffer(b"{'a'", np.uint8))}, "'plain' is not JSON"),
-    "no text": (lambda m: {**m, "plain": _npy(np.frombuffer(b"\xff", np.uint8))}, "'plain' is not text"),
-    "a list": (lambda m: {**m, "plain": _npy(np.frombuffer(b"[]", np.uint8))}, "'plain' is not an object"),
-    "poses missing": (lambda m: {n: d for n, d in m.items() if n != "take.poses"}, "'take.poses' is missing"),
-    "joints of one frame": (
-        lambda m: {**m, "take.joints": _npy(np.zeros((1, 22, 3), np.float32))}, "'take.joints' has the shape",
+    "no JSON": (
+        lambda m: {**m, "plain": _npy(np.frombuffer(b"{'a'", np.uint8))},
+        "'plain' is not JSON",
     ),
-    "a path too short": (lambda m: {**m, "take.path.yaw": _npy(np.zeros(2, np.float32))}, "'take.path.yaw' has the shape"),
+    "no text": (
+        lambda m: {**m, "plain": _npy(np.frombuffer(b"\xff", np.uint8))},
+        "'plain' is not text",
+    ),
+    "a list": (
+        lambda m: {**m, "plain": _npy(np.frombuffer(b"[]", np.uint8))},
+        "'plain' is not an object",
+    ),
+    "poses missing": (
+        lambda m: {n: d for n, d in m.items() if n != "take.poses"},
+        "'take.poses' is missing",
+    ),
+    "joints of one frame": (
+        lambda m: {**m, "take.joints": _npy(np.zeros((1, 22, 3), np.float32))},
+        "'take.joints' has the shape",
+    ),
+    "a path too short": (
+        lambda m: {**m, "take.path.yaw": _npy(np.zeros(2, np.float32))},
+        "'take.path.yaw' has the shape",
+    ),
     "numbers that are none": (
         lambda m: {**m, "take.root": _npy(np.full((FRAMES, 4, 4), np.nan, np.float32))},
         "'take.root' holds what is not a number",
     ),
     "objects": (lambda m: {**m, "take.action": _npy(np.array([None]))}, "'take.action' holds |O"),
-    "doubles": (lambda m: {**m, "take.action": _npy(np.zeros((FRAMES, 10)))}, "'take.action' holds <f8"),
+    "doubles": (
+        lambda m: {**m, "take.action": _npy(np.zeros((FRAMES, 10)))},
+        "'take.action' holds <f8",
+    ),
     "a header that lies": (
         lambda m: {**m, "take.root": m["take.root"].replace(b"(5, 4, 4), ", b"(9, 4, 4), ")},
         "the size of 'take.root' is not that of its shape",
     ),
     "a rotation that is none": (
-        lambda m: {**m, "controls.head_rotation": _npy(np.ones((FRAMES, 3, 3), np.float32))}, "'head_rotation' holds a matrix",
+        lambda m: {**m, "controls.head_rotation": _npy(np.ones((FRAMES, 3, 3), np.float32))},
+        "'head_rotation' holds a matrix",
     ),
 }
 
@@ -125,17 +162,25 @@ def test_what_is_damaged_is_told_by_its_field(made: tuple[Take, Controls], case:
     with pytest.raises(InputError) as caught:
         unpacked(b"no take" if members is None else _file(members))
     said = str(caught.value)
-    assert words in said and said.startswith("The motion that the take was made of cannot be read (")
+    assert words in said and said.startswith(
+        "The motion that the take was made of cannot be read ("
+    )
     assert said.endswith("; generate it again.") and said.count(". ") == 0
 
 
-@pytest.mark.parametrize("name", ["take.joints", "controls.root", "plain", "controls.hand_left", "something.else"])
-def test_what_unpacks_to_more_than_its_frames_ask_for_stays_packed(made: tuple[Take, Controls], name: str) -> None:
+@pytest.mark.parametrize(
+    "name", ["take.joints", "controls.root", "plain", "controls.hand_left", "something.else"]
+)
+def test_what_unpacks_to_more_than_its_frames_ask_for_stays_packed(
+    made: tuple[Take, Controls], name: str
+) -> None:
     members, zeros = _members(packed(*made)), bytes(1 << 20)
     members.pop(name, None)
     out = BytesIO(_file(members))
     with ZipFile(out, "a", ZIP_DEFLATED) as file, file.open(f"{name}.npy", "w") as member:
-        member.write(_npy(np.zeros((0, 4, 4), np.float32)).replace(b"(0, 4, 4)", b"(1048576, 4, 4)".ljust(9)))
+        member.write(
+            _npy(np.zeros((0, 4, 4), np.float32)).replace(b"(0, 4, 4)", b"(1048576, 4, 4)".ljust(9))
+        )
         for _ in range(64):
             member.write(zeros)
     data = out.getvalue()

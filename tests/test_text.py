@@ -1,4 +1,6 @@
-"""Words from outside: shown so that a terminal obeys nothing in them, and read as JSON within bounds."""
+"""Words from outside: shown so that a terminal obeys nothing in them, and read as JSON within
+bounds.
+"""
 
 import json
 from pathlib import Path
@@ -27,7 +29,11 @@ def test_what_people_write_stays_as_it_is() -> None:
 
 def test_long_texts_are_cut_and_other_things_are_named() -> None:
     assert printable("x" * 10**6, 10) == "x" * 10 + "…"
-    assert printable(None) == "None" and printable(1.5) == "1.5" and printable(10**5000) == "a huge number"
+    assert (
+        printable(None) == "None"
+        and printable(1.5) == "1.5"
+        and printable(10**5000) == "a huge number"
+    )
     assert printable(np.zeros(3)) == "of the type ndarray" and printable([1]) == "of the type list"
 
 
@@ -36,11 +42,22 @@ def test_errors_are_safe_to_print_whatever_is_in_them() -> None:
     assert said.isprintable() and said.endswith("is odd; mend it.")
 
 
-@pytest.mark.parametrize(("text", "why"), [
-    ("{", "is not JSON"), ("", "is not JSON"), ("[" * 100_000, "is not JSON"), ("[" * 40 + "]" * 40, "nested too deep"),
-    ('{"a": 1, "a": 2}', "something twice"), ('"\\ud800"', "half a character"), ('{"\\udfff": 1}', "half a character"),
-    ("NaN", "not finite"), ("[1e999]", "not finite"), ("[" + "9" * 5000 + "]", "too large"), ("-" + "9" * 30, "too large"),
-])
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("{", "is not JSON"),
+        ("", "is not JSON"),
+        ("[" * 100_000, "is not JSON"),
+        ("[" * 40 + "]" * 40, "nested too deep"),
+        ('{"a": 1, "a": 2}', "something twice"),
+        ('"\\ud800"', "half a character"),
+        ('{"\\udfff": 1}', "half a character"),
+        ("NaN", "not finite"),
+        ("[1e999]", "not finite"),
+        ("[" + "9" * 5000 + "]", "too large"),
+        ("-" + "9" * 30, "too large"),
+    ],
+)
 def test_json_is_read_within_bounds(text: str, why: str) -> None:
     with pytest.raises(ValueError, match=why):
         read_json(text)
@@ -51,10 +68,18 @@ def test_json_in_order_is_read_as_python_reads_it() -> None:
     assert read_json(text) == json.loads(text)
 
 
-def test_info_prints_metadata_safely_and_json_gives_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_prints_metadata_safely_and_json_gives_all_of_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     shipped, path = load_weights(), tmp_path / "odd.safetensors"
     hostile = HOSTILE.replace("\ud800", "")
-    metadata = {"licence": hostile, "data": "x" * 100_000, hostile: "[" * 5000, "held_out": '{"a": NaN}', "file": "elsewhere"}
+    metadata = {
+        "licence": hostile,
+        "data": "x" * 100_000,
+        hostile: "[" * 5000,
+        "held_out": '{"a": NaN}',
+        "file": "elsewhere",
+    }
     write_safetensors(path, {"x": np.ones(2, np.float32)}, {**shipped.metadata, **metadata})
     assert main(["info", str(path)]) == 0
     out = capsys.readouterr().out
@@ -62,4 +87,8 @@ def test_info_prints_metadata_safely_and_json_gives_all_of_it(tmp_path: Path, ca
     assert f"file: {path}" in out and "parameters: 2" in out
     assert main(["info", "--json", str(path)]) == 0
     described = json.loads(capsys.readouterr().out)
-    assert described["data"] == metadata["data"] and described["licence"] == hostile and described["file"] == str(path)
+    assert (
+        described["data"] == metadata["data"]
+        and described["licence"] == hostile
+        and described["file"] == str(path)
+    )

@@ -1,4 +1,6 @@
-"""Training: it learns, resumes exactly, stops on NaN with the last good state, and what it exports is what it trained."""
+"""Training: it learns, resumes exactly, stops on NaN with the last good state, and what it exports
+is what it trained.
+"""
 
 import itertools
 import json
@@ -41,20 +43,31 @@ from dafnet_addon.training.spread import noise_along, take_spread  # noqa: E402
 from dafnet_addon.training.train import Run, TrainingConfig, read_config, train_part, trained  # noqa: E402
 
 TINY = ModelConfig(
-    predictor_code=8, predictor_width=16, width=16, code=8, shared_encoder=True, mask=True, steps_upper=1, steps_lower=1
+    predictor_code=8,
+    predictor_width=16,
+    width=16,
+    code=8,
+    shared_encoder=True,
+    mask=True,
+    steps_upper=1,
+    steps_lower=1,
 )
 
 
 def _config(steps: int) -> TrainingConfig:
     """A budget that no test spends by time: runs are stopped by their number of steps."""
-    return TrainingConfig(minutes_predictor=1e3, minutes_flow=1e3, batch=4, warmup=5, save_every=steps)
+    return TrainingConfig(
+        minutes_predictor=1e3, minutes_flow=1e3, batch=4, warmup=5, save_every=steps
+    )
 
 
 class _Enough(Exception):
     pass
 
 
-def _until(part: str, dataset: Path, folder: Path, steps: int, saves: int = 1, model: ModelConfig = TINY) -> Run:
+def _until(
+    part: str, dataset: Path, folder: Path, steps: int, saves: int = 1, model: ModelConfig = TINY
+) -> Run:
     """Train a part for ``saves`` times ``steps`` steps; the run as it was saved last."""
     seen: list[float] = []
 
@@ -74,7 +87,12 @@ def test_pasts_hold_ten_poses_and_eleven_velocities():
     velocity = 100 + torch.arange(14.0)[None, :, None].expand(1, 14, 3)
     past = past_of(poses, velocity, 10)
     assert past.shape == (1, 4, 693)
-    assert past[0, 0, 0] == 0 and past[0, 0, 659] == 9 and past[0, 0, 660] == 100 and past[0, 0, 692] == 110
+    assert (
+        past[0, 0, 0] == 0
+        and past[0, 0, 659] == 9
+        and past[0, 0, 660] == 100
+        and past[0, 0, 692] == 110
+    )
     assert past[0, 3, 0] == 3 and past[0, 3, 692] == 113
 
 
@@ -118,9 +136,13 @@ def test_pools_take_in_new_shards(dataset):
 
 def test_the_sensor_in_torch_is_the_one_in_numpy():
     rng = np.random.default_rng(0)
-    rows = rng.uniform((-1, -1, 0.1, 0.05, 0.05, 0.05, -3), (1, 1, 1.2, 0.6, 0.6, 0.6, 3), (3, 6, 7))
+    rows = rng.uniform(
+        (-1, -1, 0.1, 0.05, 0.05, 0.05, -3), (1, 1, 1.2, 0.6, 0.6, 0.6, 3), (3, 6, 7)
+    )
     rows[:, -1] = boxes_module.ABSENT
-    root = np.concatenate([rng.uniform(-0.5, 0.5, (3, 20, 2)), rng.uniform(-3, 3, (3, 20, 1))], axis=-1)
+    root = np.concatenate(
+        [rng.uniform(-0.5, 0.5, (3, 20, 2)), rng.uniform(-3, 3, (3, 20, 1))], axis=-1
+    )
     made = occupancy_of(torch.from_numpy(rows), torch.from_numpy(root)).numpy()
     for boxes, places, seen in zip(rows, root, made, strict=True):
         path = RootPath(np.c_[places[:, :2], np.zeros(20)], places[:, 2])
@@ -151,7 +173,9 @@ def test_resuming_is_exact(dataset, tmp_path, monkeypatch):
     assert straight.step == resumed.step == 6
     for a, b in zip(straight.network.parameters(), resumed.network.parameters(), strict=True):
         assert torch.equal(a, b)
-    assert all(torch.equal(value, resumed.averaged[name]) for name, value in straight.averaged.items())
+    assert all(
+        torch.equal(value, resumed.averaged[name]) for name, value in straight.averaged.items()
+    )
 
 
 def test_a_rate_holds_then_falls_and_a_larger_budget_goes_on_from_before_it_fell(dataset, tmp_path):
@@ -164,7 +188,9 @@ def test_a_rate_holds_then_falls_and_a_larger_budget_goes_on_from_before_it_fell
     log = folder / "log.jsonl"
     longer = train_part("whole", dataset, folder, model, replace(config, steps_flow=20))
     steps = [json.loads(line)["step"] for line in log.read_text(encoding="utf-8").splitlines()]
-    assert longer.step == 20 and steps == [*range(1, 11), *range(8, 21)], "from the last step at the full rate"
+    assert longer.step == 20 and steps == [*range(1, 11), *range(8, 21)], (
+        "from the last step at the full rate"
+    )
     once = train_part("whole", dataset, tmp_path / "once", model, replace(config, steps_flow=20))
     for a, b in zip(longer.network.parameters(), once.network.parameters(), strict=True):
         assert torch.equal(a, b), "as if the budget had been known from the beginning"
@@ -180,7 +206,9 @@ def test_what_is_exported_is_the_average(dataset, tmp_path):
     apart = 0.0
     for name, parameter in flow.parts()["whole"].named_parameters():
         assert torch.equal(parameter, run.averaged[name])
-        apart += float((parameter.detach() - dict(run.network.named_parameters())[name].detach()).abs().max())
+        apart += float(
+            (parameter.detach() - dict(run.network.named_parameters())[name].detach()).abs().max()
+        )
     assert apart > 0.0
     with run.with_average() as network:
         assert all(torch.equal(p, run.averaged[name]) for name, p in network.named_parameters())
@@ -208,11 +236,17 @@ def test_what_is_exported_is_what_was_trained(dataset, tmp_path):
     export(tmp_path / "w.safetensors", flow, predictor, statistics, {"licence": "none"})
     weights = load_weights(tmp_path / "w.safetensors")
     for name, array in tensors_of(flow, predictor, statistics).items():
-        rows = np.abs(array).max(axis=tuple(range(1, array.ndim)), keepdims=True) if array.ndim else array
+        rows = (
+            np.abs(array).max(axis=tuple(range(1, array.ndim)), keepdims=True)
+            if array.ndim
+            else array
+        )
         assert (np.abs(weights.tensors[name] - array) <= rows / 253).all(), name
     annotate(tmp_path / "w.safetensors", {"held_out": json.dumps({"a": 1})})
     again = load_weights(tmp_path / "w.safetensors")
-    assert again.metadata["licence"] == "none" and json.loads(again.metadata["held_out"]) == {"a": 1}
+    assert again.metadata["licence"] == "none" and json.loads(again.metadata["held_out"]) == {
+        "a": 1
+    }
     assert all((again.tensors[name] == weights.tensors[name]).all() for name in weights.tensors)
 
 
@@ -235,7 +269,10 @@ def test_a_run_begins_with_what_weights_have_learnt(dataset, tmp_path):
         fresh = _loss_at(after, dataset)
         after.adopt(weights)
         # What was stored in 8 bits is off by a little.
-        assert abs(_loss_at(after, dataset) - _loss_at(before, dataset)) < 0.02 * abs(_loss_at(before, dataset) - fresh) + 0.5
+        assert (
+            abs(_loss_at(after, dataset) - _loss_at(before, dataset))
+            < 0.02 * abs(_loss_at(before, dataset) - fresh) + 0.5
+        )
 
 
 def test_weights_that_were_not_told_of_the_way_ahead_begin_a_model_that_is(dataset, tmp_path):
@@ -245,7 +282,9 @@ def test_weights_that_were_not_told_of_the_way_ahead_begin_a_model_that_is(datas
     statistics = adopted_statistics(weights, found)
     assert (statistics.pose_mean == weights.tensors["pose_mean"]).all()
     for part in ("upper", "lower"):
-        short, long = (Run(part, tmp_path / "two", model, _config(2), statistics) for model in (TINY, told))
+        short, long = (
+            Run(part, tmp_path / "two", model, _config(2), statistics) for model in (TINY, told)
+        )
         for run in (short, long):
             adopt_predictor(run.gmvae.predictor, weights)
             run.adopt(weights)
@@ -256,8 +295,13 @@ def test_weights_that_were_not_told_of_the_way_ahead_begin_a_model_that_is(datas
 
 def test_a_wider_network_begins_as_the_narrower_one(dataset, tmp_path):
     weights = load_weights(_exported(dataset, tmp_path / "one", TINY))
-    wide = replace(TINY, width=TINY.width + 5, code=TINY.code + 3, predictor_code=TINY.predictor_code + 2,
-                   predictor_width=TINY.predictor_width + 7)
+    wide = replace(
+        TINY,
+        width=TINY.width + 5,
+        code=TINY.code + 3,
+        predictor_code=TINY.predictor_code + 2,
+        predictor_width=TINY.predictor_width + 7,
+    )
     statistics = adopted_statistics(weights, _pool(dataset).statistics())
     for part in ("upper", "lower"):
         losses = []
@@ -277,7 +321,13 @@ def test_mixed_precision_is_nearly_the_same(dataset, tmp_path):
     statistics = adopted_statistics(weights, _pool(dataset).statistics())
     losses = []
     for mixed in (False, True):
-        run = Run("upper", tmp_path / "two", TINY, replace(_config(2), mixed=mixed, free_run=1.0), statistics)
+        run = Run(
+            "upper",
+            tmp_path / "two",
+            TINY,
+            replace(_config(2), mixed=mixed, free_run=1.0),
+            statistics,
+        )
         adopt_predictor(run.gmvae.predictor, weights)
         run.adopt(weights)
         losses.append(_loss_at(run, dataset))
@@ -285,11 +335,19 @@ def test_mixed_precision_is_nearly_the_same(dataset, tmp_path):
 
 
 @pytest.mark.parametrize("there", [False, True])
-def test_mixed_precision_is_asked_for_only_where_it_is_there(dataset, tmp_path, monkeypatch, capsys, there):
+def test_mixed_precision_is_asked_for_only_where_it_is_there(
+    dataset, tmp_path, monkeypatch, capsys, there
+):
     monkeypatch.setattr(precision, "mixes", lambda device: there)
     run = Run("upper", tmp_path, TINY, replace(_config(2), mixed=True), _pool(dataset).statistics())
-    switches = [module.mixed for module in run.flow.modules() if isinstance(module, Coupling | EnvironmentEncoder)]
-    assert switches and set(switches) == {there} and run.config.mixed is there, "what is said of the run is what was done"
+    switches = [
+        module.mixed
+        for module in run.flow.modules()
+        if isinstance(module, Coupling | EnvironmentEncoder)
+    ]
+    assert switches and set(switches) == {there} and run.config.mixed is there, (
+        "what is said of the run is what was done"
+    )
     precision.announce(True)
     assert capsys.readouterr().err.count("\n") == (0 if there else 1)
     precision.announce(False)
@@ -317,11 +375,17 @@ def test_configurations_are_read_and_bad_ones_refused(tmp_path):
         assert model.actions == 10 and config.batch > 0
     bad = tmp_path / "bad.toml"
     for text, words in (
-        ("= 3", "cannot be read"), ("preset = 'huge'", "unknown"), ("preset = [1]", "unknown"),
-        ("[model]\nwidht = 3", "unknown setting"), ("model = 3", "unknown setting 'model'"),
-        ("[modle]\nwidth = 3", "unknown setting 'modle'"), ("training = 3", "by name"),
-        ("[model]\nwidth = 'wide'", "'width'"), ("[model]\nwidth = 0", "'width' must be"),
-        ("[training]\nbatch = 0", "'batch' must be"), ("[training]\nmixed = 1", "'mixed'"),
+        ("= 3", "cannot be read"),
+        ("preset = 'huge'", "unknown"),
+        ("preset = [1]", "unknown"),
+        ("[model]\nwidht = 3", "unknown setting"),
+        ("model = 3", "unknown setting 'model'"),
+        ("[modle]\nwidth = 3", "unknown setting 'modle'"),
+        ("training = 3", "by name"),
+        ("[model]\nwidth = 'wide'", "'width'"),
+        ("[model]\nwidth = 0", "'width' must be"),
+        ("[training]\nbatch = 0", "'batch' must be"),
+        ("[training]\nmixed = 1", "'mixed'"),
         ("[training]\npeak = nan", "'peak'"),
     ):
         bad.write_text(text, encoding="utf-8")
@@ -336,7 +400,9 @@ def test_configurations_are_read_and_bad_ones_refused(tmp_path):
 def test_what_a_run_cannot_be_trained_with_is_said(dataset, tmp_path, capsys):
     _until("predictor", dataset, tmp_path / "run", steps=1)
     with pytest.raises(InputError, match="width 16, not 17; code 8, not 9"):
-        train_part("predictor", dataset, tmp_path / "run", replace(TINY, width=17, code=9), _config(1))
+        train_part(
+            "predictor", dataset, tmp_path / "run", replace(TINY, width=17, code=9), _config(1)
+        )
     config = Path(__file__).resolve().parents[1] / "configs" / "small.toml"
     command = ["train", str(config), str(dataset), "-o", str(tmp_path / "two")]
     for device in ("cuda:77", "gpu"):
@@ -366,24 +432,33 @@ def test_free_running_loss_is_zero_for_the_captured_motion_and_knows_sliding():
 
     rest = torch.from_numpy(REST).float()
     upper, lower = rest[list(UPPER)].repeat(3, 8, 1, 1), rest[list(LOWER)].repeat(3, 8, 1, 1)
-    calm, given, step = torch.tensor([True, False, True]), torch.zeros(3, 8, 14), torch.zeros(3, 8, 3)
+    calm, given, step = (
+        torch.tensor([True, False, True]),
+        torch.zeros(3, 8, 14),
+        torch.zeros(3, 8, 3),
+    )
     assert float(upper_loss(upper, upper, calm, given)) < 1e-3
     still = float(lower_loss(lower, lower, calm, upper[:, :, 0], step))
     assert still < 0.2  # where nothing moves, speeds are the square root's floor
-    # The root goes 1 cm to the right each frame and turns; feet that stay in its frame slide over the floor.
+    # The root goes 1 cm to the right each frame and turns; feet that stay in its frame slide over
+    # the floor.
     step[..., 0] = 0.01
     assert torch.allclose(sliding(lower, step), torch.tensor(0.3), atol=1e-3)
     assert float(lower_loss(lower, lower, ~calm, upper[:, :, 0], step)) > still + 1.0
     turning = torch.zeros(1, 2, 3)
     turning[..., 2] = 0.1
     fixed = torch.tensor([[0.0, 1.0, 0.0], [0.1, 0.995, 0.0]])[None, :, None]
-    assert float(sliding(fixed, turning)) < 0.02, "a point that stays in the world while the root turns to the left"
+    assert float(sliding(fixed, turning)) < 0.02, (
+        "a point that stays in the world while the root turns to the left"
+    )
 
 
 @pytest.mark.parametrize("part", ["lower", "upper"])
 def test_the_lower_body_first_runs_freely_too(part: str, dataset: Path, tmp_path: Path):
     pool, model = _pool(dataset), replace(TINY, system="lower-first")
-    run = Run(part, tmp_path, model, replace(_config(1), free_run=1.0, mixed=True), pool.statistics())
+    run = Run(
+        part, tmp_path, model, replace(_config(1), free_run=1.0, mixed=True), pool.statistics()
+    )
     loss = run.loss(pool.batch(torch.arange(4), run.statistics, model))
     loss.backward()
     assert loss.isfinite() and all(p.grad.isfinite().all() for p in run.network.parameters())
@@ -404,19 +479,30 @@ def test_running_on_is_the_likelihood_and_the_inverse(dataset):
     assert (again[:, 5:] - z[:, None]).abs().max() < 1e-3
 
 
-def _tiny_train(python: list[str], dataset: Path, folder: Path, changed: dict[str, str | None]) -> str:
-    """What ``dafnet train`` of a small model says, run as ``python`` in an environment with some variables set or unset."""
+def _tiny_train(
+    python: list[str], dataset: Path, folder: Path, changed: dict[str, str | None]
+) -> str:
+    """What ``dafnet train`` of a small model says, run as ``python`` in an environment with some
+    variables set or unset.
+    """
     (dataset / "dataset.json").write_text('{"train": ["Jörg"]}', encoding="utf-8")
     config = dataset / "tiny.toml"
     config.write_text(
-        'preset = "small"\n[model]\npredictor_code = 8\npredictor_width = 16\nwidth = 16\ncode = 8\nsteps_upper = 1\n'
-        "steps_lower = 1\n[training]\nminutes_predictor = 0.02\nminutes_flow = 0.02\nbatch = 4\nmixed = true\n",
+        'preset = "small"\n[model]\npredictor_code = 8\npredictor_width = 16\nwidth = 16\ncode = '
+        "8\nsteps_upper = 1\n"
+        "steps_lower = 1\n[training]\nminutes_predictor = 0.02\nminutes_flow = 0.02\nbatch = "
+        "4\nmixed = true\n",
         encoding="utf-8",
     )
-    environment = {name: value for name, value in {**os.environ, **changed}.items() if value is not None}
+    environment = {
+        name: value for name, value in {**os.environ, **changed}.items() if value is not None
+    }
     done = subprocess.run(
         [sys.executable, *python, "-m", "dafnet_addon", "train", config, dataset, "-o", folder],
-        cwd=Path(__file__).resolve().parents[1], env=environment, capture_output=True, text=True,
+        cwd=Path(__file__).resolve().parents[1],
+        env=environment,
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     weights = load_weights(folder / "dafnet.safetensors")
@@ -425,10 +511,17 @@ def _tiny_train(python: list[str], dataset: Path, folder: Path, changed: dict[st
 
 
 def test_it_trains_without_avx_512_in_a_bare_environment(dataset, tmp_path):
-    """A processor without a bfloat16 LSTM, no home, no UTF-8, one thread: as in a container or a batch job."""
+    """A processor without a bfloat16 LSTM, no home, no UTF-8, one thread: as in a container or a
+    batch job.
+    """
     bare = {
-        "ONEDNN_MAX_CPU_ISA": "AVX2", "OMP_NUM_THREADS": "1", "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0",
-        "HOME": None, "TZ": "Asia/Kathmandu",
+        "ONEDNN_MAX_CPU_ISA": "AVX2",
+        "OMP_NUM_THREADS": "1",
+        "LC_ALL": "C",
+        "PYTHONUTF8": "0",
+        "PYTHONCOERCECLOCALE": "0",
+        "HOME": None,
+        "TZ": "Asia/Kathmandu",
     }
     said = _tiny_train([], dataset, tmp_path / "run", bare)
     assert said.count("single precision") == 1
@@ -439,8 +532,13 @@ def test_two_processes_train_one_model(dataset, tmp_path):
     here = ["--rdzv-backend", "c10d", "--rdzv-endpoint", "127.0.0.1:0", "--local-addr", "127.0.0.1"]
     together = ["-m", "torch.distributed.run", *here, "--nproc-per-node", "2"]
     _tiny_train(together, dataset, tmp_path / "run", {"OMP_NUM_THREADS": "1"})
-    lines = [json.loads(line) for line in (tmp_path / "run" / "log.jsonl").read_text(encoding="utf-8").splitlines()]
-    assert len(lines) == len({(line["part"], line["step"]) for line in lines}), "one process keeps the run"
+    lines = [
+        json.loads(line)
+        for line in (tmp_path / "run" / "log.jsonl").read_text(encoding="utf-8").splitlines()
+    ]
+    assert len(lines) == len({(line["part"], line["step"]) for line in lines}), (
+        "one process keeps the run"
+    )
     assert {line["part"] for line in lines} == {"predictor", "upper", "lower"}
 
 
@@ -453,7 +551,9 @@ def test_baselines_learn_and_their_weights_run(system: str, dataset: Path, tmp_p
     for part in parts_of(model):
         fresh = Run(part, tmp_path / "fresh", model, _config(10), _pool(dataset).statistics())
         before = _loss_at(fresh, dataset)
-        assert _loss_at(_until(part, dataset, folder, steps=40, model=model), dataset) < before - 5.0
+        assert (
+            _loss_at(_until(part, dataset, folder, steps=40, model=model), dataset) < before - 5.0
+        )
     flow, predictor, statistics = trained(folder)
     assert (predictor is None) == (system == "moglow")
     spread = take_spread(flow, predictor, _pool(dataset), statistics)
@@ -474,7 +574,9 @@ def test_a_budget_in_steps_is_spent_by_steps(dataset: Path, tmp_path: Path):
     assert run.step == 7 and Run.load("whole", tmp_path).step == 7
 
 
-def test_takes_are_drawn_from_what_lasts_of_the_noise_along_captured_motion(dataset: Path, tmp_path: Path):
+def test_takes_are_drawn_from_what_lasts_of_the_noise_along_captured_motion(
+    dataset: Path, tmp_path: Path
+):
     run = Run("upper", tmp_path, TINY, _config(1), _pool(dataset).statistics())
     pool, predictor = _pool(dataset), run.gmvae.predictor
     spread = take_spread(run.flow, predictor, pool, run.statistics)
@@ -483,14 +585,25 @@ def test_takes_are_drawn_from_what_lasts_of_the_noise_along_captured_motion(data
         lasting = noise[:, 20:].mean(1)
         expected = (lasting.T @ lasting / 12).numpy()
         # Poses are noisy by 3 mm, anew for each batch.
-        assert np.abs(spread[part] @ spread[part].T - expected).max() < 0.05 * np.abs(expected).max()
+        assert (
+            np.abs(spread[part] @ spread[part].T - expected).max() < 0.05 * np.abs(expected).max()
+        )
         assert (np.triu(spread[part], 1) == 0).all()
     for part in ("predictor", "upper", "lower"):
         _until(part, dataset, tmp_path / "run", steps=2)
     flow, trained_predictor, statistics = trained(tmp_path / "run")
-    export(tmp_path / "w.safetensors", flow, trained_predictor, statistics, {}, {"lower": 3.0 * np.eye(24, dtype=np.float32)})
+    export(
+        tmp_path / "w.safetensors",
+        flow,
+        trained_predictor,
+        statistics,
+        {},
+        {"lower": 3.0 * np.eye(24, dtype=np.float32)},
+    )
     sampler = Sampler(load_weights(tmp_path / "w.safetensors"))
     plain = np.random.default_rng([5, 0]).standard_normal(42)
     assert np.allclose(sampler.noise(5)[0, :42], plain), "N(0, I) where the weights say nothing"
-    assert np.allclose(sampler.noise(5)[0, 42:], 3.0 * np.random.default_rng([5, 1]).standard_normal(24))
+    assert np.allclose(
+        sampler.noise(5)[0, 42:], 3.0 * np.random.default_rng([5, 1]).standard_normal(24)
+    )
     assert (sampler.noise(5, temperature=0.0) == 0).all()

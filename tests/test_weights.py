@@ -1,4 +1,6 @@
-"""Weights files: the reader agrees with the safetensors library, and no header makes it do anything but refuse."""
+"""Weights files: the reader agrees with the safetensors library, and no header makes it do anything
+but refuse.
+"""
 
 import json
 import struct
@@ -9,26 +11,45 @@ import pytest
 
 from dafnet_addon.core import weights
 from dafnet_addon.core.errors import WeightsError
-from dafnet_addon.core.weights import FORMAT, load_weights, quantised, read_safetensors, write_safetensors
+from dafnet_addon.core.weights import (
+    FORMAT,
+    load_weights,
+    quantised,
+    read_safetensors,
+    write_safetensors,
+)
 
-METADATA = {"format": FORMAT, "config": json.dumps({"width": 4}), "licence": "a licence — with a dash"}
+METADATA = {
+    "format": FORMAT,
+    "config": json.dumps({"width": 4}),
+    "licence": "a licence — with a dash",
+}
 
 
 def some_tensors() -> dict[str, np.ndarray]:
     rng = np.random.default_rng(0)
     tensors = {
-        "byte": rng.integers(0, 256, 5).astype(np.uint8), "half": rng.normal(size=(3, 5)).astype(np.float16),
-        "single": rng.normal(size=(2, 3, 4)).astype(np.float32), "double": rng.normal(size=7),
-        "whole": rng.integers(-9, 9, (2, 2)), "short": np.array([1, -2], np.int32),
+        "byte": rng.integers(0, 256, 5).astype(np.uint8),
+        "half": rng.normal(size=(3, 5)).astype(np.float16),
+        "single": rng.normal(size=(2, 3, 4)).astype(np.float32),
+        "double": rng.normal(size=7),
+        "whole": rng.integers(-9, 9, (2, 2)),
+        "short": np.array([1, -2], np.int32),
         "small": rng.integers(-127, 128, (3, 3)).astype(np.int8),
-        "scalar": np.float32(1.5).reshape(()), "empty": np.zeros((0, 3), np.float32),
+        "scalar": np.float32(1.5).reshape(()),
+        "empty": np.zeros((0, 3), np.float32),
     }
     tensors["strided"] = tensors["single"].transpose(2, 0, 1)
     tensors["big_endian"] = np.arange(3, dtype=">f4")
     return tensors
 
 
-def put(path: Path, header: bytes | str | dict[str, object], data: bytes = b"", length: int | None = None) -> Path:
+def put(
+    path: Path,
+    header: bytes | str | dict[str, object],
+    data: bytes = b"",
+    length: int | None = None,
+) -> Path:
     """A file with this header, true or not."""
     text = json.dumps(header) if isinstance(header, dict) else header
     raw = text.encode() if isinstance(text, str) else text
@@ -36,14 +57,20 @@ def put(path: Path, header: bytes | str | dict[str, object], data: bytes = b"", 
     return path
 
 
-def entry(dtype: object = "F32", shape: object = (2,), offsets: object = (0, 8)) -> dict[str, object]:
+def entry(
+    dtype: object = "F32", shape: object = (2,), offsets: object = (0, 8)
+) -> dict[str, object]:
     return {"dtype": dtype, "shape": shape, "data_offsets": offsets}
 
 
 def test_round_trip_is_exact_and_deterministic(tmp_path: Path) -> None:
     tensors = some_tensors()
     write_safetensors(tmp_path / "a.safetensors", tensors, METADATA)
-    write_safetensors(tmp_path / "b.safetensors", dict(reversed(tensors.items())), dict(reversed(METADATA.items())))
+    write_safetensors(
+        tmp_path / "b.safetensors",
+        dict(reversed(tensors.items())),
+        dict(reversed(METADATA.items())),
+    )
     assert (tmp_path / "a.safetensors").read_bytes() == (tmp_path / "b.safetensors").read_bytes()
     read, metadata = read_safetensors(tmp_path / "a.safetensors")
     assert metadata == METADATA and read.keys() == tensors.keys()
@@ -71,7 +98,11 @@ def test_library_reads_what_we_write(tmp_path: Path) -> None:
 
 def test_we_read_what_the_library_writes(tmp_path: Path) -> None:
     library = pytest.importorskip("safetensors.numpy")
-    tensors = {name: np.ascontiguousarray(array) for name, array in some_tensors().items() if name != "big_endian"}
+    tensors = {
+        name: np.ascontiguousarray(array)
+        for name, array in some_tensors().items()
+        if name != "big_endian"
+    }
     library.save_file(tensors, tmp_path / "a.safetensors", METADATA)
     read, metadata = read_safetensors(tmp_path / "a.safetensors")
     assert metadata == METADATA and read.keys() == tensors.keys()
@@ -91,7 +122,12 @@ def test_weights_expand_what_is_stored_small(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     big = rng.normal(size=(6, 3, 5)) * np.array([1, 10, 0.1, 0, 1, 1])[:, None, None]
     steps, scale = quantised(big)
-    assert steps.dtype == np.int8 and scale.dtype == np.float32 and np.abs(steps).max() == 127 and scale[3] == 0
+    assert (
+        steps.dtype == np.int8
+        and scale.dtype == np.float32
+        and np.abs(steps).max() == 127
+        and scale[3] == 0
+    )
     half = rng.normal(size=4).astype(np.float16)
     path = tmp_path / "w.safetensors"
     tensors = {"big": steps, "big.scale": scale, "half": half, "own.scale": np.ones(2, np.float32)}
@@ -107,26 +143,52 @@ def test_weights_expand_what_is_stored_small(tmp_path: Path) -> None:
             loaded.require(name, shape)
 
 
-@pytest.mark.parametrize(("tensors", "metadata", "said"), [
-    ({}, {"config": "{}"}, "another version"),
-    ({}, {"format": "dafnet-2", "config": "{}"}, "another version"),
-    ({}, {"format": FORMAT}, "damaged"),
-    ({}, {"format": FORMAT, "config": "["}, "damaged"),
-    ({}, {"format": FORMAT, "config": "[]"}, "config is not an object"),
-    ({}, {"format": FORMAT, "config": "[" * 20 + "{" * 40}, "config is not JSON"),
-    ({}, {"format": FORMAT, "config": '{"a": ' + "[" * 40 + "]" * 40 + "}"}, "config is nested too deep"),
-    ({}, {"format": FORMAT, "config": '{"a": "\\ud800"}'}, "config holds half a character"),
-    ({}, {"format": FORMAT, "config": '{"fps": NaN}'}, "config holds a number that is not finite"),
-    ({}, {"format": FORMAT, "config": '{"fps": 1%s}' % ("0" * 400)}, "config holds a number that is too large"),
-    ({}, {"format": "\x1b[31m" + "x" * 10**5}, r"format is '\\x1b\[31mx+…'"),
-    ({"\x1b[2J": np.array([np.nan], np.float32)}, METADATA, r"'\\x1b\[2J' holds values that are not numbers"),
-    ({"a": np.zeros((2, 2), np.int8)}, METADATA, "lacks its scales"),
-    ({"a": np.zeros((2, 2), np.int8), "a.scale": np.zeros(3, np.float32)}, METADATA, "lacks its scales"),
-    ({"a": np.array([np.nan], np.float32)}, METADATA, "not numbers"),
-    ({"a": np.array([1e300])}, METADATA, "not numbers"),
-])
+@pytest.mark.parametrize(
+    ("tensors", "metadata", "said"),
+    [
+        ({}, {"config": "{}"}, "another version"),
+        ({}, {"format": "dafnet-2", "config": "{}"}, "another version"),
+        ({}, {"format": FORMAT}, "damaged"),
+        ({}, {"format": FORMAT, "config": "["}, "damaged"),
+        ({}, {"format": FORMAT, "config": "[]"}, "config is not an object"),
+        ({}, {"format": FORMAT, "config": "[" * 20 + "{" * 40}, "config is not JSON"),
+        (
+            {},
+            {"format": FORMAT, "config": '{"a": ' + "[" * 40 + "]" * 40 + "}"},
+            "config is nested too deep",
+        ),
+        ({}, {"format": FORMAT, "config": '{"a": "\\ud800"}'}, "config holds half a character"),
+        (
+            {},
+            {"format": FORMAT, "config": '{"fps": NaN}'},
+            "config holds a number that is not finite",
+        ),
+        (
+            {},
+            {"format": FORMAT, "config": '{"fps": 1%s}' % ("0" * 400)},
+            "config holds a number that is too large",
+        ),
+        ({}, {"format": "\x1b[31m" + "x" * 10**5}, r"format is '\\x1b\[31mx+…'"),
+        (
+            {"\x1b[2J": np.array([np.nan], np.float32)},
+            METADATA,
+            r"'\\x1b\[2J' holds values that are not numbers",
+        ),
+        ({"a": np.zeros((2, 2), np.int8)}, METADATA, "lacks its scales"),
+        (
+            {"a": np.zeros((2, 2), np.int8), "a.scale": np.zeros(3, np.float32)},
+            METADATA,
+            "lacks its scales",
+        ),
+        ({"a": np.array([np.nan], np.float32)}, METADATA, "not numbers"),
+        ({"a": np.array([1e300])}, METADATA, "not numbers"),
+    ],
+)
 def test_files_of_another_kind_are_refused(
-    tmp_path: Path, tensors: dict[str, np.ndarray], metadata: dict[str, str], said: str,
+    tmp_path: Path,
+    tensors: dict[str, np.ndarray],
+    metadata: dict[str, str],
+    said: str,
 ) -> None:
     write_safetensors(tmp_path / "w.safetensors", tensors, metadata)
     with pytest.raises(WeightsError, match=said):
@@ -134,14 +196,23 @@ def test_files_of_another_kind_are_refused(
 
 
 HOSTILE: dict[str, tuple[bytes | str | dict[str, object], bytes, int | None]] = {
-    "huge length": ("{}", b"", 2**63), "length over the file": ("{}", b"", 3), "zero length": ("{}", b"", 0),
+    "huge length": ("{}", b"", 2**63),
+    "length over the file": ("{}", b"", 3),
+    "zero length": ("{}", b"", 0),
     "header over a megabyte": ("{" + " " * (1 << 20) + "}", b"", None),
-    "not JSON": ("{'a'", b"", None), "not text": (b"\xff\xfe{}", b"", None), "deep": ("[" * 200000, b"", None),
-    "list": ("[]", b"", None), "number": ("17", b"", None), "huge number": ("9" * 100000, b"", None),
-    "metadata list": ({"__metadata__": []}, b"", None), "metadata number": ({"__metadata__": {"a": 1}}, b"", None),
-    "entry list": ({"a": []}, b"", None), "entry short": ({"a": {"dtype": "F32"}}, b"", None),
+    "not JSON": ("{'a'", b"", None),
+    "not text": (b"\xff\xfe{}", b"", None),
+    "deep": ("[" * 200000, b"", None),
+    "list": ("[]", b"", None),
+    "number": ("17", b"", None),
+    "huge number": ("9" * 100000, b"", None),
+    "metadata list": ({"__metadata__": []}, b"", None),
+    "metadata number": ({"__metadata__": {"a": 1}}, b"", None),
+    "entry list": ({"a": []}, b"", None),
+    "entry short": ({"a": {"dtype": "F32"}}, b"", None),
     "entry long": ({"a": {**entry(), "more": 1}}, bytes(8), None),
-    "type unknown": ({"a": entry("F31")}, bytes(8), None), "type list": ({"a": entry(["F32"])}, bytes(8), None),
+    "type unknown": ({"a": entry("F31")}, bytes(8), None),
+    "type list": ({"a": entry(["F32"])}, bytes(8), None),
     "type object": ({"a": entry("O")}, bytes(8), None),
     "shape negative": ({"a": entry(shape=[-2])}, bytes(8), None),
     "shape both negative": ({"a": entry(shape=[-2, -1])}, bytes(8), None),
@@ -155,28 +226,40 @@ HOSTILE: dict[str, tuple[bytes | str | dict[str, object], bytes, int | None]] = 
     "shape empty and wide": ({"a": entry(shape=[2**20, 0, 2**20], offsets=[0, 0])}, b"", None),
     "half a character": ('{"\\ud800": ' + json.dumps(entry()) + "}", bytes(8), None),
     "half a character in the metadata": ({"__metadata__": {"licence": "\ud800"}}, b"", None),
-    "deep within": ('{"a": ' + "[" * 500 + "]" * 500 + "}", b"", None), "endless number": ('{"a": 1e999}', b"", None),
+    "deep within": ('{"a": ' + "[" * 500 + "]" * 500 + "}", b"", None),
+    "endless number": ('{"a": 1e999}', b"", None),
     "shape deep": ({"a": entry(shape=[1] * 60 + [2])}, bytes(8), None),
     "size not of shape": ({"a": entry(shape=[3])}, bytes(8), None),
     "offsets negative": ({"a": entry(offsets=[-8, 0])}, bytes(8), None),
     "offsets reversed": ({"a": entry(offsets=[8, 0])}, bytes(8), None),
     "offsets three": ({"a": entry(offsets=[0, 8, 8])}, bytes(8), None),
-    "offsets not a number": ('{"a": {"dtype": "F32", "shape": [2], "data_offsets": [0, NaN]}}', bytes(8), None),
+    "offsets not a number": (
+        '{"a": {"dtype": "F32", "shape": [2], "data_offsets": [0, NaN]}}',
+        bytes(8),
+        None,
+    ),
     "beyond the file": ({"a": entry(offsets=[8, 16])}, bytes(8), None),
-    "truncated": ({"a": entry()}, bytes(7), None), "more than it says": ({"a": entry()}, bytes(9), None),
+    "truncated": ({"a": entry()}, bytes(7), None),
+    "more than it says": ({"a": entry()}, bytes(9), None),
     "overlap": ({"a": entry(), "b": entry(offsets=[4, 12])}, bytes(12), None),
     "same place": ({"a": entry(), "b": entry()}, bytes(8), None),
     "hole": ({"a": entry(), "b": entry(offsets=[12, 20])}, bytes(20), None),
     "hole at the start": ({"a": entry(offsets=[4, 12])}, bytes(12), None),
     "twice": ('{"a": %s, "a": %s}' % ((json.dumps(entry()),) * 2), bytes(8), None),
-    "twice within": ('{"a": {"dtype": "F32", "dtype": "F32", "shape": [2], "data_offsets": [0, 8]}}', bytes(8), None),
+    "twice within": (
+        '{"a": {"dtype": "F32", "dtype": "F32", "shape": [2], "data_offsets": [0, 8]}}',
+        bytes(8),
+        None,
+    ),
 }
 
 
 @pytest.mark.parametrize("case", HOSTILE)
 def test_hostile_headers_are_refused(tmp_path: Path, case: str) -> None:
     header, data, length = HOSTILE[case]
-    with pytest.raises(WeightsError, match=r"damaged .*; install the extension again or choose another file\.$"):
+    with pytest.raises(
+        WeightsError, match=r"damaged .*; install the extension again or choose another file\.$"
+    ):
         read_safetensors(put(tmp_path / "h.safetensors", header, data, length))
 
 
@@ -217,7 +300,9 @@ def test_flipped_bytes_never_do_anything_but_refuse_or_read(tmp_path: Path) -> N
     assert refused > 250
 
 
-def test_the_shipped_file_is_found_beside_the_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_shipped_file_is_found_beside_the_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(weights, "__file__", str(tmp_path / "dafnet_addon" / "core" / "weights.py"))
     folder = tmp_path / "weights_stub"
     folder.mkdir()

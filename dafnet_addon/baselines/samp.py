@@ -1,9 +1,11 @@
-"""SAMP, the paper's first comparison (section 6, Table 1): its MotionNet, how it is trained, and how it walks on by itself.
+"""SAMP, the paper's first comparison (section 6, Table 1): its MotionNet, how it is trained, and
+how it walks on by itself.
 
-Hassan et al. 2021, *Stochastic Scene-Aware Motion Prediction*: a conditional VAE whose decoder is a mixture of experts makes
-the next state of the last one. Three systems: "samp" goes where its own trajectory leads; "samp-a" is the same network, of
-which only the pose is fed back, all else being the truth's; "samp-ob" has the same architecture but DAFNet's input, and makes
-poses alone (section 6.1: it "failed to generate plausible motions").
+Hassan et al. 2021, *Stochastic Scene-Aware Motion Prediction*: a conditional VAE whose decoder is a
+mixture of experts makes the next state of the last one. Three systems: "samp" goes where its own
+trajectory leads; "samp-a" is the same network, of which only the pose is fed back, all else being
+the truth's; "samp-ob" has the same architecture but DAFNet's input, and makes poses alone (section
+6.1: it "failed to generate plausible motions").
 """
 
 from collections.abc import Callable, Sequence
@@ -46,16 +48,28 @@ from .samp_state import (
 )
 
 __all__ = [
-    "KINDS", "PAPER_SAMP", "SMALL_SAMP", "Blended", "MotionNet", "SampConfig", "SampTraining", "network_of", "run", "takes",
+    "KINDS",
+    "PAPER_SAMP",
+    "SMALL_SAMP",
+    "Blended",
+    "MotionNet",
+    "SampConfig",
+    "SampTraining",
+    "network_of",
+    "run",
+    "takes",
 ]
 
 KINDS = ("samp", "samp-a", "samp-ob")
-_TOLD = POSE_SIZE + 22  # of samp-ob: the observation and its mask; then come past poses and velocities
+# of samp-ob: the observation and its mask; then come past poses and velocities
+_TOLD = POSE_SIZE + 22
 _LIKE = ModelConfig(mask=True)
 _PAST = _LIKE.history * POSE_SIZE
 _KL = 0.1
-_FORCED, _FREE = 0.3, 0.6  # shares of the training: until the one, the truth is fed; from the other on, what was made
-_LEAST, _LEAST_SEEN = 2e-3, 0.05  # smallest deviations of states (metres, metres a second, …) and voxels
+# shares of the training: until the one, the truth is fed; from the other on, what was made
+_FORCED, _FREE = 0.3, 0.6
+# smallest deviations of states (metres, metres a second, …) and voxels
+_LEAST, _LEAST_SEEN = 2e-3, 0.05
 _MEASURED = 256  # windows whose states are measured for their mean and deviation
 _WIDE = 20.0  # deviations; what is fed back and farther off than that would soon be no number
 _PHASES = 50
@@ -63,9 +77,9 @@ _PHASES = 50
 
 @dataclass(frozen=True)
 class SampConfig:
-    """``width``: of experts, and of the first layers of encoder and gating. ``code``: of the encoders' later layers.
-    ``frames``: longest training sequence. ``mixed``: the loss is computed in bfloat16 where the device can, which halves its
-    cost on a CPU.
+    """``width``: of experts, and of the first layers of encoder and gating. ``code``: of the
+    encoders' later layers. ``frames``: longest training sequence. ``mixed``: the loss is computed
+    in bfloat16 where the device can, which halves its cost on a CPU.
     """
 
     width: int = 512
@@ -87,7 +101,9 @@ SMALL_SAMP = SampConfig(width=192, code=128, mixed=True)
 
 
 class Blended(nn.Module):
-    """A linear layer of each expert, their outputs (which is the same as their weights) blended by ``shares`` (N, experts)."""
+    """A linear layer of each expert, their outputs (which is the same as their weights) blended by
+    ``shares`` (N, experts).
+    """
 
     def __init__(self, inputs: int, outputs: int, experts: int) -> None:
         super().__init__()
@@ -101,11 +117,14 @@ class Blended(nn.Module):
 
 def _layers(*sizes: int) -> nn.Sequential:
     """Linear layers with an ELU after each."""
-    return nn.Sequential(*(layer for a, b in pairwise(sizes) for layer in (nn.Linear(a, b), nn.ELU())))
+    return nn.Sequential(
+        *(layer for a, b in pairwise(sizes) for layer in (nn.Linear(a, b), nn.ELU()))
+    )
 
 
 class MotionNet(nn.Module):
-    """The last state (N, inputs) and the interaction sensor (N, sensor) to the next state (N, outputs), all standardised.
+    """The last state (N, inputs) and the interaction sensor (N, sensor) to the next state (N,
+    outputs), all standardised.
 
     The means and deviations that standardise are kept here, so that a state dict says all.
     """
@@ -121,9 +140,13 @@ class MotionNet(nn.Module):
         super().__init__()
         c = self.config = config
         self.state_encoder = _layers(inputs + outputs, c.width, c.code, c.code)
-        self.sensor_encoder, self.interaction = (_layers(sensor, c.code, c.code, c.code) for _ in range(2))
+        self.sensor_encoder, self.interaction = (
+            _layers(sensor, c.code, c.code, c.code) for _ in range(2)
+        )
         self.posterior = nn.Linear(2 * c.code, 2 * c.latent)
-        self.gating = nn.Sequential(_layers(c.latent + inputs, c.width, c.width // 2), nn.Linear(c.width // 2, c.experts))
+        self.gating = nn.Sequential(
+            _layers(c.latent + inputs, c.width, c.width // 2), nn.Linear(c.width // 2, c.experts)
+        )
         self.first = Blended(c.latent + inputs + c.code, c.width, c.experts)
         self.second = Blended(c.latent + c.width, c.width, c.experts)
         self.third = Blended(c.latent + c.width, outputs, c.experts)
@@ -133,7 +156,9 @@ class MotionNet(nn.Module):
 
     def encode(self, before: Tensor, after: Tensor, sensor: Tensor) -> tuple[Tensor, Tensor]:
         """Mean and log variance (N, latent) of z, given the next state."""
-        hidden = torch.cat([self.state_encoder(torch.cat([before, after], -1)), self.sensor_encoder(sensor)], -1)
+        hidden = torch.cat(
+            [self.state_encoder(torch.cat([before, after], -1)), self.sensor_encoder(sensor)], -1
+        )
         mean, log_variance = self.posterior(hidden).chunk(2, dim=-1)
         return mean, log_variance
 
@@ -148,7 +173,9 @@ class MotionNet(nn.Module):
         hidden = F.elu(self.second(torch.cat([z, hidden], dim=-1), shares))
         return self.third(torch.cat([z, hidden], dim=-1), shares)
 
-    def forward(self, before: Tensor, after: Tensor, sensor: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def forward(
+        self, before: Tensor, after: Tensor, sensor: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor]:
         """The next state made with a z that knows it, and the mean and log variance of that."""
         mean, log_variance = self.encode(before, after, sensor)
         z = mean + (0.5 * log_variance).exp() * torch.randn_like(mean)
@@ -170,12 +197,17 @@ def network_of(kind: str, config: SampConfig) -> MotionNet:
 
 
 class SampTraining:
-    """Gives the loss of a batch of windows. Predictions are fed back as in scheduled sampling, without their gradients, and the
-    goal is always the true one, as the authors have it.
+    """Gives the loss of a batch of windows. Predictions are fed back as in scheduled sampling,
+    without their gradients, and the goal is always the true one, as the authors have it.
     """
 
     def __init__(
-        self, kind: str, config: SampConfig, statistics: Statistics, device: torch.device | str, pool: Pool
+        self,
+        kind: str,
+        config: SampConfig,
+        statistics: Statistics,
+        device: torch.device | str,
+        pool: Pool,
     ) -> None:
         self.kind, self.statistics, self.device = kind, statistics, torch.device(device)
         self.config = replace(config, mixed=config.mixed and precision.mixes(str(device)))
@@ -190,7 +222,9 @@ class SampTraining:
         self.network.to(self.device)
 
     def _states(self, pool: Pool, rows: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """States (B, F, 647), the next ones, sensors (B, F, 2048) and goals (B, F, 13, 11) of windows."""
+        """States (B, F, 647), the next ones, sensors (B, F, 2048) and goals (B, F, 13, 11) of
+        windows.
+        """
         phases = torch.randint(_PHASES, (len(rows),)).numpy()
         track, at = of_windows(pool.windows(rows, FIELDS), phases)
         first = int(torch.randint(max(1, len(at) - self.config.frames + 1), ()))
@@ -201,7 +235,8 @@ class SampTraining:
         return inputs_of(now), after, sensor_of(track.solid[track.which[:, at]], aim), now.goal
 
     def loss(self, pool: Pool, rows: Tensor, share: float) -> Tensor:
-        """Squared error, summed over a state, and 0.1 of z's KL divergence, means over the frames of windows ``rows``.
+        """Squared error, summed over a state, and 0.1 of z's KL divergence, means over the frames
+        of windows ``rows``.
 
         ``share`` of the training is done.
         """
@@ -213,7 +248,13 @@ class SampTraining:
             before = torch.cat([observation, given, batch.past], dim=-1)[:, frames]
             after = torch.cat([batch.upper, batch.lower], dim=-1)[:, frames]
             sensor = batch.occupancy[:, frames]
-            before = self._lived(before, after, sensor, share, lambda t, last, made: _remembered(before[:, t], last, made))
+            before = self._lived(
+                before,
+                after,
+                sensor,
+                share,
+                lambda t, last, made: _remembered(before[:, t], last, made),
+            )
         else:
             before, after, sensor, goals = (a.to(self.device) for a in self._states(pool, rows))
             before = (before - net.in_mean) / net.in_std
@@ -233,9 +274,15 @@ class SampTraining:
 
     @torch.no_grad()
     def _lived(
-        self, before: Tensor, after: Tensor, sensor: Tensor, share: float, fed: Callable[[int, Tensor, Tensor], Tensor]
+        self,
+        before: Tensor,
+        after: Tensor,
+        sensor: Tensor,
+        share: float,
+        fed: Callable[[int, Tensor, Tensor], Tensor],
     ) -> Tensor:
-        """``before`` (B, F, …), in which ever more frames are what the network itself makes of the frames before.
+        """``before`` (B, F, …), in which ever more frames are what the network itself makes of the
+        frames before.
 
         ``fed``: a frame's number, what was fed before it and what was made of that, to what is fed.
         """
@@ -254,23 +301,35 @@ def _take_statistics(network: MotionNet, statistics: Statistics) -> None:
     """What standardises samp-ob's input and pose: the flow's own means and deviations."""
     for name, constant in (("mean", 0.0), ("std", 1.0)):
         pose, velocity = (getattr(statistics, f"{what}_{name}") for what in ("pose", "velocity"))
-        told = np.concatenate([pose, np.full(22, constant), *[pose] * _LIKE.history, *[velocity] * (_LIKE.history + 1)])
+        told = np.concatenate(
+            [
+                pose,
+                np.full(22, constant),
+                *[pose] * _LIKE.history,
+                *[velocity] * (_LIKE.history + 1),
+            ]
+        )
         getattr(network, f"in_{name}").copy_(torch.from_numpy(told))
         getattr(network, f"out_{name}").copy_(torch.from_numpy(pose))
 
 
 def _remembered(told: Tensor, last: Tensor, made: Tensor) -> Tensor:
-    """What samp-ob is fed (B, 781): what it is ``told`` but for past poses, which are its ``last`` ones and the one made."""
+    """What samp-ob is fed (B, 781): what it is ``told`` but for past poses, which are its ``last``
+    ones and the one made.
+    """
     poses = torch.cat([last[:, _TOLD + POSE_SIZE : _TOLD + _PAST], made], dim=-1)
     return torch.cat([told[:, :_TOLD], poses, told[:, _TOLD + _PAST :]], dim=-1)
 
 
 @torch.no_grad()
-def _walked(network: MotionNet, clip: HeldClip, path: RootPath, noise: Tensor, own_root: bool) -> np.ndarray:
+def _walked(
+    network: MotionNet, clip: HeldClip, path: RootPath, noise: Tensor, own_root: bool
+) -> np.ndarray:
     """World joints (S, T, 22, 3) that follow from a clip's first pose, of ``noise`` (S, T, latent).
 
-    With its ``own_root``, the character goes where its trajectory leads, and is told the clip's goals one after another; else
-    root, trajectory, contacts and goals are the clip's along ``path``, and its own pose alone is fed back.
+    With its ``own_root``, the character goes where its trajectory leads, and is told the clip's
+    goals one after another; else root, trajectory, contacts and goals are the clip's along
+    ``path``, and its own pose alone is fed back.
     """
     one, at = of_clip(clip, path)
     track = one.repeated(len(noise))
@@ -282,7 +341,9 @@ def _walked(network: MotionNet, clip: HeldClip, path: RootPath, noise: Tensor, o
     for t, frame in enumerate(at[1:].tolist(), 1):
         seen = sensor_of(track.solid[track.which[:, frame - 1]], parts.goal[:, NOW])
         told = (inputs_of(parts) - network.in_mean) / network.in_std
-        state = network.decode(noise[:, t], told, (seen - network.sensor_mean) / network.sensor_std).clamp(-_WIDE, _WIDE)
+        state = network.decode(
+            noise[:, t], told, (seen - network.sensor_mean) / network.sensor_std
+        ).clamp(-_WIDE, _WIDE)
         made, from_goal = split(state * network.out_std + network.out_mean)
         made = read(made, parts.pose)
         if own_root:
@@ -303,7 +364,8 @@ def _walked(network: MotionNet, clip: HeldClip, path: RootPath, noise: Tensor, o
 
 @torch.no_grad()
 def run(network: MotionNet, conditions: Conditions, z: np.ndarray) -> np.ndarray:
-    """Poses (T, B, 66), SMPL order, metres, of samp-ob, each fed back: of ``z`` (B, latent) held, or (T, B, latent).
+    """Poses (T, B, 66), SMPL order, metres, of samp-ob, each fed back: of ``z`` (B, latent) held,
+    or (T, B, latent).
 
     The past is the mean pose at first.
     """
@@ -313,7 +375,9 @@ def run(network: MotionNet, conditions: Conditions, z: np.ndarray) -> np.ndarray
     free = np.where(given > 0, conditions.observation, network.out_mean.numpy())
     velocity = velocities_up_to(conditions.velocity, _LIKE.history)
     poses = np.tile(network.out_mean.numpy(), (frames, _LIKE.history))
-    told = torch.from_numpy(np.concatenate([free, conditions.given, poses, velocity], axis=1)).float()
+    told = torch.from_numpy(
+        np.concatenate([free, conditions.given, poses, velocity], axis=1)
+    ).float()
     told = (told - network.in_mean) / network.in_std
     seen = torch.from_numpy(conditions.occupancy).float()
     last = told[0].repeat(noise.shape[1], 1)
@@ -325,8 +389,11 @@ def run(network: MotionNet, conditions: Conditions, z: np.ndarray) -> np.ndarray
     return smpl_order(torch.stack(out).double().numpy())
 
 
-def takes(network: MotionNet, clip: HeldClip, shot: Shot, seeds: Sequence[int | None], kind: str) -> np.ndarray:
-    """Takes (S, T, 22, 3) of a clip, world joints on constant bones, one for each seed; None is z = 0, its mean.
+def takes(
+    network: MotionNet, clip: HeldClip, shot: Shot, seeds: Sequence[int | None], kind: str
+) -> np.ndarray:
+    """Takes (S, T, 22, 3) of a clip, world joints on constant bones, one for each seed; None is z =
+    0, its mean.
 
     As in SAMP, z is drawn anew for each frame. ``shot`` is what DAFNet is told of the clip.
     """
@@ -334,10 +401,18 @@ def takes(network: MotionNet, clip: HeldClip, shot: Shot, seeds: Sequence[int | 
     noise = np.zeros((len(seeds), frames, network.config.latent))
     for s, seed in enumerate(seeds):
         if seed is not None:
-            noise[s] = np.random.default_rng([abs(seed), int(seed < 0)]).standard_normal(noise[s].shape)
+            noise[s] = np.random.default_rng([abs(seed), int(seed < 0)]).standard_normal(
+                noise[s].shape
+            )
     if kind == "samp-ob":
         poses = run(network, shot.conditions, noise.swapaxes(0, 1))
-        joints = [to_world(shot.path, poses[PREROLL:, s].reshape(-1, 22, 3)) for s in range(len(seeds))]
+        joints = [
+            to_world(shot.path, poses[PREROLL:, s].reshape(-1, 22, 3)) for s in range(len(seeds))
+        ]
     else:
-        joints = list(_walked(network, clip, shot.path, torch.from_numpy(noise).float(), own_root=kind == "samp"))
+        joints = list(
+            _walked(
+                network, clip, shot.path, torch.from_numpy(noise).float(), own_root=kind == "samp"
+            )
+        )
     return np.stack([on_bones(take) for take in joints])

@@ -29,10 +29,15 @@ def _beside(file: Path, kind: str, clip: HeldClip) -> Measured:
 
 
 def measured_samp(
-    file: Path, kind: str, clips: Sequence[HeldClip], progress: Callable[[float], None] = lambda share: None
+    file: Path,
+    kind: str,
+    clips: Sequence[HeldClip],
+    progress: Callable[[float], None] = lambda share: None,
 ) -> list[Measured]:
-    """Every clip beside itself: "samp" and "samp-a" in FREE, which is all that they know, "samp-ob" also in EE.
+    """Every clip beside itself: "samp" and "samp-a" in FREE, which is all that they know, "samp-ob"
+    also in EE.
 
-    ``file`` is a checkpoint of ``train_samp``. "t0" is z at its mean, "t1" z drawn anew for each frame, with ``SEEDS`` seeds.
+    ``file`` is a checkpoint of ``train_samp``. "t0" is z at its mean, "t1" z drawn anew for each
+    frame, with ``SEEDS`` seeds.
     """
     return list(spread_out(partial(_beside, file, kind), clips, progress=progress))

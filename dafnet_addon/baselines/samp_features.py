@@ -1,7 +1,8 @@
-"""What SAMP is told of motions: their tracks, with contacts, actions and goals, from training windows and held-out clips.
+"""What SAMP is told of motions: their tracks, with contacts, actions and goals, from training
+windows and held-out clips.
 
-The states of a track are made by ``parts_of``; see ``samp_state``. Our data have no labels: actions follow from the root's
-speed and the pelvis' height, goals from where the pelvis comes to rest.
+The states of a track are made by ``parts_of``; see ``samp_state``. Our data have no labels: actions
+follow from the root's speed and the pelvis' height, goals from where the pelvis comes to rest.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,7 +29,8 @@ FIELDS = ("poses", "velocity", "ahead", "root", "boxes")
 """What is needed of training windows."""
 
 _SECOND = 30
-_SEGMENT = 50  # frames between two way points, so that a goal is 1 to 2.7 seconds ahead, as in a training window
+# frames between two way points, so that a goal is 1 to 2.7 seconds ahead, as in a training window
+_SEGMENT = 50
 _HORIZON = 80  # frames before a rest in which it is the goal
 _SITS_UNDER, _STILL, _SLOW, _FAST = 0.80, 0.25, 0.3, 2.2  # pelvis, metres; root, metres a second
 _SEAT = 0.25, 0.78  # heights of tops that one sits on, metres
@@ -38,10 +40,12 @@ _PELVIS, _NECK, _TOUCHES = joint("pelvis"), joint("neck"), CONTACTS.index("pelvi
 
 @dataclass(frozen=True)
 class Track:
-    """B motions with what is known around them. ``root`` (B, N, 4): places. ``joints`` (B, K, 22, 3), ``axes`` (B, K, 22, 6):
-    forward and up of each joint's frame, ``velocity`` (B, K, 22, 3), all in the world, of frames ``first`` to ``first`` + K.
-    ``contacts`` (B, N, 5), ``action`` (B, N, 5). ``goal`` (B, N, 5): where one is going to, a place and a height over the
-    floor; ``goal_action`` (B, N, 5). ``solid`` (U, 512): occupancies of the voxels at all seats; ``which`` (B, N): the goal's.
+    """B motions with what is known around them. ``root`` (B, N, 4): places. ``joints`` (B, K, 22,
+    3), ``axes`` (B, K, 22, 6): forward and up of each joint's frame, ``velocity`` (B, K, 22, 3),
+    all in the world, of frames ``first`` to ``first`` + K. ``contacts`` (B, N, 5), ``action`` (B,
+    N, 5). ``goal`` (B, N, 5): where one is going to, a place and a height over the floor;
+    ``goal_action`` (B, N, 5). ``solid`` (U, 512): occupancies of the voxels at all seats; ``which``
+    (B, N): the goal's.
     """
 
     first: int
@@ -58,7 +62,9 @@ class Track:
 
     def repeated(self, count: int) -> "Track":
         """This one motion ``count`` times."""
-        many = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("first", "solid")}
+        many = {
+            f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("first", "solid")
+        }
         return replace(self, **{name: a.expand(count, *a.shape[1:]) for name, a in many.items()})
 
 
@@ -67,8 +73,12 @@ def parts_of(track: Track, at: Tensor, seen: Tensor) -> Parts:
     frame, k = track.root[:, seen], at - track.first
     pose = torch.cat([track.joints[:, k], track.axes[:, k], track.velocity[:, k]], dim=-1)
     around = at[:, None] + OFFSETS
-    trajectory = torch.cat([seen_from(track.root[:, around], frame[:, :, None]), track.action[:, around]], dim=-1)
-    return Parts(pose_seen(pose, frame), trajectory, track.contacts[:, at], goals_seen(track, at, frame))
+    trajectory = torch.cat(
+        [seen_from(track.root[:, around], frame[:, :, None]), track.action[:, around]], dim=-1
+    )
+    return Parts(
+        pose_seen(pose, frame), trajectory, track.contacts[:, at], goals_seen(track, at, frame)
+    )
 
 
 def goals_seen(track: Track, at: Tensor, frame: Tensor) -> Tensor:
@@ -77,12 +87,19 @@ def goals_seen(track: Track, at: Tensor, frame: Tensor) -> Tensor:
     goal, frame = track.goal[:, around], frame[:, :, None]
     place = seen_from(goal[..., :4], frame)
     flat = torch.zeros_like(place[..., :1])
-    return torch.cat([place[..., :2], goal[..., 4:], place[..., 2:], flat, track.goal_action[:, around]], dim=-1)
+    return torch.cat(
+        [place[..., :2], goal[..., 4:], place[..., 2:], flat, track.goal_action[:, around]], dim=-1
+    )
 
 
 def _solid(boxes: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Occupancy (512,) of upright ``boxes`` (M, 7) in the voxels at a place x, y, yaw; 1 inside, 0 a cell away."""
-    near = boxes[np.linalg.norm(boxes[:, :2] - place[:2], axis=1) < 1.0 + np.linalg.norm(boxes[:, 3:5], axis=1)]
+    """Occupancy (512,) of upright ``boxes`` (M, 7) in the voxels at a place x, y, yaw; 1 inside, 0
+    a cell away.
+    """
+    near = boxes[
+        np.linalg.norm(boxes[:, :2] - place[:2], axis=1)
+        < 1.0 + np.linalg.norm(boxes[:, 3:5], axis=1)
+    ]
     if not len(near):
         return np.zeros(len(VOXELS))
     points = rotate(yaw_matrix(place[2]), VOXELS.numpy().astype(float))
@@ -96,7 +113,9 @@ def _places(root: np.ndarray) -> np.ndarray:
 
 
 def _actions(root: np.ndarray, low: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """Shares of ``ACTIONS`` (B, N, 5) of roots (B, N, 3) whose pelvis is ``low`` and whose trunk ``level`` (B, N)."""
+    """Shares of ``ACTIONS`` (B, N, 5) of roots (B, N, 3) whose pelvis is ``low`` and whose trunk
+    ``level`` (B, N).
+    """
     speed = _speed(root)
     kind = np.where(speed > _FAST, 2, np.where(speed > _SLOW, 1, 0))
     one = np.eye(len(ACTIONS))[np.where(low & level, 4, np.where(low, 3, kind))]
@@ -114,15 +133,24 @@ def _speed(root: np.ndarray) -> np.ndarray:
 
 
 def _goals(
-    root: np.ndarray, height: np.ndarray, action: np.ndarray, still: np.ndarray, boxes: np.ndarray, phase: int
+    root: np.ndarray,
+    height: np.ndarray,
+    action: np.ndarray,
+    still: np.ndarray,
+    boxes: np.ndarray,
+    phase: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Goals (N, 5) of one motion, their actions (N, 5), which seat each is (N,; 0: none), and the seats' solids (512,).
+    """Goals (N, 5) of one motion, their actions (N, 5), which seat each is (N,; 0: none), and the
+    seats' solids (512,).
 
-    A goal is the next place where the pelvis is ``still`` (N,) on something, until one gets up from there; where none is near,
-    a way point of the root (N, 3) itself, as SAMP's path planner gives them. ``height`` (N,): of the seat under a low pelvis.
+    A goal is the next place where the pelvis is ``still`` (N,) on something, until one gets up from
+    there; where none is near, a way point of the root (N, 3) itself, as SAMP's path planner gives
+    them. ``height`` (N,): of the seat under a low pelvis.
     """
     frames = np.arange(len(root))
-    point = np.minimum(_SEGMENT * ((frames + _SECOND + phase) // _SEGMENT + 1) - phase, len(root) - 1)
+    point = np.minimum(
+        _SEGMENT * ((frames + _SECOND + phase) // _SEGMENT + 1) - phase, len(root) - 1
+    )
     place, rise, does = root[point].copy(), height[point].copy(), action[point].copy()
     which, solids = np.zeros(len(root), dtype=int), []
     for start, end in reversed(runs(still, 8)):
@@ -135,15 +163,26 @@ def _goals(
 
 
 def _track(
-    root: np.ndarray, joints: np.ndarray, first: int, low: np.ndarray, level: np.ndarray, height: np.ndarray,
-    touches: np.ndarray, boxes: Sequence[np.ndarray], phases: np.ndarray,
+    root: np.ndarray,
+    joints: np.ndarray,
+    first: int,
+    low: np.ndarray,
+    level: np.ndarray,
+    height: np.ndarray,
+    touches: np.ndarray,
+    boxes: Sequence[np.ndarray],
+    phases: np.ndarray,
 ) -> Track:
-    """Tracks of roots (B, N, 3), world joints (B, K, 22, 3) from frame ``first`` on, and what is known of all frames (B, N)."""
+    """Tracks of roots (B, N, 3), world joints (B, K, 22, 3) from frame ``first`` on, and what is
+    known of all frames (B, N).
+    """
     action = _actions(root, low, level)
     goals, does, seats, solids = [], [], [], [np.zeros(len(VOXELS))]
     for b in range(len(root)):
         still = touches[b, :, _TOUCHES] > 0
-        goal, act, which, found = _goals(root[b], height[b], action[b], still, boxes[b], int(phases[b]))
+        goal, act, which, found = _goals(
+            root[b], height[b], action[b], still, boxes[b], int(phases[b])
+        )
         seats.append(np.where(which > 0, which + len(solids) - 1, 0))
         goals.append(goal)
         does.append(act)
@@ -155,8 +194,15 @@ def _track(
     if joints.shape[1] > 1:
         velocity[:, 0] = velocity[:, 1]
     arrays = {
-        "root": _places(root), "joints": joints, "axes": axes, "velocity": velocity, "contacts": touches, "action": action,
-        "goal": np.stack(goals), "goal_action": np.stack(does), "solid": np.stack(solids),
+        "root": _places(root),
+        "joints": joints,
+        "axes": axes,
+        "velocity": velocity,
+        "contacts": touches,
+        "action": action,
+        "goal": np.stack(goals),
+        "goal_action": np.stack(does),
+        "solid": np.stack(solids),
     }
     tensors = {name: torch.from_numpy(a).float() for name, a in arrays.items()}
     return Track(first=first, which=torch.from_numpy(np.stack(seats)), **tensors)
@@ -169,10 +215,12 @@ def _posture(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def of_windows(windows: Mapping[str, np.ndarray], phases: np.ndarray) -> tuple[Track, Tensor]:
-    """Tracks of B training windows (``data.windows.Window``), and the frames (50,) after which the next is known, too.
+    """Tracks of B training windows (``data.windows.Window``), and the frames (50,) after which the
+    next is known, too.
 
-    The root is known from one frame before the first pose (by the velocities) to a second after the last (by the way ahead):
-    111 frames, the second of which is the first pose's. ``phases`` (B,): when the way points change.
+    The root is known from one frame before the first pose (by the velocities) to a second after the
+    last (by the way ahead): 111 frames, the second of which is the first pose's. ``phases`` (B,):
+    when the way points change.
     """
     root = _window_root(windows["root"], windows["velocity"], windows["ahead"])
     poses = windows["poses"].reshape(len(root), 80, 22, 3) * POSE_UNIT
@@ -182,8 +230,11 @@ def of_windows(windows: Mapping[str, np.ndarray], phases: np.ndarray) -> tuple[T
     touched = np.stack([contacts(j) for j in joints]).astype(float)
     low = (height < _SITS_UNDER) | (touched[..., _TOUCHES] > 0)
     seat = np.where(low, height - SEAT_TO_PELVIS, 0.0)
-    # Nobody knows the pose after the last: it sits where a seat is under a root that stays, or goes on sitting.
-    top = np.stack([_seat_under(b, p) for b, p in zip(windows["boxes"], root[:, 81:, :2], strict=True)])
+    # Nobody knows the pose after the last: it sits where a seat is under a root that stays, or goes
+    # on sitting.
+    top = np.stack(
+        [_seat_under(b, p) for b, p in zip(windows["boxes"], root[:, 81:, :2], strict=True)]
+    )
     stays = _speed(root)[:, 81:] < _STILL
     goes_on = low[:, -1:] & (np.linalg.norm(root[:, 81:, :2] - root[:, 80:81, :2], axis=-1) < 0.25)
     later = (stays & (top > 0)) | goes_on
@@ -196,8 +247,15 @@ def of_windows(windows: Mapping[str, np.ndarray], phases: np.ndarray) -> tuple[T
     level_later = np.repeat(level[:, -1:] & low[:, -1:], _SECOND, axis=1)
     heights = np.where(later, np.where(goes_on, seat[:, -1:], top), 0.0)
     track = _track(
-        root, joints[:, 28:], 29, whole(low, later), whole(level, level_later), whole(seat, heights), whole(touched, on),
-        list(windows["boxes"]), phases,
+        root,
+        joints[:, 28:],
+        29,
+        whole(low, later),
+        whole(level, level_later),
+        whole(seat, heights),
+        whole(touched, on),
+        list(windows["boxes"]),
+        phases,
     )
     return track, torch.arange(30, 80)
 
@@ -218,7 +276,9 @@ def _window_root(root: np.ndarray, velocity: np.ndarray, ahead: np.ndarray) -> n
 
 
 def _seat_under(boxes: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Height of what one may sit on over each floor point (N, 2), 0 where there is nothing, of ``boxes`` (M, 7)."""
+    """Height of what one may sit on over each floor point (N, 2), 0 where there is nothing, of
+    ``boxes`` (M, 7).
+    """
     top = boxes[:, 2] + boxes[:, 5]
     seats = boxes[(top > _SEAT[0]) & (top < _SEAT[1])]
     offset = points[:, None] - seats[:, :2]
@@ -229,14 +289,18 @@ def _seat_under(boxes: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def of_clip(clip: HeldClip, path: RootPath) -> tuple[Track, Tensor]:
-    """The track (B = 1) of a held-out clip along its root ``path`` (T), and the frames (T,) of its poses.
+    """The track (B = 1) of a held-out clip along its root ``path`` (T), and the frames (T,) of its
+    poses.
 
     Before its first frame and after its last, the path goes on as it moves there.
     """
     root = np.concatenate([path.position[:, :2], path.yaw[:, None]], axis=1)
     steps = np.arange(1, _SECOND + 2)[:, None]
     one = min(1, len(root) - 1)
-    before, after = root[:1] - (root[one] - root[0]) * steps[::-1], root[-1:] + (root[-1] - root[-1 - one]) * steps[:-1]
+    before, after = (
+        root[:1] - (root[one] - root[0]) * steps[::-1],
+        root[-1:] + (root[-1] - root[-1 - one]) * steps[:-1],
+    )
     root = np.concatenate([before, root, after])[None]
     height, level = _posture(clip.joints)
     touched = contacts(clip.joints).astype(float)
@@ -249,6 +313,14 @@ def of_clip(clip: HeldClip, path: RootPath) -> tuple[Track, Tensor]:
         return np.concatenate([known[:1]] * len(steps) + [known] + [known[-1:]] * _SECOND)[None]
 
     track = _track(
-        root, clip.joints[None], len(steps), whole(low), whole(level), whole(seat), whole(touched), [clip.boxes], np.zeros(1)
+        root,
+        clip.joints[None],
+        len(steps),
+        whole(low),
+        whole(level),
+        whole(seat),
+        whole(touched),
+        [clip.boxes],
+        np.zeros(1),
     )
     return track, torch.arange(len(steps), len(steps) + len(path))

@@ -1,12 +1,16 @@
-"""The state of SAMP's MotionNet, 647 values: what it holds, how it is seen from another root, how it is fed back.
+"""The state of SAMP's MotionNet, 647 values: what it holds, how it is seen from another root, how
+it is fed back.
 
-Hassan et al. 2021, *Stochastic Scene-Aware Motion Prediction*. A state holds the pose (22 × [position, forward, up, velocity]),
-its joints seen from where the root will be in a second (22 × 3), the trajectory (13 samples from a second ago to a second
-ahead × [place, direction, action]), contacts (5), the trajectory seen from the goal (13 × 4), and the goal at each of these
-times (13 × [place, direction, action]). What the network is given of a frame is seen from that frame's root; what it makes of
-the next frame is seen from the same root, its joints from the same future root, its trajectory from the same goal.
+Hassan et al. 2021, *Stochastic Scene-Aware Motion Prediction*. A state holds the pose (22 ×
+[position, forward, up, velocity]), its joints seen from where the root will be in a second (22 ×
+3), the trajectory (13 samples from a second ago to a second ahead × [place, direction, action]),
+contacts (5), the trajectory seen from the goal (13 × 4), and the goal at each of these times (13 ×
+[place, direction, action]). What the network is given of a frame is seen from that frame's root;
+what it makes of the next frame is seen from the same root, its joints from the same future root,
+its trajectory from the same goal.
 
-A place on the floor is (…, 4): x, y, and the unit vector that looks forward. Metres, seconds, 30 frames a second, z up.
+A place on the floor is (…, 4): x, y, and the unit vector that looks forward. Metres, seconds, 30
+frames a second, z up.
 """
 
 from dataclasses import dataclass, replace
@@ -20,9 +24,30 @@ from ..core.skeleton import OFFSETS as BONES
 from ..core.skeleton import PARENTS
 
 __all__ = [
-    "ACTIONS", "CELL", "FPS", "LAST", "NOW", "OFFSETS", "SENSOR", "STATE", "VOXELS", "Parts", "clean_place", "following",
-    "goal_place", "inputs_of", "led", "placed_back", "points_back", "points_seen", "pose_seen", "read", "seen_from",
-    "sensor_of", "split", "state_of",
+    "ACTIONS",
+    "CELL",
+    "FPS",
+    "LAST",
+    "NOW",
+    "OFFSETS",
+    "SENSOR",
+    "STATE",
+    "VOXELS",
+    "Parts",
+    "clean_place",
+    "following",
+    "goal_place",
+    "inputs_of",
+    "led",
+    "placed_back",
+    "points_back",
+    "points_seen",
+    "pose_seen",
+    "read",
+    "seen_from",
+    "sensor_of",
+    "split",
+    "state_of",
 ]
 
 ACTIONS = ("idle", "walk", "run", "sit", "lie")
@@ -42,8 +67,8 @@ VOXELS = (_LATTICE - torch.tensor([4.0, 4.0, 0.0])) * CELL
 
 @dataclass(frozen=True)
 class Parts:
-    """A state without what follows from it: ``pose`` (…, 22, 12), ``trajectory`` (…, 13, 9), ``contacts`` (…, 5), ``goal``
-    (…, 13, 11), all seen from one root.
+    """A state without what follows from it: ``pose`` (…, 22, 12), ``trajectory`` (…, 13, 9),
+    ``contacts`` (…, 5), ``goal`` (…, 13, 11), all seen from one root.
     """
 
     pose: Tensor
@@ -53,7 +78,9 @@ class Parts:
 
 
 def _turned(v: Tensor, forward: Tensor) -> Tensor:
-    """Horizontal vectors (…, 2 or 3) as one sees them who looks along ``forward`` (…, 2); the height stays."""
+    """Horizontal vectors (…, 2 or 3) as one sees them who looks along ``forward`` (…, 2); the
+    height stays.
+    """
     x, y, fx, fy = v[..., 0], v[..., 1], forward[..., 0], forward[..., 1]
     flat = torch.stack([x * fy - y * fx, x * fx + y * fy], dim=-1)
     return torch.cat([flat, v[..., 2:].expand(*flat.shape[:-1], -1)], dim=-1)
@@ -76,12 +103,16 @@ def points_back(points: Tensor, frame: Tensor) -> Tensor:
 
 def seen_from(place: Tensor, frame: Tensor) -> Tensor:
     """Places (…, 4) seen from places (…, 4)."""
-    return torch.cat([points_seen(place[..., :2], frame), _turned(place[..., 2:], frame[..., 2:])], dim=-1)
+    return torch.cat(
+        [points_seen(place[..., :2], frame), _turned(place[..., 2:], frame[..., 2:])], dim=-1
+    )
 
 
 def placed_back(place: Tensor, frame: Tensor) -> Tensor:
     """Inverse of ``seen_from``."""
-    return torch.cat([points_back(place[..., :2], frame), _turned_back(place[..., 2:], frame[..., 2:])], dim=-1)
+    return torch.cat(
+        [points_back(place[..., :2], frame), _turned_back(place[..., 2:], frame[..., 2:])], dim=-1
+    )
 
 
 def pose_seen(pose: Tensor, frame: Tensor) -> Tensor:
@@ -97,13 +128,22 @@ def goal_place(goal: Tensor) -> Tensor:
 
 
 def state_of(parts: Parts, last: Tensor, aim: Tensor) -> Tensor:
-    """States (…, 647), with joints seen from the place ``last`` (…, 4), the trajectory from the goal's place ``aim`` (…, 4)."""
+    """States (…, 647), with joints seen from the place ``last`` (…, 4), the trajectory from the
+    goal's place ``aim`` (…, 4).
+    """
     from_last = points_seen(parts.pose[..., :3], last[..., None, :])
     from_goal = seen_from(parts.trajectory[..., :4], aim[..., None, :])
-    return torch.cat([
-        parts.pose.flatten(-2), from_last.flatten(-2), parts.trajectory.flatten(-2), parts.contacts, from_goal.flatten(-2),
-        parts.goal.flatten(-2),
-    ], dim=-1)
+    return torch.cat(
+        [
+            parts.pose.flatten(-2),
+            from_last.flatten(-2),
+            parts.trajectory.flatten(-2),
+            parts.contacts,
+            from_goal.flatten(-2),
+            parts.goal.flatten(-2),
+        ],
+        dim=-1,
+    )
 
 
 def inputs_of(parts: Parts) -> Tensor:
@@ -114,14 +154,20 @@ def inputs_of(parts: Parts) -> Tensor:
 def split(state: Tensor) -> tuple[Parts, Tensor]:
     """The parts of states (…, 647), and their trajectory seen from the goal (…, 13, 4)."""
     pose, _, trajectory, touches, from_goal, goal = state.split(list(_SIZES), dim=-1)
-    parts = Parts(*(
-        pose.unflatten(-1, (22, 12)), trajectory.unflatten(-1, (_SAMPLES, 9)), touches, goal.unflatten(-1, (_SAMPLES, 11))
-    ))
+    parts = Parts(
+        *(
+            pose.unflatten(-1, (22, 12)),
+            trajectory.unflatten(-1, (_SAMPLES, 9)),
+            touches,
+            goal.unflatten(-1, (_SAMPLES, 11)),
+        )
+    )
     return parts, from_goal.unflatten(-1, (_SAMPLES, 4))
 
 
 def sensor_of(solid: Tensor, goal: Tensor) -> Tensor:
-    """The voxels (…, 2048) at goals (…, 11) seen from the root: centre and occupancy of each; zero where there is no seat.
+    """The voxels (…, 2048) at goals (…, 11) seen from the root: centre and occupancy of each; zero
+    where there is no seat.
 
     ``solid`` (…, 512) in the goal's frame.
     """
@@ -136,14 +182,16 @@ def clean_place(place: Tensor) -> Tensor:
 
 
 def following(made: Parts, goal: Tensor, root: Tensor | None = None) -> Parts:
-    """The next state as it is fed back: seen from the next ``root`` (B, 4), or from where the made trajectory has it, and with
-    the true ``goal`` (B, 13, 11) seen from there.
+    """The next state as it is fed back: seen from the next ``root`` (B, 4), or from where the made
+    trajectory has it, and with the true ``goal`` (B, 13, 11) seen from there.
     """
     places = clean_place(made.trajectory[..., :4])
     root = places[..., NOW, :] if root is None else root
     axes = F.normalize(made.pose[..., 3:9].unflatten(-1, (2, 3)), dim=-1).flatten(-2)
     pose = torch.cat([made.pose[..., :3], axes, made.pose[..., 9:]], dim=-1)
-    trajectory = torch.cat([seen_from(places, root[..., None, :]), made.trajectory[..., 4:].clamp(0.0, 1.0)], dim=-1)
+    trajectory = torch.cat(
+        [seen_from(places, root[..., None, :]), made.trajectory[..., 4:].clamp(0.0, 1.0)], dim=-1
+    )
     return Parts(pose_seen(pose, root), trajectory, made.contacts.clamp(0.0, 1.0), goal)
 
 
@@ -157,13 +205,16 @@ def _on_bones(joints: Tensor) -> Tensor:
 
 
 def read(made: Parts, last: Tensor) -> Parts:
-    """The pose as the authors' program reads it: half its positions, half the ``last`` ones moved on by its velocities."""
+    """The pose as the authors' program reads it: half its positions, half the ``last`` ones moved
+    on by its velocities.
+    """
     positions = 0.5 * (made.pose[..., :3] + last[..., :3] + made.pose[..., 9:] / FPS)
     return replace(made, pose=torch.cat([_on_bones(positions), made.pose[..., 3:]], dim=-1))
 
 
 def led(made: Parts, from_goal: Tensor, goal: Tensor) -> Parts:
-    """The future trajectory led to the ``goal`` (B, 13, 11): near it, and late, the one that was made as the goal sees it.
+    """The future trajectory led to the ``goal`` (B, 13, 11): near it, and late, the one that was
+    made as the goal sees it.
 
     The weight is the authors' program's: ((k - 6) / 7) ^ (100 d²), d metres from the goal.
     """
@@ -171,5 +222,12 @@ def led(made: Parts, from_goal: Tensor, goal: Tensor) -> Parts:
     other = placed_back(clean_place(from_goal), goal_place(goal[..., NOW, :])[..., None, :])
     distance = (places[..., :2] - goal[..., :2]).norm(dim=-1)
     late = ((torch.arange(len(OFFSETS)) - NOW).clamp_min(0) / 7.0).to(places)
-    weight = torch.where(late > 0, late.clamp_min(1e-6) ** (100.0 * distance.square()), 0.0)[..., None]
-    return replace(made, trajectory=torch.cat([places + weight * (other - places), made.trajectory[..., 4:]], dim=-1))
+    weight = torch.where(late > 0, late.clamp_min(1e-6) ** (100.0 * distance.square()), 0.0)[
+        ..., None
+    ]
+    return replace(
+        made,
+        trajectory=torch.cat(
+            [places + weight * (other - places), made.trajectory[..., 4:]], dim=-1
+        ),
+    )

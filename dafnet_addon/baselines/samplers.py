@@ -1,4 +1,6 @@
-"""Runs the flows that DAFNet is compared with (``flows``), by the core's sampler with other parts or told of other things."""
+"""Runs the flows that DAFNet is compared with (``flows``), by the core's sampler with other parts
+or told of other things.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -42,11 +44,18 @@ class LowerFirstSampler(Sampler):
     parts = {name: Sampler.parts[name] for name in ("lower", "upper")}
 
 
-_SAMPLERS = {"dafnet": Sampler, "lower-first": LowerFirstSampler, "ap-p": WholeBodySampler, "moglow": MoGlowSampler}
+_SAMPLERS = {
+    "dafnet": Sampler,
+    "lower-first": LowerFirstSampler,
+    "ap-p": WholeBodySampler,
+    "moglow": MoGlowSampler,
+}
 
 
 def sampler_of(weights: Weights, device: str | None = None) -> Sampler:
-    """The sampler of the system that the weights are of. Raises WeightsError where the file does not fit it."""
+    """The sampler of the system that the weights are of. Raises WeightsError where the file does
+    not fit it.
+    """
     model = weights.config.get("model")
     system = model.get("system", "dafnet") if isinstance(model, dict) else "dafnet"
     known = isinstance(system, str) and system in _SAMPLERS

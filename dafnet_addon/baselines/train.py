@@ -1,4 +1,6 @@
-"""Trains SAMP's networks, with the budget, the learning rates and the resuming of the flows (``training.train``)."""
+"""Trains SAMP's networks, with the budget, the learning rates and the resuming of the flows
+(``training.train``).
+"""
 
 import math
 from collections.abc import Callable
@@ -16,13 +18,19 @@ __all__ = ["load_samp", "train_samp"]
 
 
 def train_samp(
-    kind: str, config: SampConfig, dataset: Path, file: Path, training: TrainingConfig, threads: int = 1,
+    kind: str,
+    config: SampConfig,
+    dataset: Path,
+    file: Path,
+    training: TrainingConfig,
+    threads: int = 1,
     progress: Callable[[float, float], None] = lambda share, loss: None,
 ) -> int:
-    """Train "samp" or "samp-ob", or go on with it, until its budget is spent; the number of steps that it took.
+    """Train "samp" or "samp-ob", or go on with it, until its budget is spent; the number of steps
+    that it took.
 
-    ``file`` is saved as it goes; a loss that is no number stops the run with the last good state kept. Raises InputError then,
-    without a dataset, and where ``file`` is another network's.
+    ``file`` is saved as it goes; a loss that is no number stops the run with the last good state
+    kept. Raises InputError then, without a dataset, and where ``file`` is another network's.
     """
     torch.set_num_threads(threads)
     torch.manual_seed(training.seed)
@@ -46,7 +54,10 @@ def train_samp(
         if step % training.save_every == 0 or training.share(step, seconds) >= 1.0:
             mean = sum(losses) / len(losses)
             if not math.isfinite(mean):
-                raise InputError(f"The loss of '{kind}' is no number by step {step}; resume with a lower peak rate.")
+                raise InputError(
+                    f"The loss of '{kind}' is no number by step {step}; resume with a lower peak "
+                    "rate."
+                )
             drawn = {f"generator.{name}": state for name, state in generators(device).items()}
             state = {"kind": kind, "config": asdict(run.config), "step": step, "seconds": seconds}
             write_checkpoint(file, {**of_training(run.network, optimiser), **drawn}, state)
@@ -56,7 +67,9 @@ def train_samp(
 
 
 def load_samp(file: Path) -> tuple[str, MotionNet]:
-    """The kind and the network of a checkpoint. Raises InputError where it is none of SAMP's, or damaged."""
+    """The kind and the network of a checkpoint. Raises InputError where it is none of SAMP's, or
+    damaged.
+    """
     kept = Checkpoint.read(file)
     if kept.state.get("kind") not in KINDS:
         raise kept.refused("it holds none of SAMP's networks")

@@ -1,7 +1,8 @@
-"""The character in Blender: 22 bones named as the joints, the mannequin on them, and the empties that direct it.
+"""The character in Blender: 22 bones named as the joints, the mannequin on them, and the empties
+that direct it.
 
-In the armature's space the character looks along −Y with its left at +X, as Blender's rigs do: the canonical frame
-turned by half a circle about z (``mannequin.FACING``).
+In the armature's space the character looks along −Y with its left at +X, as Blender's rigs do: the
+canonical frame turned by half a circle about z (``mannequin.FACING``).
 """
 
 import bpy
@@ -13,21 +14,36 @@ from ..core.skeleton import JOINTS, OFFSETS, PARENTS, REST, STATURE, joint
 from .mannequin import FACING, add_body
 
 __all__ = [
-    "create_character", "character_of", "character_scale", "is_character", "metres_per_unit", "missing_bones", "parts_of",
+    "create_character",
+    "character_of",
+    "character_scale",
+    "is_character",
+    "metres_per_unit",
+    "missing_bones",
+    "parts_of",
     "sent",
 ]
 
 _CHAIN = {  # the joint at which each bone's tail lies
-    "pelvis": "spine1", "spine1": "spine2", "spine2": "spine3", "spine3": "neck", "neck": "head",
-    "left_collar": "left_shoulder", "left_shoulder": "left_elbow", "left_elbow": "left_wrist",
-    "left_hip": "left_knee", "left_knee": "left_ankle", "left_ankle": "left_foot",
+    "pelvis": "spine1",
+    "spine1": "spine2",
+    "spine2": "spine3",
+    "spine3": "neck",
+    "neck": "head",
+    "left_collar": "left_shoulder",
+    "left_shoulder": "left_elbow",
+    "left_elbow": "left_wrist",
+    "left_hip": "left_knee",
+    "left_knee": "left_ankle",
+    "left_ankle": "left_foot",
 }
 _LEAVES = {"head": (0, 0, 0.16), "left_wrist": (-0.18, 0, 0), "left_foot": (0, 0.07, 0)}
 
 
-
 def metres_per_unit(scene: bpy.types.Scene) -> float:
-    """Length of a Blender unit in metres: the scene's unit scale, or 1 where the scene has no unit system."""
+    """Length of a Blender unit in metres: the scene's unit scale, or 1 where the scene has no unit
+    system.
+    """
     units = scene.unit_settings
     return 1.0 if units.system == "NONE" else units.scale_length
 
@@ -38,7 +54,9 @@ def missing_bones(armature: bpy.types.Object) -> list[str]:
 
 
 def is_character(candidate: bpy.types.Object) -> bool:
-    """Whether an object is a character's armature; SMPL-X has bones of the same names in other places, and no root of ours."""
+    """Whether an object is a character's armature; SMPL-X has bones of the same names in other
+    places, and no root of ours.
+    """
     if candidate.type != "ARMATURE" or missing_bones(candidate):
         return False
     if candidate.dafnet.root is not None or candidate.mode == "EDIT":
@@ -53,11 +71,20 @@ def is_character(candidate: bpy.types.Object) -> bool:
 def parts_of(character: bpy.types.Object) -> set[bpy.types.Object]:
     """An armature, what hangs on it, its root and its targets."""
     own = character.dafnet
-    return {character, *character.children_recursive, own.root, own.head, own.hand_left, own.hand_right} - {None}
+    return {
+        character,
+        *character.children_recursive,
+        own.root,
+        own.head,
+        own.hand_left,
+        own.hand_right,
+    } - {None}
 
 
 def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The character that the active object is or belongs to: its armature, its body, its root or one of its targets."""
+    """The character that the active object is or belongs to: its armature, its body, its root or
+    one of its targets.
+    """
     active = context.object
     if active is None:
         return None
@@ -67,7 +94,12 @@ def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
         return active.parent
     for candidate in context.scene.objects:
         own = candidate.dafnet
-        if candidate.type == "ARMATURE" and active in (own.root, own.head, own.hand_left, own.hand_right):
+        if candidate.type == "ARMATURE" and active in (
+            own.root,
+            own.head,
+            own.hand_left,
+            own.hand_right,
+        ):
             return candidate
     return None
 
@@ -75,13 +107,17 @@ def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
 def sent(context: bpy.types.Context) -> tuple[bpy.types.Object | None, bpy.types.Object | None]:
     """The character to direct, and the mesh that it is to go to: from what is active and selected.
 
-    The character is the active one, else a selected one, else the only one of the scene. The mesh is the active or the only
-    selected object that is no part of a character.
+    The character is the active one, else a selected one, else the only one of the scene. The mesh
+    is the active or the only selected object that is no part of a character.
     """
     characters = [o for o in context.scene.objects if is_character(o)]
     chosen = [character_of(context), *(o for o in context.selected_objects if o in characters)]
-    character = next((o for o in chosen if o is not None), characters[0] if len(characters) == 1 else None)
-    meshes = [o for o in context.selected_objects if o.type == "MESH" and o.parent not in characters]
+    character = next(
+        (o for o in chosen if o is not None), characters[0] if len(characters) == 1 else None
+    )
+    meshes = [
+        o for o in context.selected_objects if o.type == "MESH" and o.parent not in characters
+    ]
     active = context.object
     goal = active if active in meshes else meshes[0] if len(meshes) == 1 else None
     return character, goal
@@ -90,41 +126,63 @@ def sent(context: bpy.types.Context) -> tuple[bpy.types.Object | None, bpy.types
 def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:
     """Size of the character over the canonical body; ``unit`` is a Blender unit in metres.
 
-    ``InputError``: bones are missing, their proportions, parents or inheritance were edited, or the object is scaled
-    unevenly.
+    ``InputError``: bones are missing, their proportions, parents or inheritance were edited, or the
+    object is scaled unevenly.
     """
     if armature.mode == "EDIT":
         raise InputError(f"The armature '{armature.name}' is in edit mode; leave it and try again.")
     if missing := missing_bones(armature):
-        raise InputError(f"The armature '{armature.name}' has no bone '{missing[0]}'; use one that Add Character made.")
+        raise InputError(
+            f"The armature '{armature.name}' has no bone '{missing[0]}'; use one that Add "
+            "Character made."
+        )
     bones = [armature.data.bones[name] for name in JOINTS]
-    chained = [bone.parent and bone.parent.name for bone in bones] == [JOINTS[p] if p >= 0 else None for p in PARENTS]
-    if not chained or not all(bone.use_inherit_rotation and bone.use_local_location for bone in bones):
-        raise InputError(f"The bones of '{armature.name}' got other parents or inheritance; add a new character.")
+    chained = [bone.parent and bone.parent.name for bone in bones] == [
+        JOINTS[p] if p >= 0 else None for p in PARENTS
+    ]
+    if not chained or not all(
+        bone.use_inherit_rotation and bone.use_local_location for bone in bones
+    ):
+        raise InputError(
+            f"The bones of '{armature.name}' got other parents or inheritance; add a new character."
+        )
     heads = np.array([bone.head_local for bone in bones])
     offsets = heads[1:] - heads[list(PARENTS[1:])]
     canonical = OFFSETS[1:] @ FACING
     scale = float((offsets * canonical).sum() / (canonical**2).sum())
     if scale <= 0.0 or np.abs(offsets - scale * canonical).max() > 0.002 * scale:
-        raise InputError(f"The bones of '{armature.name}' were moved in edit mode; add a new character and use it.")
+        raise InputError(
+            f"The bones of '{armature.name}' were moved in edit mode; add a new character and use "
+            "it."
+        )
     size = np.array(armature.scale)
     if not np.isfinite(size).all() or size[0] <= 0.0 or np.ptp(size) > 1e-4 * size[0]:
-        raise InputError(f"The armature '{armature.name}' is scaled unevenly; set its scales to one positive value.")
+        raise InputError(
+            f"The armature '{armature.name}' is scaled unevenly; set its scales to one positive "
+            "value."
+        )
     return scale * float(size[0]) * unit
 
 
 def create_character(
-    context: bpy.types.Context, name: str = "Character", height: float = STATURE, build: float = 1.0,
+    context: bpy.types.Context,
+    name: str = "Character",
+    height: float = STATURE,
+    build: float = 1.0,
 ) -> bpy.types.Object:
-    """A character of this height (metres) at the 3D cursor: armature, body, and root, head and hand empties.
+    """A character of this height (metres) at the 3D cursor: armature, body, and root, head and hand
+    empties.
 
     ``build``: thickness of trunk and limbs over the usual; bones and motion are the same.
 
-    It stands in a T-pose looking along the world's +y, in a new collection of its own. Returns the armature, whose
-    ``dafnet`` settings name the empties. ``InputError``: Blender is not in object mode.
+    It stands in a T-pose looking along the world's +y, in a new collection of its own. Returns the
+    armature, whose ``dafnet`` settings name the empties. ``InputError``: Blender is not in object
+    mode.
     """
     if context.mode != "OBJECT":
-        raise InputError("A character can only be added in object mode; leave the current mode first.")
+        raise InputError(
+            "A character can only be added in object mode; leave the current mode first."
+        )
     scale = height / STATURE / metres_per_unit(context.scene)
     collection = bpy.data.collections.new(name)
     context.scene.collection.children.link(collection)
@@ -169,7 +227,10 @@ def _tail(name: str) -> np.ndarray:
 
 
 def _armature_object(
-    context: bpy.types.Context, collection: bpy.types.Collection, name: str, scale: float,
+    context: bpy.types.Context,
+    collection: bpy.types.Collection,
+    name: str,
+    scale: float,
 ) -> bpy.types.Object:
     """Bones from joint to joint.
 

@@ -6,7 +6,13 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix, rotate, transpose
+from ..core.rotations import (
+    continuous_signs,
+    matrix_from_quaternion,
+    quaternion_from_matrix,
+    rotate,
+    transpose,
+)
 from ..core.skeleton import JOINTS
 from ..core.take import Take
 from .armature import character_scale
@@ -21,31 +27,56 @@ TRANSFORMS = ("location", "rotation", "scale")
 
 
 def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
-    """The character's size, see ``character_scale``, if it can be baked onto; else ``InputError`` with what to do."""
+    """The character's size, see ``character_scale``, if it can be baked onto; else ``InputError``
+    with what to do.
+    """
     if armature.type != "ARMATURE":
-        raise InputError(f"'{armature.name}' is no armature; select a character that Add Character made.")
-    if armature.library or armature.override_library:
-        raise InputError(f"The armature '{armature.name}' is linked or a library override; make it local first.")
-    if armature.parent:
-        raise InputError(f"The armature '{armature.name}' has a parent; clear it, and parent the root object instead.")
-    if any(not constraint.mute for constraint in armature.constraints) or driven(armature, TRANSFORMS):
         raise InputError(
-            f"The armature '{armature.name}' has object constraints or drivers; mute them and constrain the root."
+            f"'{armature.name}' is no armature; select a character that Add Character made."
         )
-    delta = (*armature.delta_location, *armature.delta_rotation_euler, *(s - 1.0 for s in armature.delta_scale))
+    if armature.library or armature.override_library:
+        raise InputError(
+            f"The armature '{armature.name}' is linked or a library override; make it local first."
+        )
+    if armature.parent:
+        raise InputError(
+            f"The armature '{armature.name}' has a parent; clear it, and parent the root object "
+            "instead."
+        )
+    if any(not constraint.mute for constraint in armature.constraints) or driven(
+        armature, TRANSFORMS
+    ):
+        raise InputError(
+            f"The armature '{armature.name}' has object constraints or drivers; mute them and "
+            "constrain the root."
+        )
+    delta = (
+        *armature.delta_location,
+        *armature.delta_rotation_euler,
+        *(s - 1.0 for s in armature.delta_scale),
+    )
     if any(delta):
-        raise InputError(f"The armature '{armature.name}' has delta transforms; apply them and try again.")
+        raise InputError(
+            f"The armature '{armature.name}' has delta transforms; apply them and try again."
+        )
     if armature.data.pose_position == "REST":
-        raise InputError(f"The armature '{armature.name}' shows its rest position; set it to Pose Position.")
+        raise InputError(
+            f"The armature '{armature.name}' shows its rest position; set it to Pose Position."
+        )
     data = armature.animation_data
     if data and (data.use_tweak_mode or any(track.is_solo for track in data.nla_tracks)):
-        raise InputError(f"The armature '{armature.name}' plays an NLA strip in tweak or solo mode; leave it first.")
+        raise InputError(
+            f"The armature '{armature.name}' plays an NLA strip in tweak or solo mode; leave it "
+            "first."
+        )
     return character_scale(armature, unit)
 
 
 def laid_over(armature: bpy.types.Object) -> bool:
     """Whether constraints or drivers of bones change what an action plays."""
-    constraints = (constraint for name in JOINTS for constraint in armature.pose.bones[name].constraints)
+    constraints = (
+        constraint for name in JOINTS for constraint in armature.pose.bones[name].constraints
+    )
     return any(not constraint.mute for constraint in constraints) or driven(armature, "pose.bones[")
 
 
@@ -55,27 +86,35 @@ def driven(armature: bpy.types.Object, paths: str | tuple[str, ...]) -> bool:
     return any(not driver.mute and driver.data_path.startswith(paths) for driver in drivers)
 
 
-def bake(take: Take, armature: bpy.types.Object, frame_start: int, name: str, unit: float = 1.0) -> bpy.types.Action:
-    """Key every frame of ``take`` from ``frame_start`` on, in a new action ``name`` that ``armature`` plays.
+def bake(
+    take: Take, armature: bpy.types.Object, frame_start: int, name: str, unit: float = 1.0
+) -> bpy.types.Action:
+    """Key every frame of ``take`` from ``frame_start`` on, in a new action ``name`` that
+    ``armature`` plays.
 
-    The object follows the root (location and heading), each bone turns, and the pelvis moves: bone lengths are
-    constant, so all 22 bone heads lie on ``take.joints``. ``unit`` is the length of a Blender unit in metres. Earlier
-    actions are kept by a fake user, and all other curves of the present one (the mode, influences, custom properties, further
-    bones) are carried over to the new action.
+    The object follows the root (location and heading), each bone turns, and the pelvis moves: bone
+    lengths are constant, so all 22 bone heads lie on ``take.joints``. ``unit`` is the length of a
+    Blender unit in metres. Earlier actions are kept by a fake user, and all other curves of the
+    present one (the mode, influences, custom properties, further bones) are carried over to the new
+    action.
 
-    ``InputError``: the armature is linked, overridden, parented, constrained, edited, or its size differs from the
-    take's; nothing is changed then.
+    ``InputError``: the armature is linked, overridden, parented, constrained, edited, or its size
+    differs from the take's; nothing is changed then.
     """
     scale = require_bakeable(armature, unit)
     if abs(scale - take.scale) > 1e-3 * take.scale:
-        raise InputError(f"The character '{armature.name}' is no longer of the take's size; generate it again.")
+        raise InputError(
+            f"The character '{armature.name}' is no longer of the take's size; generate it again."
+        )
     if not all(np.isfinite(values).all() for values in (take.joints, take.rotations, take.root)):
         raise InputError("The take holds values that are not numbers; generate it again.")
 
     frames = frame_start + np.arange(len(take), dtype=float)
     to_root = transpose(take.root[:, :3, :3])
     heading = np.unwrap(np.arctan2(-take.root[:, 0, 1], take.root[:, 1, 1])) + np.pi
-    pelvis = rotate(FACING @ to_root, take.joints[:, 0] - take.root[:, :3, 3]) / (unit * armature.scale[0])
+    pelvis = rotate(FACING @ to_root, take.joints[:, 0] - take.root[:, :3, 3]) / (
+        unit * armature.scale[0]
+    )
     local = matrix_from_quaternion(take.rotations)
     local[:, 0] = to_root @ local[:, 0]
 
@@ -84,14 +123,26 @@ def bake(take: Take, armature: bpy.types.Object, frame_start: int, name: str, un
     action, add_curve = new_action(armature, name)
     action.use_fake_user = True
     key_curves(add_curve, "location", "Root", frames, take.root[:, :3, 3] / unit)
-    key_curves(add_curve, "rotation_euler", "Root", frames, np.stack([0 * heading, 0 * heading, heading], axis=1))
+    key_curves(
+        add_curve,
+        "rotation_euler",
+        "Root",
+        frames,
+        np.stack([0 * heading, 0 * heading, heading], axis=1),
+    )
     for j, joint_name in enumerate(JOINTS):
         rest = np.array(armature.data.bones[joint_name].matrix_local)
         axes = FACING @ rest[:3, :3]
         quaternions = continuous_signs(quaternion_from_matrix(axes.T @ local[:, j] @ axes))
         path = f'pose.bones["{joint_name}"].'
         if j == 0:
-            key_curves(add_curve, path + "location", joint_name, frames, (pelvis - rest[:3, 3]) @ rest[:3, :3])
+            key_curves(
+                add_curve,
+                path + "location",
+                joint_name,
+                frames,
+                (pelvis - rest[:3, 3]) @ rest[:3, :3],
+            )
         key_curves(add_curve, path + "rotation_quaternion", joint_name, frames, quaternions)
     for curve in carried:
         copy_curve(curve, add_curve)
@@ -109,7 +160,10 @@ def bake(take: Take, armature: bpy.types.Object, frame_start: int, name: str, un
 
 def key_curves(
     add_curve: Callable[[str, int, str], bpy.types.FCurve],
-    path: str, group: str, frames: np.ndarray, values: np.ndarray,
+    path: str,
+    group: str,
+    frames: np.ndarray,
+    values: np.ndarray,
 ) -> None:
     """One linear curve for each column of ``values`` (T, D)."""
     for index, column in enumerate(values.T):

@@ -1,4 +1,6 @@
-"""Takes of a scene's character without a window: a file is opened, its character generated, another file written."""
+"""Takes of a scene's character without a window: a file is opened, its character generated, another
+file written.
+"""
 
 import os
 from collections.abc import Callable, Iterator
@@ -23,19 +25,27 @@ __all__ = ["bake_takes", "save_scene"]
 
 
 def bake_takes(
-    file: Path | None, output: Path | None, *, scene: str | None = None, character: str | None = None,
-    changes: dict[str, Any] | None = None, takes: int = 1, weights: "Weights | None" = None,
+    file: Path | None,
+    output: Path | None,
+    *,
+    scene: str | None = None,
+    character: str | None = None,
+    changes: dict[str, Any] | None = None,
+    takes: int = 1,
+    weights: "Weights | None" = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[Path, job.Result]:
-    """Bake ``takes`` takes of one character and save; the first plays, the others are Actions of the file too.
+    """Bake ``takes`` takes of one character and save; the first plays, the others are Actions of
+    the file too.
 
-    ``file`` None stands for the file that is open, ``output`` None for the file itself. ``scene`` is needed where another one
-    is active in the file, ``character`` names the armature where the scene has several. ``changes`` overrule the character's
-    own settings (fields of ``Settings``). Each further take has the next seed, and temperature 1 where none is set. Returns
-    the file written and the ``Result``.
+    ``file`` None stands for the file that is open, ``output`` None for the file itself. ``scene``
+    is needed where another one is active in the file, ``character`` names the armature where the
+    scene has several. ``changes`` overrule the character's own settings (fields of ``Settings``).
+    Each further take has the next seed, and temperature 1 where none is set. Returns the file
+    written and the ``Result``.
 
-    Whatever ``progress`` raises, until the new file is whole, leaves everything as it was. Raises InputError where a file
-    cannot be opened or written, or there is nothing to bake onto.
+    Whatever ``progress`` raises, until the new file is whole, leaves everything as it was. Raises
+    InputError where a file cannot be opened or written, or there is nothing to bake onto.
     """
     ensure_registered()
     source = file or (Path(bpy.data.filepath) if bpy.data.filepath else None)
@@ -47,14 +57,19 @@ def bake_takes(
         raise InputError(f"The output '{written}' has to end in .blend.")
     require_writable(written)
     if output is not None and source is not None and _same(output, source):
-        raise InputError(f"'{output}' is the scene's own file; give the output another name, or --in-place instead of it.")
+        raise InputError(
+            f"'{output}' is the scene's own file; give the output another name, or --in-place "
+            "instead of it."
+        )
     if file is not None:
         _open(file)
     progress(0.0)
     warnings = tuple(_told(output is None))
     for library in bpy.data.libraries:
         if _same(written, Path(bpy.path.abspath(library.filepath))):
-            raise InputError(f"'{written}' is a library of the scene; give the output another name.")
+            raise InputError(
+                f"'{written}' is a library of the scene; give the output another name."
+            )
     chosen = _scene(scene)
     with _active(chosen):
         armature = _character(chosen, character)
@@ -65,7 +80,8 @@ def bake_takes(
 
 
 def save_scene(file: Path, last: Callable[[], None] = lambda: None, **options: Any) -> None:
-    """Save a copy of the scene in one step, before which ``last`` is called. ``options``: of Blender's own saving.
+    """Save a copy of the scene in one step, before which ``last`` is called. ``options``: of
+    Blender's own saving.
 
     ``InputError`` where Blender cannot write it.
     """
@@ -74,7 +90,8 @@ def save_scene(file: Path, last: Callable[[], None] = lambda: None, **options: A
             bpy.ops.wm.save_as_mainfile(filepath=str(part), copy=True, **options)
         except RuntimeError as error:
             raise InputError(
-                f"Blender cannot write '{file}'; choose a folder that has room and may be written to."
+                f"Blender cannot write '{file}'; choose a folder that has room and may be written "
+                "to."
             ) from error
         last()
 
@@ -88,7 +105,9 @@ def _same(one: Path, other: Path) -> bool:
 
 
 def _open(file: Path) -> None:
-    """Open a file. Its scripts run where Blender's own preferences let them, which at first they do not."""
+    """Open a file. Its scripts run where Blender's own preferences let them, which at first they do
+    not.
+    """
     if not file.is_file():
         raise InputError(f"There is no file '{file}'; check its path.")
     try:
@@ -101,18 +120,29 @@ def _open(file: Path) -> None:
 
 
 def _told(in_place: bool) -> Iterator[str]:
-    """Warnings about the open file. ``InputError`` where to write it anew would lose a part of it."""
+    """Warnings about the open file. ``InputError`` where to write it anew would lose a part of
+    it.
+    """
     if bpy.data.version[:2] > bpy.app.version[:2]:
-        newer = f"The file was saved by Blender {bpy.data.version[0]}.{bpy.data.version[1]}, which is newer than this one"
+        newer = (
+            f"The file was saved by Blender {bpy.data.version[0]}.{bpy.data.version[1]}, which is "
+            "newer than this one"
+        )
         if in_place:
             raise InputError(f"{newer}; bake it with that Blender, or name an output.")
-        yield f"{newer}, so that parts of it may be missing in the output; bake it with that Blender."
+        yield (
+            f"{newer}, so that parts of it may be missing in the output; bake it with that Blender."
+        )
     for library in bpy.data.libraries:
         if library.is_missing:
-            yield f"The library '{library.filepath}' is missing, and so is what the scene links from it; put it there again."
+            yield (
+                f"The library '{library.filepath}' is missing, and so is what the scene links "
+                "from it; put it there again."
+            )
     if bpy.app.autoexec_fail:
         yield (
-            f"A script of the file did not run ({bpy.app.autoexec_fail_message}), and what it moves stands still; "
+            f"A script of the file did not run ({bpy.app.autoexec_fail_message}), and what it "
+            "moves stands still; "
             "allow Python scripts in Blender's preferences if you trust the file."
         )
 
@@ -136,17 +166,25 @@ def _active(scene: bpy.types.Scene) -> AbstractContextManager[object]:
 
 
 def _elsewhere(scene: bpy.types.Scene, named: str | None) -> str:
-    """What is to be said of the other scenes: which of them has such an armature, or any character."""
+    """What is to be said of the other scenes: which of them has such an armature, or any
+    character.
+    """
     for other in bpy.data.scenes:
         armatures = [ob for ob in other.objects if ob.type == "ARMATURE" and other != scene]
         for armature in armatures:
-            if named in (armature.name, armature.name_full) or (named is None and is_character(armature)):
-                return f"the scene '{other.name}' has '{armature.name}': give --scene '{other.name}'"
+            if named in (armature.name, armature.name_full) or (
+                named is None and is_character(armature)
+            ):
+                return (
+                    f"the scene '{other.name}' has '{armature.name}': give --scene '{other.name}'"
+                )
     return ""
 
 
 def _character(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
-    """The armature to bake onto: the one named, else the only one of the scene that is a DAFNet character."""
+    """The armature to bake onto: the one named, else the only one of the scene that is a DAFNet
+    character.
+    """
     armatures = [ob for ob in scene.objects if ob.type == "ARMATURE"]
     if name is not None:
         named = [ob for ob in armatures if name in (ob.name, ob.name_full)]
@@ -161,5 +199,7 @@ def _character(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
         raise InputError(f"The scene '{scene.name}' has no character; {to_do}.")
     if len(directed) > 1:
         names = ", ".join(f"'{ob.name}'" for ob in directed)
-        raise InputError(f"The scene has several characters; choose one of {names} with --character.")
+        raise InputError(
+            f"The scene has several characters; choose one of {names} with --character."
+        )
     return directed[0]

@@ -1,6 +1,7 @@
 """Everything in which Blender 4.2, 4.5, 5.0 and 5.2 differ for this add-on.
 
-Actions have slots from 4.4 on, and ``Action.fcurves`` is gone in 5.0; video is a media type of its own from 5.0 on.
+Actions have slots from 4.4 on, and ``Action.fcurves`` is gone in 5.0; video is a media type of its
+own from 5.0 on.
 """
 
 from collections.abc import Callable
@@ -8,23 +9,33 @@ from collections.abc import Callable
 import bpy
 
 __all__ = [
-    "new_action", "assign_action", "playing", "action_curves", "animated_paths", "shares_curves", "output_video",
+    "new_action",
+    "assign_action",
+    "playing",
+    "action_curves",
+    "animated_paths",
+    "shares_curves",
+    "output_video",
 ]
 
 _SLOTS = bpy.app.version >= (4, 4, 0)
 
 
 def new_action(
-    owner: bpy.types.Object, name: str,
+    owner: bpy.types.Object,
+    name: str,
 ) -> tuple[bpy.types.Action, Callable[[str, int, str], bpy.types.FCurve]]:
-    """A new action for ``owner``, not assigned yet, and a function (path, index, group) that adds a curve to it.
+    """A new action for ``owner``, not assigned yet, and a function (path, index, group) that adds a
+    curve to it.
 
     An empty ``group`` is none.
     """
     action = bpy.data.actions.new(name)
     if _SLOTS:
         slot = action.slots.new(id_type="OBJECT", name=owner.name)
-        curves = action.layers.new("Layer").strips.new(type="KEYFRAME").channelbag(slot, ensure=True)
+        curves = (
+            action.layers.new("Layer").strips.new(type="KEYFRAME").channelbag(slot, ensure=True)
+        )
     else:
         curves = action
 
@@ -38,7 +49,9 @@ def new_action(
 
 
 def assign_action(owner: bpy.types.Object, action: bpy.types.Action) -> None:
-    """Let ``owner`` play ``action`` and nothing mixed into it; a slot that is not assigned plays nothing."""
+    """Let ``owner`` play ``action`` and nothing mixed into it; a slot that is not assigned plays
+    nothing.
+    """
     data = owner.animation_data_create()
     data.action = action
     data.action_blend_type, data.action_influence = "REPLACE", 1.0
@@ -47,7 +60,9 @@ def assign_action(owner: bpy.types.Object, action: bpy.types.Action) -> None:
 
 
 def playing(owner: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
-    """A function that lets ``owner``, as it may have to be found again, play what it plays now, mixed as it is now."""
+    """A function that lets ``owner``, as it may have to be found again, play what it plays now,
+    mixed as it is now.
+    """
     data = owner.animation_data
     if data is None:
         return lambda found: found.animation_data_clear()
@@ -64,7 +79,9 @@ def playing(owner: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
         data.action_blend_type, data.action_influence = mixed
         if _SLOTS:
             if action:
-                data.action_slot = next((each for each in action.slots if each.handle == slot), None)
+                data.action_slot = next(
+                    (each for each in action.slots if each.handle == slot), None
+                )
             data.last_slot_identifier = last_slot
         if action:
             action.use_fake_user = kept
@@ -81,7 +98,9 @@ def action_curves(owner: bpy.types.Object) -> list[bpy.types.FCurve]:
         return list(data.action.fcurves)
     if data.action_slot is None:
         return []
-    bags = (strip.channelbag(data.action_slot) for layer in data.action.layers for strip in layer.strips)
+    bags = (
+        strip.channelbag(data.action_slot) for layer in data.action.layers for strip in layer.strips
+    )
     return [curve for bag in bags if bag for curve in bag.fcurves]
 
 
@@ -90,7 +109,10 @@ def animated_paths(owner: bpy.types.ID) -> set[str]:
     data = getattr(owner, "animation_data", None)
     if data is None:
         return set()
-    actions = {data.action, *(strip.action for track in data.nla_tracks for strip in track.strips)} - {None}
+    actions = {
+        data.action,
+        *(strip.action for track in data.nla_tracks for strip in track.strips),
+    } - {None}
     paths = {curve.data_path for action in actions for curve in _all_curves(action)}
     return paths | {driver.data_path for driver in data.drivers}
 

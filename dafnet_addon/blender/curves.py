@@ -10,16 +10,28 @@ __all__ = ["copy_curve"]
 
 _KEY_FIRST = ("co", "handle_left_type", "handle_right_type")
 """Of a key, what has to be set before its handles."""
-_ELSEWHERE = {"co_ui", "select", "select_control_point", "select_left_handle", "select_right_handle", "lock", "name"}
+_ELSEWHERE = {
+    "co_ui",
+    "select",
+    "select_control_point",
+    "select_left_handle",
+    "select_right_handle",
+    "lock",
+    "name",
+}
 """Properties that others stand for, that are of a moment, or that are set apart."""
 _KINDS = {"FLOAT": np.float32, "INT": np.int32, "ENUM": np.int32, "BOOLEAN": np.bool_}
 
 
-def copy_curve(source: bpy.types.FCurve, add_curve: Callable[[str, int, str], bpy.types.FCurve]) -> bpy.types.FCurve:
-    """Add to an action, by ``add_curve`` (see ``compat.new_action``), a curve that plays what ``source`` plays.
+def copy_curve(
+    source: bpy.types.FCurve, add_curve: Callable[[str, int, str], bpy.types.FCurve]
+) -> bpy.types.FCurve:
+    """Add to an action, by ``add_curve`` (see ``compat.new_action``), a curve that plays what
+    ``source`` plays.
 
-    Keys with their handles and easing, modifiers, extrapolation, whether it is muted or locked, and the group. A group that the
-    action has already keeps its own settings: then a muted group of the source mutes the curve.
+    Keys with their handles and easing, modifiers, extrapolation, whether it is muted or locked, and
+    the group. A group that the action has already keeps its own settings: then a muted group of the
+    source mutes the curve.
     """
     group = source.group
     target = add_curve(source.data_path, source.array_index, group.name if group else "")
@@ -48,7 +60,10 @@ def _keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
     new.add(len(old))
     kinds = bpy.types.Keyframe.bl_rna.properties
     names = [kind.identifier for kind in kinds if kind.type in _KINDS and not kind.is_readonly]
-    for name in (*_KEY_FIRST, *(name for name in names if name not in _KEY_FIRST and name not in _ELSEWHERE)):
+    for name in (
+        *_KEY_FIRST,
+        *(name for name in names if name not in _KEY_FIRST and name not in _ELSEWHERE),
+    ):
         length = max(1, getattr(kinds[name], "array_length", 1))
         values = np.empty(length * len(old), _KINDS[kinds[name].type])
         old.foreach_get(name, values)
@@ -62,7 +77,8 @@ def _modifier(source: bpy.types.FModifier, target: bpy.types.FModifier) -> None:
     old, new = source.control_points, target.control_points
     for k in range(len(old)):
         new.add(float(k))
-    for name in ("frame", "min", "max"):  # set one by one, each may crash Blender: it takes the point for a modifier then
+    # set one by one, each may crash Blender: it takes the point for a modifier then
+    for name in ("frame", "min", "max"):
         values = np.empty(len(old), np.float32)
         old.foreach_get(name, values)
         new.foreach_set(name, values)
@@ -71,5 +87,9 @@ def _modifier(source: bpy.types.FModifier, target: bpy.types.FModifier) -> None:
 def _alike(source: Any, target: Any, apart: tuple[str, ...] = ()) -> None:
     """Set all plain properties of ``target`` as those of ``source`` are."""
     for kind in source.bl_rna.properties:
-        if kind.type in {*_KINDS, "STRING"} and not kind.is_readonly and kind.identifier not in {*_ELSEWHERE, *apart}:
+        if (
+            kind.type in {*_KINDS, "STRING"}
+            and not kind.is_readonly
+            and kind.identifier not in {*_ELSEWHERE, *apart}
+        ):
             setattr(target, kind.identifier, getattr(source, kind.identifier))

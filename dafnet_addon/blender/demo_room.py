@@ -1,4 +1,6 @@
-"""The example: a room from tables of parts, a character, its keyed root and hand target, a take and its preview."""
+"""The example: a room from tables of parts, a character, its keyed root and hand target, a take and
+its preview.
+"""
 
 import json
 from collections.abc import Callable, Iterable
@@ -26,7 +28,16 @@ from .preview import look_at, render_film, render_sheet, use_workbench
 from .properties import ensure_registered
 from .scene_reader import read_scene
 
-__all__ = ["FURNITURE", "Part", "Room", "add_piece", "build_room", "key_channels", "new_collection", "run_demo"]
+__all__ = [
+    "FURNITURE",
+    "Part",
+    "Room",
+    "add_piece",
+    "build_room",
+    "key_channels",
+    "new_collection",
+    "run_demo",
+]
 
 Triple = tuple[float, float, float]
 
@@ -35,8 +46,8 @@ Triple = tuple[float, float, float]
 class Part:
     """A box of ``size`` (x, y, z) around ``center``, or an upright cylinder of that size; metres.
 
-    ``tilt``: Euler angles in degrees. ``bevel``: width of the rounded edges. The piece's front is +y, its floor z = 0,
-    and a seat's origin is where a pelvis rests.
+    ``tilt``: Euler angles in degrees. ``bevel``: width of the rounded edges. The piece's front is
+    +y, its floor z = 0, and a seat's origin is where a pelvis rests.
     """
 
     material: str
@@ -48,16 +59,30 @@ class Part:
 
 
 def _four(
-    material: str, x: float, y: float, height: float, thickness: float, splay: float, y0: float = 0.0
+    material: str,
+    x: float,
+    y: float,
+    height: float,
+    thickness: float,
+    splay: float,
+    y0: float = 0.0,
 ) -> list[Part]:
-    """Four round legs, splayed by ``splay`` degrees, that meet a top at ``height`` at (±x, y0 ± y)."""
+    """Four round legs, splayed by ``splay`` degrees, that meet a top at ``height`` at (±x, y0 ±
+    y).
+    """
     size = (thickness, thickness, height / cos(radians(splay)))
     lean = 0.5 * height * sin(radians(splay))
     return [
         Part(
-            material, size, (i * (x + lean), y0 + j * (y + lean), height / 2), (j * splay, -i * splay, 0.0), 0.006, True
+            material,
+            size,
+            (i * (x + lean), y0 + j * (y + lean), height / 2),
+            (j * splay, -i * splay, 0.0),
+            0.006,
+            True,
         )
-        for i in (-1, 1) for j in (-1, 1)
+        for i in (-1, 1)
+        for j in (-1, 1)
     ]
 
 
@@ -140,15 +165,24 @@ _SHELL = (  # the room itself: no furniture, since nobody sits on a wall
 )
 
 _COLOURS = {
-    "Oak": (0.58, 0.40, 0.24), "Teal": (0.16, 0.42, 0.44), "Graphite": (0.12, 0.13, 0.15), "Paper": (0.90, 0.90, 0.88),
-    "Coral": (0.82, 0.36, 0.26), "Slate": (0.30, 0.37, 0.47), "Floor": (0.62, 0.52, 0.42), "Wall": (0.60, 0.67, 0.69),
-    "Rug": (0.74, 0.68, 0.58), "Rug Border": (0.30, 0.40, 0.46),
+    "Oak": (0.58, 0.40, 0.24),
+    "Teal": (0.16, 0.42, 0.44),
+    "Graphite": (0.12, 0.13, 0.15),
+    "Paper": (0.90, 0.90, 0.88),
+    "Coral": (0.82, 0.36, 0.26),
+    "Slate": (0.30, 0.37, 0.47),
+    "Floor": (0.62, 0.52, 0.42),
+    "Wall": (0.60, 0.67, 0.69),
+    "Rug": (0.74, 0.68, 0.58),
+    "Rug Border": (0.30, 0.40, 0.46),
 }
 
 
 @dataclass(frozen=True)
 class Room:
-    """The built room: its ``scene``, the character's ``armature`` (its ``dafnet`` settings made) and the ``route``."""
+    """The built room: its ``scene``, the character's ``armature`` (its ``dafnet`` settings made)
+    and the ``route``.
+    """
 
     scene: bpy.types.Scene
     armature: bpy.types.Object
@@ -156,7 +190,9 @@ class Room:
 
 
 def build_room(context: bpy.types.Context) -> Room:
-    """Furnish the context's empty scene, add the character and key its root, its mode and its right hand's target."""
+    """Furnish the context's empty scene, add the character and key its root, its mode and its right
+    hand's target.
+    """
     scene = context.scene
     walked = demo_route()
     scene.render.fps, scene.render.fps_base = FPS, 1.0
@@ -190,13 +226,19 @@ def build_room(context: bpy.types.Context) -> Room:
 
 
 def run_demo(
-    folder: Path, *, seed: int, temperature: float, weights: Path | None, preview: bool,
+    folder: Path,
+    *,
+    seed: int,
+    temperature: float,
+    weights: Path | None,
+    preview: bool,
     progress: Callable[[float], None],
 ) -> dict[str, Any]:
-    """Build the room in an empty file, generate and bake, and write ``demo.blend``, its preview and ``report.json``.
+    """Build the room in an empty file, generate and bake, and write ``demo.blend``, its preview and
+    ``report.json``.
 
-    Returns the report. ``progress`` is called with the part done, in [0, 1]. Raises WeightsError, and InputError where the
-    folder cannot be written to.
+    Returns the report. ``progress`` is called with the part done, in [0, 1]. Raises WeightsError,
+    and InputError where the folder cannot be written to.
     """
     require_writable(folder / "demo.blend")
     loaded = load_weights(weights)
@@ -206,7 +248,9 @@ def run_demo(
     use_workbench(room.scene)
     settings = job.settings_of(room.armature, room.scene, seed=seed, temperature=temperature)
     generating = 0.2 if preview else 1.0
-    result = drained(job.steps(bpy.context, settings, loaded), lambda part: progress(generating * part))
+    result = drained(
+        job.steps(bpy.context, settings, loaded), lambda part: progress(generating * part)
+    )
 
     read = read_scene(bpy.context, settings)
     report = demo_report(result.take, read.scene, read.controls, loaded, result.seconds)
@@ -215,7 +259,12 @@ def run_demo(
     if preview:
         frames = np.linspace(room.scene.frame_start, room.scene.frame_end, 16).astype(int).tolist()
         render_sheet(room.scene, folder / "sheet.png", frames)
-        render_film(room.scene, folder / "preview.mp4", 2, lambda part: progress(generating + (1 - generating) * part))
+        render_film(
+            room.scene,
+            folder / "preview.mp4",
+            2,
+            lambda part: progress(generating + (1 - generating) * part),
+        )
     return report
 
 
@@ -226,7 +275,9 @@ def new_collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
     return made
 
 
-def add_piece(collection: bpy.types.Collection, name: str, parts: Iterable[Part], place: Place) -> bpy.types.Object:
+def add_piece(
+    collection: bpy.types.Collection, name: str, parts: Iterable[Part], place: Place
+) -> bpy.types.Object:
     """One mesh object of all ``parts``, its origin on the floor at ``place``."""
     names: list[str] = []
     shape = bmesh.new()
@@ -258,9 +309,15 @@ def _add(shape: bmesh.types.BMesh, part: Part, material: int) -> None:
         bmesh.ops.create_cube(piece, size=1.0, matrix=frame)
     sharp = [edge for edge in piece.edges if edge.calc_face_angle(0.0) > radians(60)]
     if part.bevel > 0.0:
-        bmesh.ops.bevel(piece, geom=sharp, offset=part.bevel, segments=3, profile=0.5, affect="EDGES")
+        bmesh.ops.bevel(
+            piece, geom=sharp, offset=part.bevel, segments=3, profile=0.5, affect="EDGES"
+        )
     wide = 4 * part.bevel**2
-    flat = {face for face in piece.faces if len(face.verts) > 4 or (not part.round and face.calc_area() > wide)}
+    flat = {
+        face
+        for face in piece.faces
+        if len(face.verts) > 4 or (not part.round and face.calc_area() > wide)
+    }
     vertices = {vertex: shape.verts.new(vertex.co) for vertex in piece.verts}
     for face in piece.faces:
         copy = shape.faces.new([vertices[v] for v in face.verts])
@@ -283,8 +340,12 @@ def _material(name: str) -> bpy.types.Material:
     return found
 
 
-def _camera_and_lights(scene: bpy.types.Scene, collection: bpy.types.Collection, walked: Route) -> None:
-    """A camera that turns after the character, calmly, and lights for the renderers that use them."""
+def _camera_and_lights(
+    scene: bpy.types.Scene, collection: bpy.types.Collection, walked: Route
+) -> None:
+    """A camera that turns after the character, calmly, and lights for the renderers that use
+    them.
+    """
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.lens = 50.0
     collection.objects.link(camera)
@@ -315,7 +376,9 @@ def key_channels(owner: bpy.types.Object, frames: np.ndarray, **channels: np.nda
         for index in range(values.shape[1]):
             curve = add(path, index, path)
             curve.keyframe_points.add(len(frames))
-            curve.keyframe_points.foreach_set("co", np.stack([frames, values[:, index]], axis=1).ravel())
+            curve.keyframe_points.foreach_set(
+                "co", np.stack([frames, values[:, index]], axis=1).ravel()
+            )
             curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), linear))
             curve.update()
     assign_action(owner, action)

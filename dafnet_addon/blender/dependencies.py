@@ -1,8 +1,10 @@
-"""What an object of the scene follows, near or far: its place, its shape, and the simulations that move it.
+"""What an object of the scene follows, near or far: its place, its shape, and the simulations that
+move it.
 
-Blender's own graph of dependencies cannot be asked for this, so what that graph is built from is read: parents, constraints
-(of bones, too), drivers, modifiers with their node groups, shape keys, collections. What a driver's script names itself
-(``bpy.data.objects["…"]``) counts as well, though Blender does not know of it.
+Blender's own graph of dependencies cannot be asked for this, so what that graph is built from is
+read: parents, constraints (of bones, too), drivers, modifiers with their node groups, shape keys,
+collections. What a driver's script names itself (``bpy.data.objects["…"]``) counts as well, though
+Blender does not know of it.
 """
 
 import re
@@ -19,21 +21,46 @@ __all__ = ["Dependencies", "Simulation"]
 _PLACE = ("location", "rotation", "scale", "delta_", "constraints[", "parent")
 _SHAPE = ("modifiers[", "pose.", "instance_")
 """How the data paths of an object begin that move it, and that shape it."""
-_SIMULATED = {"CLOTH", "SOFT_BODY", "PARTICLE_SYSTEM", "PARTICLE_INSTANCE", "DYNAMIC_PAINT", "FLUID", "COLLISION"}
+_SIMULATED = {
+    "CLOTH",
+    "SOFT_BODY",
+    "PARTICLE_SYSTEM",
+    "PARTICLE_INSTANCE",
+    "DYNAMIC_PAINT",
+    "FLUID",
+    "COLLISION",
+}
 """Modifiers that name what they may push against: ``Simulation.met``, not what they follow."""
 _BY_PLACE = {
-    "COPY_LOCATION", "COPY_ROTATION", "COPY_SCALE", "COPY_TRANSFORMS", "LIMIT_DISTANCE", "TRANSFORM", "DAMPED_TRACK",
-    "TRACK_TO", "LOCKED_TRACK", "STRETCH_TO", "CHILD_OF", "FLOOR", "PIVOT", "ACTION", "ARMATURE", "IK",
+    "COPY_LOCATION",
+    "COPY_ROTATION",
+    "COPY_SCALE",
+    "COPY_TRANSFORMS",
+    "LIMIT_DISTANCE",
+    "TRANSFORM",
+    "DAMPED_TRACK",
+    "TRACK_TO",
+    "LOCKED_TRACK",
+    "STRETCH_TO",
+    "CHILD_OF",
+    "FLOOR",
+    "PIVOT",
+    "ACTION",
+    "ARMATURE",
+    "IK",
 }
-"""Constraints that follow their target's place, and its shape only where they name a bone or a vertex group of it."""
+"""Constraints that follow their target's place, and its shape only where they name a bone or a
+vertex group of it.
+"""
 _QUOTED = re.compile(r"""["'](.+?)["']""")
 _NESTED = 2
 """How deep in a constraint or a modifier what it points to may lie."""
 
 
 class _Aspect(NamedTuple):
-    """What something follows of a datablock: of an object ``_IN_PLACE`` or ``_IN_SHAPE`` (which has the place in it), of any
-    datablock a single property by its data path, of all but objects else everything.
+    """What something follows of a datablock: of an object ``_IN_PLACE`` or ``_IN_SHAPE`` (which has
+    the place in it), of any datablock a single property by its data path, of all but objects else
+    everything.
     """
 
     owner: bpy.types.ID
@@ -45,7 +72,8 @@ _IN_PLACE, _IN_SHAPE = "its place", "its shape"
 
 @dataclass(frozen=True)
 class Simulation:
-    """A simulation that is not baked: the object's ``name``, and the frame that it starts ``since``.
+    """A simulation that is not baked: the object's ``name``, and the frame that it starts
+    ``since``.
 
     ``met``: the objects that it may push against.
     """
@@ -56,24 +84,38 @@ class Simulation:
 
 
 class Dependencies:
-    """What objects of one scene follow. Each datablock is looked at once, so it is of the moment when it was made."""
+    """What objects of one scene follow. Each datablock is looked at once, so it is of the moment
+    when it was made.
+    """
 
     def __init__(self, scene: bpy.types.Scene) -> None:
         self._scene = scene
         self._next: dict[_Aspect, set[_Aspect]] = {}
 
-    def follows(self, follower: bpy.types.Object, leader: bpy.types.Object, shaped: bool = True) -> bool:
-        """Whether ``leader`` moves ``follower``, or with ``shaped`` also whether it shapes it; an object follows itself."""
+    def follows(
+        self, follower: bpy.types.Object, leader: bpy.types.Object, shaped: bool = True
+    ) -> bool:
+        """Whether ``leader`` moves ``follower``, or with ``shaped`` also whether it shapes it; an
+        object follows itself.
+        """
         return _meets(self._all([_Aspect(follower, _IN_SHAPE if shaped else _IN_PLACE)]), leader)
 
     def setting_follows(self, owner: bpy.types.Object, path: str, leader: bpy.types.Object) -> bool:
-        """Whether drivers let ``leader`` set any property of ``owner`` whose data path begins like ``path``."""
+        """Whether drivers let ``leader`` set any property of ``owner`` whose data path begins like
+        ``path``.
+        """
         return _meets(self._all([_Aspect(owner, path)]), leader)
 
-    def simulations(self, owners: Iterable[bpy.types.Object], shaped: bool = True) -> list[Simulation]:
-        """The simulations, none of them baked, that move these objects or with ``shaped`` also shape them."""
+    def simulations(
+        self, owners: Iterable[bpy.types.Object], shaped: bool = True
+    ) -> list[Simulation]:
+        """The simulations, none of them baked, that move these objects or with ``shaped`` also
+        shape them.
+        """
         found: dict[Simulation, None] = {}
-        for owner, what in self._all(_Aspect(owner, _IN_SHAPE if shaped else _IN_PLACE) for owner in owners):
+        for owner, what in self._all(
+            _Aspect(owner, _IN_SHAPE if shaped else _IN_PLACE) for owner in owners
+        ):
             if isinstance(owner, bpy.types.Object) and what in {_IN_PLACE, _IN_SHAPE}:
                 found |= dict.fromkeys(self._rigid(owner))
                 found |= dict.fromkeys(self._soft(owner) if what == _IN_SHAPE else ())
@@ -95,19 +137,40 @@ class Dependencies:
     def _rigid(self, owner: bpy.types.Object) -> Iterator[Simulation]:
         """The rigid body that moves an object: an active one that is not animated all along."""
         world, body = self._scene.rigidbody_world, owner.rigid_body
-        if world is None or not world.enabled or world.collection is None or world.point_cache.is_baked:
+        if (
+            world is None
+            or not world.enabled
+            or world.collection is None
+            or world.point_cache.is_baked
+        ):
             return
         handed_over = "rigid_body.kinematic" in animated_paths(owner)
-        if body is not None and body.type == "ACTIVE" and body.enabled and (handed_over or not body.kinematic):
-            yield Simulation(owner.name, world.point_cache.frame_start, tuple(world.collection.all_objects))
+        if (
+            body is not None
+            and body.type == "ACTIVE"
+            and body.enabled
+            and (handed_over or not body.kinematic)
+        ):
+            yield Simulation(
+                owner.name, world.point_cache.frame_start, tuple(world.collection.all_objects)
+            )
 
     def _soft(self, owner: bpy.types.Object) -> Iterator[Simulation]:
         """Simulations among the modifiers."""
         scene = self._scene
         modifiers = list(_on(owner.modifiers, owner))
-        since = [cache.frame_start for each in modifiers for cache in _caches(each) if not cache.is_baked]
-        if any(each.type == "NODES" and each.node_group and _simulates(each.node_group) for each in modifiers):
-            since.append(scene.simulation_frame_start if scene.use_custom_simulation_range else scene.frame_start)
+        since = [
+            cache.frame_start for each in modifiers for cache in _caches(each) if not cache.is_baked
+        ]
+        if any(
+            each.type == "NODES" and each.node_group and _simulates(each.node_group)
+            for each in modifiers
+        ):
+            since.append(
+                scene.simulation_frame_start
+                if scene.use_custom_simulation_range
+                else scene.frame_start
+            )
         if since:
             met = (o for o in scene.objects if any(m.type == "COLLISION" for m in o.modifiers))
             yield Simulation(owner.name, min(since), tuple(met))
@@ -138,9 +201,14 @@ def _inside(owner: bpy.types.ID) -> Iterator[Any]:
     elif isinstance(owner, bpy.types.NodeTree):
         for node in owner.nodes:
             yield getattr(node, "node_tree", None)
-            yield from (getattr(each, "default_value", None) for each in node.inputs if not each.is_linked)
+            yield from (
+                getattr(each, "default_value", None) for each in node.inputs if not each.is_linked
+            )
     else:
-        yield from (getattr(owner, name, None) for name in ("shape_keys", "bevel_object", "taper_object", "follow_curve"))
+        yield from (
+            getattr(owner, name, None)
+            for name in ("shape_keys", "bevel_object", "taper_object", "follow_curve")
+        )
 
 
 def _aspects(found: Iterable[Any], what: str = _IN_SHAPE) -> Iterator[_Aspect]:
@@ -151,7 +219,9 @@ def _aspects(found: Iterable[Any], what: str = _IN_SHAPE) -> Iterator[_Aspect]:
 def _placed(owner: bpy.types.Object) -> Iterator[_Aspect]:
     if owner.parent:
         instanced = owner.parent.instance_type in {"VERTS", "FACES"}
-        yield _Aspect(owner.parent, _IN_SHAPE if instanced or owner.parent_type != "OBJECT" else _IN_PLACE)
+        yield _Aspect(
+            owner.parent, _IN_SHAPE if instanced or owner.parent_type != "OBJECT" else _IN_PLACE
+        )
     yield from _constrained(owner.constraints, owner)
 
 
@@ -165,20 +235,32 @@ def _shaped(owner: bpy.types.Object) -> Iterator[_Aspect]:
             yield from _constrained(bone.constraints, owner)
 
 
-def _constrained(constraints: Iterable[bpy.types.Constraint], owner: bpy.types.Object) -> Iterator[_Aspect]:
+def _constrained(
+    constraints: Iterable[bpy.types.Constraint], owner: bpy.types.Object
+) -> Iterator[_Aspect]:
     for constraint in _on(constraints, owner):
         parts = [constraint, *getattr(constraint, "targets", ())]
-        inside = constraint.type not in _BY_PLACE or any(getattr(part, "subtarget", "") for part in parts)
+        inside = constraint.type not in _BY_PLACE or any(
+            getattr(part, "subtarget", "") for part in parts
+        )
         yield from _aspects(_pointed(constraint, _NESTED), _IN_SHAPE if inside else _IN_PLACE)
 
 
 def _on(blocks: Iterable[Any], owner: bpy.types.Object) -> Iterator[Any]:
-    """Those of an object's modifiers or constraints that do something now, or may since their switch is animated."""
+    """Those of an object's modifiers or constraints that do something now, or may since their
+    switch is animated.
+    """
     for block in blocks:
-        off = block.mute or not block.influence if isinstance(block, bpy.types.Constraint) else not block.show_viewport
+        off = (
+            block.mute or not block.influence
+            if isinstance(block, bpy.types.Constraint)
+            else not block.show_viewport
+        )
         if off:
             path = block.path_from_id()
-            switches = {f"{path}.{name}" for name in ("mute", "enabled", "influence", "show_viewport")}
+            switches = {
+                f"{path}.{name}" for name in ("mute", "enabled", "influence", "show_viewport")
+            }
             if switches.isdisjoint(animated_paths(owner)):
                 continue
         yield block
@@ -207,7 +289,9 @@ def _driven(owner: bpy.types.ID, paths: str | tuple[str, ...]) -> Iterator[_Aspe
         if curve.mute or not curve.data_path.startswith(paths):
             continue
         if "bpy." in curve.driver.expression:
-            yield from _aspects(bpy.data.objects.get(name) for name in _QUOTED.findall(curve.driver.expression))
+            yield from _aspects(
+                bpy.data.objects.get(name) for name in _QUOTED.findall(curve.driver.expression)
+            )
         for variable in curve.driver.variables:
             for target in variable.targets:
                 if target.id is None:
@@ -215,14 +299,20 @@ def _driven(owner: bpy.types.ID, paths: str | tuple[str, ...]) -> Iterator[_Aspe
                 path = target.data_path if variable.type == "SINGLE_PROP" else ""
                 if _is_setting(path):
                     yield _Aspect(target.id, path)
-                elif path.startswith(_SHAPE) or target.bone_target or not isinstance(target.id, bpy.types.Object):
+                elif (
+                    path.startswith(_SHAPE)
+                    or target.bone_target
+                    or not isinstance(target.id, bpy.types.Object)
+                ):
                     yield _Aspect(target.id, _IN_SHAPE)
                 else:
                     yield _Aspect(target.id, _IN_PLACE)
 
 
 def _is_setting(path: str) -> bool:
-    """Whether a data path is a custom property or one of ours: keyed by hand, and moved by nothing but a driver."""
+    """Whether a data path is a custom property or one of ours: keyed by hand, and moved by nothing
+    but a driver.
+    """
     return path.startswith("dafnet.") or path.endswith(('"]', "']"))
 
 
@@ -239,4 +329,6 @@ def _caches(modifier: bpy.types.Modifier) -> Iterator[Any]:
 def _simulates(tree: bpy.types.NodeTree) -> bool:
     """Whether a node group has a simulation zone, also in a group in it."""
     inner = (node.node_tree for node in tree.nodes if getattr(node, "node_tree", None))
-    return any(node.bl_idname == "GeometryNodeSimulationOutput" for node in tree.nodes) or any(map(_simulates, inner))
+    return any(node.bl_idname == "GeometryNodeSimulationOutput" for node in tree.nodes) or any(
+        map(_simulates, inner)
+    )

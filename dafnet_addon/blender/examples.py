@@ -1,4 +1,6 @@
-"""Small scenes to begin with, at the 3D cursor: furniture, a character, its keyed root, mode and targets, ready to generate."""
+"""Small scenes to begin with, at the 3D cursor: furniture, a character, its keyed root, mode and
+targets, ready to generate.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,7 +21,8 @@ from .walking import extended_to
 
 __all__ = ["EXAMPLES", "Example", "add_example"]
 
-_COMES_OVER = 0.2  # seconds after the root has come to rest and before it leaves, in which hands go to their targets
+# seconds after the root has come to rest and before it leaves, in which hands go to their targets
+_COMES_OVER = 0.2
 _BED_TOP, _PILLOW = 0.46, 0.07  # metres
 _HERE = Place((0.0, 0.0), 0.0)
 _WRITING_DESK = (  # the demo's, with a sheet of paper where its computer stands
@@ -30,8 +33,8 @@ _WRITING_DESK = (  # the demo's, with a sheet of paper where its computer stands
 
 @dataclass(frozen=True)
 class Plan:
-    """What a character does: its ``walked`` root, the ``targets`` (T, 3) of some of head and hands, and the mode EE in frames
-    ``reaching`` (first, end exclusive); metres from the example's middle.
+    """What a character does: its ``walked`` root, the ``targets`` (T, 3) of some of head and hands,
+    and the mode EE in frames ``reaching`` (first, end exclusive); metres from the example's middle.
     """
 
     walked: Route
@@ -41,8 +44,8 @@ class Plan:
 
 @dataclass(frozen=True)
 class Example:
-    """``pieces``: the parts of each piece of furniture by its name, and where it stands; ``plan``: what is done with them at so
-    many frames a second.
+    """``pieces``: the parts of each piece of furniture by its name, and where it stands; ``plan``:
+    what is done with them at so many frames a second.
     """
 
     label: str
@@ -51,19 +54,31 @@ class Example:
     plan: Callable[[float], Plan]
 
 
-def _writing(seconds: np.ndarray, width: float, tall: float, line: float = 3.0) -> tuple[np.ndarray, ...]:
-    """A hand that writes: metres along the line, up the page, and off it (N,) each, between lines of so many seconds."""
+def _writing(
+    seconds: np.ndarray, width: float, tall: float, line: float = 3.0
+) -> tuple[np.ndarray, ...]:
+    """A hand that writes: metres along the line, up the page, and off it (N,) each, between lines
+    of so many seconds.
+    """
     number, u = np.floor(seconds / line), (seconds % line) / line
     back = np.clip((u - 0.85) / 0.15, 0.0, 1.0)
     ease = back * back * (3.0 - 2.0 * back)
     pen = np.sin(np.pi * np.clip(u / 0.85, 0.0, 1.0)) ** 0.25  # still at both ends of a line
     along = width * (np.clip(u / 0.85, 0.0, 1.0) * (1.0 - ease))
-    letters = 0.5 * tall * pen * np.sin(2.0 * np.pi * 1.7 * seconds) * (0.7 + 0.3 * np.sin(2.0 * np.pi * 0.45 * seconds))
+    letters = (
+        0.5
+        * tall
+        * pen
+        * np.sin(2.0 * np.pi * 1.7 * seconds)
+        * (0.7 + 0.3 * np.sin(2.0 * np.pi * 0.45 * seconds))
+    )
     return along, letters - 1.4 * tall * (number + ease), np.sin(np.pi * back)
 
 
 def _during(rest: Rest, frames: int, fps: float) -> tuple[np.ndarray, tuple[int, int]]:
-    """Seconds (T,) since the hands are there, held before and after; and the frames in which they are."""
+    """Seconds (T,) since the hands are there, held before and after; and the frames in which they
+    are.
+    """
     first, last = rest.first + round(_COMES_OVER * fps), rest.last - round(_COMES_OVER * fps)
     return (np.clip(np.arange(frames), first, last) - first) / fps, (first, last)
 
@@ -71,7 +86,11 @@ def _during(rest: Rest, frames: int, fps: float) -> tuple[np.ndarray, tuple[int,
 def _desk(fps: float) -> Plan:
     """Walks up from the side, sits down and writes with the right hand, the left on the paper."""
     walked = route(
-        Stop((2.0, -1.2), facing((-0.8, 0.6)), 0.3), (0.75, 0.0), (0.45, 0.3), Stop((0.0, 0.0), 0.0, 7.0, seated=True), fps=fps,
+        Stop((2.0, -1.2), facing((-0.8, 0.6)), 0.3),
+        (0.75, 0.0),
+        (0.45, 0.3),
+        Stop((0.0, 0.0), 0.0, 7.0, seated=True),
+        fps=fps,
     )
     seconds, reaching = _during(walked.rests[-1], len(walked.path), fps)
     along, up, off = _writing(seconds, 0.15, 0.022)
@@ -83,8 +102,12 @@ def _desk(fps: float) -> Plan:
 def _whiteboard(fps: float) -> Plan:
     """Walks up, writes two lines on the board, and steps aside."""
     walked = route(
-        Stop((1.9, -1.6), facing((-0.8, 0.5)), 0.3), (0.1, -0.9), Stop((0.0, 0.0), 0.0, 6.4), (-0.75, -0.7),
-        Stop((-1.5, -1.0), facing((0.45, -1.0)), 1.5), fps=fps,
+        Stop((1.9, -1.6), facing((-0.8, 0.5)), 0.3),
+        (0.1, -0.9),
+        Stop((0.0, 0.0), 0.0, 6.4),
+        (-0.75, -0.7),
+        Stop((-1.5, -1.0), facing((0.45, -1.0)), 1.5),
+        fps=fps,
     )
     seconds, reaching = _during(walked.rests[1], len(walked.path), fps)
     along, up, off = _writing(seconds, 0.34, 0.085)
@@ -94,16 +117,29 @@ def _whiteboard(fps: float) -> Plan:
 
 def _sofa(fps: float) -> Plan:
     """Walks up, sits a while, gets up and walks off."""
-    return Plan(route(
-        Stop((-1.7, 2.2), facing((0.8, -0.7)), 0.3), (-0.1, 1.5), Stop((0.0, 0.0), 0.0, 3.5, seated=True), (0.5, 1.2),
-        Stop((1.9, 2.0), facing((1.0, 0.4)), 1.0), fps=fps,
-    ))
+    return Plan(
+        route(
+            Stop((-1.7, 2.2), facing((0.8, -0.7)), 0.3),
+            (-0.1, 1.5),
+            Stop((0.0, 0.0), 0.0, 3.5, seated=True),
+            (0.5, 1.2),
+            Stop((1.9, 2.0), facing((1.0, 0.4)), 1.0),
+            fps=fps,
+        )
+    )
 
 
 def _bed(fps: float) -> Plan:
-    """Sits down on the edge, swings the legs up and lies down, the head on the pillow, led by targets of head and hands."""
+    """Sits down on the edge, swings the legs up and lies down, the head on the pillow, led by
+    targets of head and hands.
+    """
     turn, inward, lasts, stays = 0.5 * np.pi, 0.30, 3.5, 4.0
-    sits = route(Stop((-1.6, 1.6), facing((0.6, -0.4)), 0.3), (-0.9, 1.1), Stop((0.0, 0.0), 0.0, 0.7, seated=True), fps=fps)
+    sits = route(
+        Stop((-1.6, 1.6), facing((0.6, -0.4)), 0.3),
+        (-0.9, 1.1),
+        Stop((0.0, 0.0), 0.0, 0.7, seated=True),
+        fps=fps,
+    )
     start = len(sits.path)
     frames = start + round((lasts + stays) * fps)
     after = (np.arange(frames) - start) / fps
@@ -112,40 +148,62 @@ def _bed(fps: float) -> Plan:
         u = np.clip((after - begin) / seconds, 0.0, 1.0)
         return u * u * (3.0 - 2.0 * u)
 
-    # One leans back before one turns: the legs then come up first, else they would swing through the bed.
+    # One leans back before one turns: the legs then come up first, else they would swing through
+    # the bed.
     turned = eased(0.7, 1.9)
     yaw = np.concatenate([sits.path.yaw, np.zeros(frames - start)])
     yaw[start:] = sits.path.yaw[-1] + turn * turned[start:]
-    position = np.concatenate([sits.path.position, np.tile(sits.path.position[-1], (frames - start, 1))])
+    position = np.concatenate(
+        [sits.path.position, np.tile(sits.path.position[-1], (frames - start, 1))]
+    )
     position[:, 1] -= inward * turned
     path = RootPath(position, yaw)
     back = 0.6 * eased(0.15, 1.65) + 0.4 * eased(1.4, 2.0)
     angle = np.radians(88.0) * back
     over = _BED_TOP + 0.12
-    head = np.stack([
-        np.zeros(frames), 0.06 * (1.0 - back) - 0.60 * np.sin(angle), over + 0.60 * np.cos(angle) + (_PILLOW - 0.02) * back
-    ], axis=1)
-    right = np.stack([0.20 + 0.10 * back, 0.10 - 0.10 * back, _BED_TOP + 0.20 - 0.11 * back], axis=1)
+    head = np.stack(
+        [
+            np.zeros(frames),
+            0.06 * (1.0 - back) - 0.60 * np.sin(angle),
+            over + 0.60 * np.cos(angle) + (_PILLOW - 0.02) * back,
+        ],
+        axis=1,
+    )
+    right = np.stack(
+        [0.20 + 0.10 * back, 0.10 - 0.10 * back, _BED_TOP + 0.20 - 0.11 * back], axis=1
+    )
     local = {"head": head, "hand_right": right, "hand_left": right * (-1.0, 1.0, 1.0)}
     targets = {role: rotate(yaw_matrix(yaw), place) + position for role, place in local.items()}
-    rests = (sits.rests[0], sits.rests[1], Rest(Stop((0.0, -inward), turn), frames - round(stays * fps), frames - 1))
+    rests = (
+        sits.rests[0],
+        sits.rests[1],
+        Rest(Stop((0.0, -inward), turn), frames - round(stays * fps), frames - 1),
+    )
     return Plan(Route(path, rests), targets, (start, frames))
 
 
 EXAMPLES = {
     "DESK": Example(
-        "Chair and Desk", "Walks up to a desk, sits down and writes",
-        {"Chair": (FURNITURE["Chair"], _HERE), "Desk": (_WRITING_DESK, Place((0.0, 0.80), np.pi))}, _desk,
+        "Chair and Desk",
+        "Walks up to a desk, sits down and writes",
+        {"Chair": (FURNITURE["Chair"], _HERE), "Desk": (_WRITING_DESK, Place((0.0, 0.80), np.pi))},
+        _desk,
     ),
     "WHITEBOARD": Example(
-        "Whiteboard", "Walks up to a whiteboard, writes on it and steps aside",
-        {"Whiteboard": (FURNITURE["Whiteboard"], Place((0.10, 0.53), np.pi))}, _whiteboard,
+        "Whiteboard",
+        "Walks up to a whiteboard, writes on it and steps aside",
+        {"Whiteboard": (FURNITURE["Whiteboard"], Place((0.10, 0.53), np.pi))},
+        _whiteboard,
     ),
     "SOFA": Example(
-        "Sofa", "Walks up to a sofa, sits down, gets up and walks off",
-        {"Sofa": (FURNITURE["Sofa"], Place((-0.405, 0.0), 0.0))}, _sofa,
+        "Sofa",
+        "Walks up to a sofa, sits down, gets up and walks off",
+        {"Sofa": (FURNITURE["Sofa"], Place((-0.405, 0.0), 0.0))},
+        _sofa,
     ),
-    "BED": Example("Bed", "Sits down on a bed and lies down on it", {"Bed": (FURNITURE["Bed"], _HERE)}, _bed),
+    "BED": Example(
+        "Bed", "Sits down on a bed and lies down on it", {"Bed": (FURNITURE["Bed"], _HERE)}, _bed
+    ),
 }
 """What the Add menu offers besides a character alone."""
 
@@ -153,11 +211,13 @@ EXAMPLES = {
 def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
     """Add an example at the 3D cursor, from the scene's first frame on, and return its character.
 
-    The furniture comes into a new collection; the scene's end is moved where the example is longer. ``InputError``: Blender is
-    not in object mode; nothing is changed then.
+    The furniture comes into a new collection; the scene's end is moved where the example is longer.
+    ``InputError``: Blender is not in object mode; nothing is changed then.
     """
     if context.mode != "OBJECT":
-        raise InputError("An example can only be added in object mode; leave the current mode first.")
+        raise InputError(
+            "An example can only be added in object mode; leave the current mode first."
+        )
     scene, example = context.scene, EXAMPLES[kind]
     unit, fps = metres_per_unit(scene), scene.render.fps / scene.render.fps_base
     plan = example.plan(fps)
@@ -185,8 +245,12 @@ def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
     return armature
 
 
-def _direct(armature: bpy.types.Object, plan: Plan, first: int, middle: np.ndarray, unit: float) -> None:
-    """Key the targets while they count, and the mode; targets without a plan are kept, without influence."""
+def _direct(
+    armature: bpy.types.Object, plan: Plan, first: int, middle: np.ndarray, unit: float
+) -> None:
+    """Key the targets while they count, and the mode; targets without a plan are kept, without
+    influence.
+    """
     own = armature.dafnet
     for role in ("head", "hand_left", "hand_right"):
         target = getattr(own, role)

@@ -1,7 +1,8 @@
-"""The meshes that a character may touch or must avoid, as the viewport evaluates them, and how they move.
+"""The meshes that a character may touch or must avoid, as the viewport evaluates them, and how they
+move.
 
-What follows the character is none, nor are helpers: what no render shows and the viewport draws as wire or bounds, and what is
-there to be cut out of something else.
+What follows the character is none, nor are helpers: what no render shows and the viewport draws as
+wire or bounds, and what is there to be cut out of something else.
 """
 
 from collections import defaultdict
@@ -28,9 +29,11 @@ _CHANGED = 1e-3
 
 @dataclass
 class _Piece:
-    """One evaluated mesh, an object's own (``source``) or an instance, with its matrix in each frame.
+    """One evaluated mesh, an object's own (``source``) or an instance, with its matrix in each
+    frame.
 
-    ``key`` finds it again. ``vertices`` (V, 3), ``triangles`` (F, 3): in its own space, Blender units.
+    ``key`` finds it again. ``vertices`` (V, 3), ``triangles`` (F, 3): in its own space, Blender
+    units.
     """
 
     key: tuple
@@ -42,18 +45,25 @@ class _Piece:
 
 
 def furniture_of(settings: Settings, dependencies: Dependencies) -> "Furniture | None":
-    """The character's furniture, None where no collection is chosen. ``InputError``: the collection is gone."""
+    """The character's furniture, None where no collection is chosen. ``InputError``: the collection
+    is gone.
+    """
     if settings.furniture is None:
         return None
     scene = find_scene(settings)
     armature = find_object(settings, settings.armature, "character")
     named = (settings.root, settings.head, settings.hand_left, settings.hand_right)
-    own = {armature, *armature.children_recursive, *(o for o in scene.objects if o.name_full in named)}
+    own = {
+        armature,
+        *armature.children_recursive,
+        *(o for o in scene.objects if o.name_full in named),
+    }
     return Furniture(scene, find_collection(settings.furniture), armature, own, dependencies)
 
 
 def furniture_now(context: bpy.types.Context, settings: Settings) -> dict[str, list[Mesh]]:
-    """The furniture's meshes in the current frame by the names of the objects that they belong to; world, metres.
+    """The furniture's meshes in the current frame by the names of the objects that they belong to;
+    world, metres.
 
     ``InputError`` where there is none to be seen, as for ``scene_reader.read_steps``.
     """
@@ -68,8 +78,12 @@ def furniture_now(context: bpy.types.Context, settings: Settings) -> dict[str, l
     return dict(found)
 
 
-def furniture_at(context: bpy.types.Context, settings: Settings, frame: int) -> dict[str, list[Mesh]]:
-    """``furniture_now`` in another frame, as it lies there when the scene is played; that frame stays set."""
+def furniture_at(
+    context: bpy.types.Context, settings: Settings, frame: int
+) -> dict[str, list[Mesh]]:
+    """``furniture_now`` in another frame, as it lies there when the scene is played; that frame
+    stays set.
+    """
     dependencies = Dependencies(find_scene(settings))
     furniture = furniture_of(settings, dependencies)
     simulations = dependencies.simulations(furniture.members) if furniture else []
@@ -79,21 +93,34 @@ def furniture_at(context: bpy.types.Context, settings: Settings, frame: int) -> 
 
 
 class Furniture:
-    """A collection's evaluated meshes at the frame where it ``begin``s, and their matrices in that and all frames added.
+    """A collection's evaluated meshes at the frame where it ``begin``s, and their matrices in that
+    and all frames added.
 
-    ``own``: the character, its parts and what directs it. ``members``: the objects whose meshes are furniture.
+    ``own``: the character, its parts and what directs it. ``members``: the objects whose meshes are
+    furniture.
     """
 
     def __init__(
-        self, scene: bpy.types.Scene, collection: bpy.types.Collection, armature: bpy.types.Object,
-        own: set[bpy.types.Object], dependencies: Dependencies,
+        self,
+        scene: bpy.types.Scene,
+        collection: bpy.types.Collection,
+        armature: bpy.types.Object,
+        own: set[bpy.types.Object],
+        dependencies: Dependencies,
     ) -> None:
-        self._collection, self._armature, self._own, self._dependencies = collection, armature, own, dependencies
+        self._collection, self._armature, self._own, self._dependencies = (
+            collection,
+            armature,
+            own,
+            dependencies,
+        )
         candidates = [o for o in collection.all_objects if o not in own]
         self._held = {o for o in candidates if dependencies.follows(o, armature)}
         drawn_through = {o for o in candidates if o.display_type in _DRAWN_THROUGH}
         unrendered = set(candidates) - _rendered(scene.collection)
-        self._helpers = (drawn_through & unrendered) | ((drawn_through | unrendered) & _cutters(scene)) - self._held
+        self._helpers = (drawn_through & unrendered) | (
+            (drawn_through | unrendered) & _cutters(scene)
+        ) - self._held
         self._doubtful = (drawn_through | unrendered) - self._helpers - self._held
         self.members = set(candidates) - self._held - self._helpers
         self._pieces: list[_Piece] = []
@@ -102,7 +129,9 @@ class Furniture:
         self._blinking: dict[str, None] = {}
 
     def begin(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Read the meshes with faces; instances of one mesh share its arrays. ``InputError``: there are none."""
+        """Read the meshes with faces; instances of one mesh share its arrays. ``InputError``: there
+        are none.
+        """
         shapes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         met = False
         for instance in self._meshes(depsgraph):
@@ -119,10 +148,13 @@ class Furniture:
         name = self._collection.name
         if not met:
             raise InputError(
-                f"The furniture collection '{name}' has no visible mesh besides the character's own; fill it or choose none."
+                f"The furniture collection '{name}' has no visible mesh besides the character's "
+                "own; fill it or choose none."
             )
         if not self._pieces:
-            raise InputError(f"The meshes of the furniture collection '{name}' have no faces; give them some.")
+            raise InputError(
+                f"The meshes of the furniture collection '{name}' have no faces; give them some."
+            )
         self._shown = {o: o.visible_get() for o in self.members if _may_have_faces(o)}
 
     def add(self, depsgraph: bpy.types.Depsgraph, shaped: set[bpy.types.Object]) -> None:
@@ -162,28 +194,53 @@ class Furniture:
 
     def told(self) -> Iterator[str]:
         """Sentences about what was read otherwise than the scene shows it."""
-        nowhere = (p.name for p in self._pieces if not np.any(np.abs(np.array(p.matrices)[:, :3, :3]) > 1e-9))
+        nowhere = (
+            p.name
+            for p in self._pieces
+            if not np.any(np.abs(np.array(p.matrices)[:, :3, :3]) > 1e-9)
+        )
         for name in dict.fromkeys(nowhere):
-            yield f"'{name}' is scaled to zero, so it is not there for the character; give it a scale."
+            yield (
+                f"'{name}' is scaled to zero, so it is not there for the character; give it a "
+                "scale."
+            )
         for name in self._changed:
-            yield f"The shape of '{name}' changes during the shot; its shape at the first frame is used."
+            yield (
+                f"The shape of '{name}' changes during the shot; its shape at the first frame is "
+                "used."
+            )
         for name in self._blinking:
-            yield f"'{name}' is shown or hidden during the shot; it counts for all of it as at the first frame."
-        worn = {o for o in self._held if any(m.type == "ARMATURE" and m.object == self._armature for m in o.modifiers)}
+            yield (
+                f"'{name}' is shown or hidden during the shot; it counts for all of it as at the "
+                "first frame."
+            )
+        worn = {
+            o
+            for o in self._held
+            if any(m.type == "ARMATURE" and m.object == self._armature for m in o.modifiers)
+        }
         if held := self._named(self._held - worn):
             yield f"Moved by the character, so not there for it: {held}."
         if helpers := self._named(self._helpers):
-            yield f"Helpers that no picture shows, so not there for the character: {helpers}; show what is to count."
+            yield (
+                f"Helpers that no picture shows, so not there for the character: {helpers}; show "
+                "what is to count."
+            )
         if doubtful := self._named(self._doubtful):
             yield (
-                f"Not rendered, or drawn as wire or bounds, but solid for the character: {doubtful}; "
+                "Not rendered, or drawn as wire or bounds, but solid for the character: "
+                f"{doubtful}; "
                 "hide in the viewport what is not to count."
             )
 
     def _named(self, objects: set[bpy.types.Object]) -> str:
-        return ", ".join(sorted(f"'{o.name}'" for o in objects if o.type == "MESH" and o.visible_get()))
+        return ", ".join(
+            sorted(f"'{o.name}'" for o in objects if o.type == "MESH" and o.visible_get())
+        )
 
-    def _meshes(self, depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.DepsgraphObjectInstance]:
+    def _meshes(
+        self, depsgraph: bpy.types.Depsgraph
+    ) -> Iterator[bpy.types.DepsgraphObjectInstance]:
         """Every evaluated mesh that is furniture, instances among them."""
         for instance in depsgraph.object_instances:
             if instance.object.type != "MESH" or not (instance.is_instance or instance.show_self):
@@ -193,7 +250,9 @@ class Furniture:
                 yield instance
 
     def _follows(self, made_of: bpy.types.Object) -> bool:
-        """Whether an object that may lie outside the collection, in an instanced one, is the character's or moved by it."""
+        """Whether an object that may lie outside the collection, in an instanced one, is the
+        character's or moved by it.
+        """
         if made_of in self.members:
             return False
         return made_of in self._own or self._dependencies.follows(made_of, self._armature)
@@ -203,7 +262,10 @@ class Furniture:
             return
         vertices, _ = _geometry(evaluated)
         tolerance = _CHANGED * np.ptp(piece.vertices, axis=0).max()
-        if vertices.shape != piece.vertices.shape or np.abs(vertices - piece.vertices).max() > tolerance:
+        if (
+            vertices.shape != piece.vertices.shape
+            or np.abs(vertices - piece.vertices).max() > tolerance
+        ):
             self._changed[piece.name] = None
 
 
@@ -222,7 +284,9 @@ def _rendered(collection: bpy.types.Collection) -> set[bpy.types.Object]:
 def _cutters(scene: bpy.types.Scene) -> set[bpy.types.Object]:
     """What Boolean modifiers cut out of something, or join to it."""
     found: set[bpy.types.Object] = set()
-    for modifier in (m for o in scene.objects for m in o.modifiers if m.type == "BOOLEAN" and m.show_viewport):
+    for modifier in (
+        m for o in scene.objects for m in o.modifiers if m.type == "BOOLEAN" and m.show_viewport
+    ):
         by_collection = modifier.operand_type == "COLLECTION" and modifier.collection
         found |= set(modifier.collection.all_objects) if by_collection else {modifier.object}
     return found - {None}

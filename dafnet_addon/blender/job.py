@@ -1,6 +1,7 @@
 """From the scene to keyframes: the one code path under the operator, the command line and batches.
 
-A job knows objects by name only and looks them up at each stage, since they may be deleted or undone while it runs.
+A job knows objects by name only and looks them up at each stage, since they may be deleted or
+undone while it runs.
 """
 
 from collections.abc import Callable, Generator
@@ -50,8 +51,9 @@ _FURTHER_TAKES = 1.0
 class Result:
     """Baked takes of one shot.
 
-    ``actions``: new, the first one played by the armature; ``takes``, ``draws``: of each. ``warnings``: sentences for the user.
-    ``seconds`` by stage: ``reading``, those of ``Take.seconds`` (``conditions``, ``sampling``, …) and ``baking``.
+    ``actions``: new, the first one played by the armature; ``takes``, ``draws``: of each.
+    ``warnings``: sentences for the user. ``seconds`` by stage: ``reading``, those of
+    ``Take.seconds`` (``conditions``, ``sampling``, …) and ``baking``.
     """
 
     actions: tuple[bpy.types.Action, ...]
@@ -73,7 +75,9 @@ class Result:
 
 def draws_of(settings: Settings) -> list[Draw]:
     """What the takes are drawn with: each further one with the next seed."""
-    first = Draw(settings.seed, settings.lower_seed, settings.temperature, settings.lower_temperature)
+    first = Draw(
+        settings.seed, settings.lower_seed, settings.temperature, settings.lower_temperature
+    )
     further = settings.temperature or _FURTHER_TAKES
     return [first, *(Draw(settings.seed + k, None, further) for k in range(1, settings.take_count))]
 
@@ -83,15 +87,18 @@ def _clean_up(settings: Settings) -> CleanUp:
 
 
 def steps(
-    context: bpy.types.Context, settings: Settings, weights: "Weights | None" = None,
+    context: bpy.types.Context,
+    settings: Settings,
+    weights: "Weights | None" = None,
     watch: Callable[[int, np.ndarray], None] | None = None,
 ) -> Generator[float, None, Result]:
     """Read the scene, generate, bake; yields progress in [0, 1] and returns the ``Result``.
 
-    ``settings`` comes from ``settings_of(armature, scene, **overrides)``. Without ``weights`` those of the
-    preferences, else the shipped ones, are loaded. ``watch``: see ``takes_steps``. The current frame is as it was at every
-    yield (but see ``read_steps`` for simulations). Any error (``InputError``, ``WeightsError`` or whatever else), and
-    ``close()``, leaves the scene as it was.
+    ``settings`` comes from ``settings_of(armature, scene, **overrides)``. Without ``weights`` those
+    of the preferences, else the shipped ones, are loaded. ``watch``: see ``takes_steps``. The
+    current frame is as it was at every yield (but see ``read_steps`` for simulations). Any error
+    (``InputError``, ``WeightsError`` or whatever else), and ``close()``, leaves the scene as it
+    was.
     """
     if weights is None:
         weights = load_weights(weights_path(context))
@@ -102,23 +109,39 @@ def steps(
         action = find_action(settings.kept)
         resume, at = stored(action)[0], settings.kept_until - settings.frame_start
         if action.dafnet.frame_start != settings.frame_start:
-            raise InputError(f"The take '{action.name}' begins at another frame than the range; set the range's start to its.")
+            raise InputError(
+                f"The take '{action.name}' begins at another frame than the range; set the "
+                "range's start to its."
+            )
         render = find_scene(settings).render
         if not 0.0 < at * render.fps_base / render.fps < len(resume) / resume.fps:
-            raise InputError(f"Frame {settings.kept_until} is not inside the take '{action.name}'; go to a frame in it.")
+            raise InputError(
+                f"Frame {settings.kept_until} is not inside the take '{action.name}'; go to a "
+                "frame in it."
+            )
     try:
         read = yield from within(read_steps(context, settings), 0.0, _READ)
     except ReferenceError as error:
-        raise InputError("Something was deleted while the scene was read; generate again.") from error
+        raise InputError(
+            "Something was deleted while the scene was read; generate again."
+        ) from error
     seconds = {"reading": perf_counter() - started}
 
     draws = draws_of(settings)
     takes = yield from within(
         takes_steps(
-            read.scene, read.controls, weights, draws, resume=resume, resume_frame=at, device=device_of(context),
-            clean_up=_clean_up(settings), watch=watch,
+            read.scene,
+            read.controls,
+            weights,
+            draws,
+            resume=resume,
+            resume_frame=at,
+            device=device_of(context),
+            clean_up=_clean_up(settings),
+            watch=watch,
         ),
-        _READ, _GENERATED,
+        _READ,
+        _GENERATED,
     )
     started = perf_counter()
     if gone := used - names_in_use(settings):
@@ -127,13 +150,17 @@ def steps(
     seconds |= takes[0].seconds | {"fitting": sum(take.seconds["fitting"] for take in takes)}
     seconds["baking"] = perf_counter() - started
     yield 1.0
-    return Result(tuple(actions), tuple(takes), tuple(draws), read.warnings + takes[0].warnings, seconds)
+    return Result(
+        tuple(actions), tuple(takes), tuple(draws), read.warnings + takes[0].warnings, seconds
+    )
 
 
 def _bake_steps(
     settings: Settings, takes: list[Take], controls: Controls, draws: list[Draw]
 ) -> Generator[float, None, list[bpy.types.Action]]:
-    """An action for each take, listed; the first one plays. All are made, or none: whatever stops it, nothing has changed."""
+    """An action for each take, listed; the first one plays. All are made, or none: whatever stops
+    it, nothing has changed.
+    """
     names: list[str] = []
     with ExitStack() as undo:
         undo.callback(_unbake, settings, names, state_of(_character(settings)))
@@ -156,7 +183,9 @@ def _character(settings: Settings) -> bpy.types.Object:
     return find_object(settings, settings.armature, "character")
 
 
-def _unbake(settings: Settings, names: list[str], restore: Callable[[bpy.types.Object], None]) -> None:
+def _unbake(
+    settings: Settings, names: list[str], restore: Callable[[bpy.types.Object], None]
+) -> None:
     """Give the character its state back if it is there, and remove the actions of these names."""
     for armature in (o for o in bpy.data.objects if o.name_full == settings.armature):
         restore(armature)
@@ -169,15 +198,20 @@ def run(context: bpy.types.Context, settings: Settings, weights: "Weights | None
     return drained(steps(context, settings, weights))
 
 
-def clean_again_of(context: bpy.types.Context, armature: bpy.types.Object, action: bpy.types.Action) -> Result:
-    """The take of ``action`` with the character's present clean-up as a new action, without sampling again.
+def clean_again_of(
+    context: bpy.types.Context, armature: bpy.types.Object, action: bpy.types.Action
+) -> Result:
+    """The take of ``action`` with the character's present clean-up as a new action, without
+    sampling again.
 
-    Targets, root and mode count as they were when it was generated, furniture as it is now. ``InputError`` as for ``steps``,
-    and where the action holds no take; nothing is changed then.
+    Targets, root and mode count as they were when it was generated, furniture as it is now.
+    ``InputError`` as for ``steps``, and where the action holds no take; nothing is changed then.
     """
     take, controls = stored(action)
     start = action.dafnet.frame_start
-    settings = settings_of(armature, context.scene, frame_start=start, frame_end=start + len(take) - 1, mode="FREE")
+    settings = settings_of(
+        armature, context.scene, frame_start=start, frame_end=start + len(take) - 1, mode="FREE"
+    )
     read = drained(read_steps(context, settings))
     again = drained(clean_again_steps(read.scene, controls, take, _clean_up(settings)))
     draw = draw_of(action)

@@ -1,4 +1,6 @@
-"""The motion that a DAFNet character plays, hand edits included, onto an armature of the animator's own: a new action."""
+"""The motion that a DAFNet character plays, hand edits included, onto an armature of the animator's
+own: a new action.
+"""
 
 import re
 from collections.abc import Callable
@@ -19,7 +21,16 @@ from .baker import TRANSFORMS, driven, key_curves
 from .compat import action_curves, assign_action, new_action
 from .mannequin import FACING
 from .playback import frame_kept
-from .rig_controls import Attachments, Channels, Control, channels, controls_of, posed, probe, settled
+from .rig_controls import (
+    Attachments,
+    Channels,
+    Control,
+    channels,
+    controls_of,
+    posed,
+    probe,
+    settled,
+)
 from .rig_reading import character_motion, pose_matrices, rigid_parts, shape_of
 from .rigs import RigMap, in_names_of, required
 from .rollback import undone_on_failure
@@ -34,10 +45,12 @@ Curves = Callable[[str, int, str], bpy.types.FCurve]
 
 @dataclass(frozen=True)
 class Baked:
-    """The new ``action``; ``errors``: mean and largest distance (metres) of wrists, ankles, head and pelvis (the middle of the
-    hip joints) from where they were to lie. ``angles``: mean and largest angle (degrees) by which limbs and trunk lie otherwise
-    than the character's (``limb_errors``). Both are measured on the rig as Blender plays it. ``ratio``: the rig's size over the
-    character's, by which the motion was scaled. ``overruled``: keyed bones that constraints or drivers of their own move, too.
+    """The new ``action``; ``errors``: mean and largest distance (metres) of wrists, ankles, head
+    and pelvis (the middle of the hip joints) from where they were to lie. ``angles``: mean and
+    largest angle (degrees) by which limbs and trunk lie otherwise than the character's
+    (``limb_errors``). Both are measured on the rig as Blender plays it. ``ratio``: the rig's size
+    over the character's, by which the motion was scaled. ``overruled``: keyed bones that
+    constraints or drivers of their own move, too.
     """
 
     action: bpy.types.Action
@@ -49,7 +62,9 @@ class Baked:
 
 @dataclass(frozen=True)
 class _Read:
-    """Matrices of every frame: ``bodies`` and ``poses`` of the character, ``above`` (T, 4, 4) what carries the rig's object."""
+    """Matrices of every frame: ``bodies`` and ``poses`` of the character, ``above`` (T, 4, 4) what
+    carries the rig's object.
+    """
 
     bodies: np.ndarray
     poses: np.ndarray
@@ -66,33 +81,59 @@ def frames_played(character: bpy.types.Object, scene: bpy.types.Scene) -> range:
 
 
 def bake_onto_rig(
-    context: bpy.types.Context, character: bpy.types.Object, rig: bpy.types.Object, rig_map: RigMap,
-    root_motion: str = "OBJECT", limbs: str = "FK", frames: range | None = None, name: str | None = None,
+    context: bpy.types.Context,
+    character: bpy.types.Object,
+    rig: bpy.types.Object,
+    rig_map: RigMap,
+    root_motion: str = "OBJECT",
+    limbs: str = "FK",
+    frames: range | None = None,
+    name: str | None = None,
 ) -> Baked:
-    """Key on ``rig`` what ``character`` does in ``frames`` (those of its action), in a new action that the rig then plays.
+    """Key on ``rig`` what ``character`` does in ``frames`` (those of its action), in a new action
+    that the rig then plays.
 
-    ``root_motion``: OBJECT, BONE or HIPS, what carries the rig over the floor; ``limbs``: FK or IK. Earlier actions are kept
-    by a fake user. Controls that are not mapped keep their pose, but those above mapped ones and those that the earlier
-    action moves are put at rest. ``InputError``: rig, map or character cannot be used; the rig is then as it was.
+    ``root_motion``: OBJECT, BONE or HIPS, what carries the rig over the floor; ``limbs``: FK or IK.
+    Earlier actions are kept by a fake user. Controls that are not mapped keep their pose, but those
+    above mapped ones and those that the earlier action moves are put at rest. ``InputError``: rig,
+    map or character cannot be used; the rig is then as it was.
     """
     frames = frames_played(character, context.scene) if frames is None else frames
     unit = metres_per_unit(context.scene)
     size = character_scale(character, 1.0)
     _require_bakeable(context, rig, root_motion)
     if character.data.pose_position == "REST":
-        raise InputError(f"The character '{character.name}' shows its rest position; set it to Pose Position.")
+        raise InputError(
+            f"The character '{character.name}' shows its rest position; set it to Pose Position."
+        )
     rig_map = in_names_of(rig_map, rig.data.bones.keys()) if rig.mode != "EDIT" else rig_map
     required(rig, rig_map)
     controls = controls_of(rig, rig_map, limbs, root_motion == "BONE")
     read = _read(context, character, rig, frames)
     with frame_kept(context.scene), undone_on_failure(rig):
-        return _bake(context, character, rig, rig_map, controls, read, _Wish(
-            root_motion, limbs, np.array(frames, float), name or f"{character.name} on {rig.name}", size, unit))
+        return _bake(
+            context,
+            character,
+            rig,
+            rig_map,
+            controls,
+            read,
+            _Wish(
+                root_motion,
+                limbs,
+                np.array(frames, float),
+                name or f"{character.name} on {rig.name}",
+                size,
+                unit,
+            ),
+        )
 
 
 @dataclass(frozen=True)
 class _Wish:
-    """What was asked for, see ``bake_onto_rig``; ``size``: of the character, in Blender units of the canonical metre."""
+    """What was asked for, see ``bake_onto_rig``; ``size``: of the character, in Blender units of
+    the canonical metre.
+    """
 
     root_motion: str
     limbs: str
@@ -103,15 +144,23 @@ class _Wish:
 
 
 def _bake(
-    context: bpy.types.Context, character: bpy.types.Object, rig: bpy.types.Object, rig_map: RigMap,
-    controls: list[Control], read: _Read, wish: _Wish,
+    context: bpy.types.Context,
+    character: bpy.types.Object,
+    rig: bpy.types.Object,
+    rig_map: RigMap,
+    controls: list[Control],
+    read: _Read,
+    wish: _Wish,
 ) -> Baked:
     previous = rig.animation_data.action if rig.animation_data else None
     moved, switched = _animated(rig)
     action, add_curve = new_action(rig, wish.name)
     action.use_fake_user = True
     assign_action(rig, action)
-    for bone, key, value in (*rig_map.settings.get(wish.limbs, ()), *rig_map.settings.get("BOTH", ())):
+    for bone, key, value in (
+        *rig_map.settings.get(wish.limbs, ()),
+        *rig_map.settings.get("BOTH", ()),
+    ):
         _set(rig, add_curve, bone, key, value, wish.frames[0])
         switched.discard((bone, key))
     for bone, key in switched:
@@ -121,7 +170,12 @@ def _bake(
         _at_rest(rig.pose.bones[bone], add_curve, wish.frames[0], ("location", "rotation", "scale"))
     for control in controls:
         if control.bone in moved:
-            _at_rest(rig.pose.bones[control.bone], add_curve, wish.frames[0], ("location", "scale")[control.moves :])
+            _at_rest(
+                rig.pose.bones[control.bone],
+                add_curve,
+                wish.frames[0],
+                ("location", "scale")[control.moves :],
+            )
 
     held = probe(context, rig, controls)
     evaluated = settled(context, rig)
@@ -136,10 +190,15 @@ def _bake(
     carrier = path.matrices()
     carrier[:, :3, :3] = scale * carrier[:, :3, :3] @ shape.axes.T
     objects = carrier if wish.root_motion == "OBJECT" else still
-    made = channels(controls, held, shape, landed, objects, carrier if wish.root_motion == "BONE" else objects)
+    made = channels(
+        controls, held, shape, landed, objects, carrier if wish.root_motion == "BONE" else objects
+    )
 
     _key_object(rig, add_curve, wish, np.linalg.inv(read.above) @ objects, basis)
-    curves = {control.bone: _key_control(rig, add_curve, control, made, i, wish.frames) for i, control in enumerate(controls)}
+    curves = {
+        control.bone: _key_control(rig, add_curve, control, made, i, wish.frames)
+        for i, control in enumerate(controls)
+    }
     if previous:
         previous.use_fake_user = True
     if held.loose:
@@ -150,9 +209,18 @@ def _bake(
 
 def _overruled(rig: bpy.types.Object, controls: list[Control]) -> tuple[str, ...]:
     """Controls that their own constraints or drivers move, besides their keys."""
+
     def moved(name: str) -> bool:
-        own = any(not constraint.mute and constraint.influence > 0.0 for constraint in rig.pose.bones[name].constraints)
-        return own or driven(rig, tuple(f'pose.bones["{bpy.utils.escape_identifier(name)}"].{part}' for part in TRANSFORMS))
+        own = any(
+            not constraint.mute and constraint.influence > 0.0
+            for constraint in rig.pose.bones[name].constraints
+        )
+        return own or driven(
+            rig,
+            tuple(
+                f'pose.bones["{bpy.utils.escape_identifier(name)}"].{part}' for part in TRANSFORMS
+            ),
+        )
 
     return tuple(control.bone for control in controls if moved(control.bone))
 
@@ -168,22 +236,37 @@ def _require_bakeable(context: bpy.types.Context, rig: bpy.types.Object, root_mo
     if rig.type != "ARMATURE":
         raise InputError(f"'{rig.name}' is no armature; choose the armature of your rig.")
     if rig.library:
-        raise InputError(f"The armature '{rig.name}' is linked; make a library override of it, or make it local first.")
+        raise InputError(
+            f"The armature '{rig.name}' is linked; make a library override of it, or make it "
+            "local first."
+        )
     if rig.data.pose_position == "REST":
-        raise InputError(f"The armature '{rig.name}' shows its rest position; set it to Pose Position.")
+        raise InputError(
+            f"The armature '{rig.name}' shows its rest position; set it to Pose Position."
+        )
     if rig not in {each.original for each in context.evaluated_depsgraph_get().ids}:
-        raise InputError(f"'{rig.name}' or its collection is disabled in viewports; enable it, or hide it with H.")
+        raise InputError(
+            f"'{rig.name}' or its collection is disabled in viewports; enable it, or hide it with "
+            "H."
+        )
     data = rig.animation_data
     if data and (data.use_tweak_mode or any(track.is_solo for track in data.nla_tracks)):
-        raise InputError(f"The armature '{rig.name}' plays an NLA strip in tweak or solo mode; leave it first.")
+        raise InputError(
+            f"The armature '{rig.name}' plays an NLA strip in tweak or solo mode; leave it first."
+        )
     if driven(rig, TRANSFORMS):
         raise InputError(f"The object '{rig.name}' is moved by drivers; mute them and bake again.")
     delta = (*rig.delta_location, *rig.delta_rotation_euler, *(s - 1.0 for s in rig.delta_scale))
     if root_motion == "OBJECT" and (any(not c.mute for c in rig.constraints) or any(delta)):
-        raise InputError(f"The object '{rig.name}' has constraints or delta transforms; choose Hips as the root motion.")
+        raise InputError(
+            f"The object '{rig.name}' has constraints or delta transforms; choose Hips as the "
+            "root motion."
+        )
 
 
-def _read(context: bpy.types.Context, character: bpy.types.Object, rig: bpy.types.Object, frames: range) -> _Read:
+def _read(
+    context: bpy.types.Context, character: bpy.types.Object, rig: bpy.types.Object, frames: range
+) -> _Read:
     """Play the frames and note what is needed; the current frame is as it was afterwards."""
     bodies, poses, above = [], [], []
     with frame_kept(context.scene):
@@ -196,7 +279,10 @@ def _read(context: bpy.types.Context, character: bpy.types.Object, rig: bpy.type
             above.append(np.array(own.matrix_world @ own.matrix_basis.inverted_safe(), float))
     read = _Read(np.array(bodies), np.array(poses), np.array(above))
     if not all(np.isfinite(values).all() for values in (read.bodies, read.poses, read.above)):
-        raise InputError(f"'{character.name}' or '{rig.name}' has a transform that is not a number; fix what drives it.")
+        raise InputError(
+            f"'{character.name}' or '{rig.name}' has a transform that is not a number; fix what "
+            "drives it."
+        )
     return read
 
 
@@ -205,7 +291,11 @@ def _animated(rig: bpy.types.Object) -> tuple[set[str], set[tuple[str, str]]]:
     moved, switched = set(), set()
     for curve in action_curves(rig):
         found = _BONE_PATH.match(curve.data_path)
-        bone, key = (bpy.utils.unescape_identifier(part or "") for part in found.groups()) if found else ("", "")
+        bone, key = (
+            (bpy.utils.unescape_identifier(part or "") for part in found.groups())
+            if found
+            else ("", "")
+        )
         if key and bone in rig.pose.bones:
             switched.add((bone, key))
         elif bone in rig.pose.bones:
@@ -213,8 +303,11 @@ def _animated(rig: bpy.types.Object) -> tuple[set[str], set[tuple[str, str]]]:
     return moved, switched
 
 
-def _in_the_way(context: bpy.types.Context, rig: bpy.types.Object, rig_map: RigMap, suspects: set[str]) -> list[str]:
-    """Those of some bones that move joints when they are moved; they are left at rest, the others keep their pose.
+def _in_the_way(
+    context: bpy.types.Context, rig: bpy.types.Object, rig_map: RigMap, suspects: set[str]
+) -> list[str]:
+    """Those of some bones that move joints when they are moved; they are left at rest, the others
+    keep their pose.
 
     In control rigs they need not be parents of what they move, so each of them is tried.
     """
@@ -237,33 +330,51 @@ def _in_the_way(context: bpy.types.Context, rig: bpy.types.Object, rig_map: RigM
     return found
 
 
-def _at_rest(bone: bpy.types.PoseBone, add_curve: Curves, frame: float, kinds: tuple[str, ...]) -> None:
+def _at_rest(
+    bone: bpy.types.PoseBone, add_curve: Curves, frame: float, kinds: tuple[str, ...]
+) -> None:
     """Put a bone at rest, with one key for each kind of channels."""
     bone.matrix_basis.identity()
     start = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].'
     path, rotation = _rotation_channels(bone.rotation_mode, np.array([[1.0, 0.0, 0.0, 0.0]]))
-    given = {"location": ("location", np.zeros((1, 3))), "rotation": (path, rotation), "scale": ("scale", np.ones((1, 3)))}
+    given = {
+        "location": ("location", np.zeros((1, 3))),
+        "rotation": (path, rotation),
+        "scale": ("scale", np.ones((1, 3))),
+    }
     for kind in kinds:
         key_curves(add_curve, start + given[kind][0], bone.name, np.array([frame]), given[kind][1])
 
 
-def _set(rig: bpy.types.Object, add_curve: Curves, bone: str, key: str, value: Any, frame: float) -> None:
+def _set(
+    rig: bpy.types.Object, add_curve: Curves, bone: str, key: str, value: Any, frame: float
+) -> None:
     """Set and key a custom property of a bone, where the bone has it as a number."""
     holder = rig.pose.bones[bone]
     if isinstance(holder.get(key), int | float):
         holder[key] = type(holder[key])(value)
         names = (bpy.utils.escape_identifier(part) for part in (bone, key))
-        key_curves(add_curve, 'pose.bones["{}"]["{}"]'.format(*names), bone, np.array([frame]), np.array([[value]]))
+        key_curves(
+            add_curve,
+            'pose.bones["{}"]["{}"]'.format(*names),
+            bone,
+            np.array([frame]),
+            np.array([[value]]),
+        )
 
 
 def _rotation_channels(mode: str, quaternions: np.ndarray) -> tuple[str, np.ndarray]:
-    """Data path and values (T, 3 or 4) of rotations (T, 4) in one of Blender's rotation modes, steady in time."""
+    """Data path and values (T, 3 or 4) of rotations (T, 4) in one of Blender's rotation modes,
+    steady in time.
+    """
     if mode == "QUATERNION":
         return "rotation_quaternion", quaternions
     if mode == "AXIS_ANGLE":
         axis, length = quaternions[:, 1:], np.linalg.norm(quaternions[:, 1:], axis=1)
         angle = 2.0 * np.arctan2(length, quaternions[:, 0])
-        return "rotation_axis_angle", np.concatenate([angle[:, None], normalised(axis, np.array([0.0, 1.0, 0.0]))], axis=1)
+        return "rotation_axis_angle", np.concatenate(
+            [angle[:, None], normalised(axis, np.array([0.0, 1.0, 0.0]))], axis=1
+        )
     angles, before = [], Euler((0.0, 0.0, 0.0), mode)
     for quaternion in quaternions:
         before = Quaternion(quaternion.tolist()).to_euler(mode, before)
@@ -276,7 +387,11 @@ def _quaternions(turns: np.ndarray) -> np.ndarray:
 
 
 def _key_object(
-    rig: bpy.types.Object, add_curve: Curves, wish: _Wish, basis: np.ndarray, now: np.ndarray,
+    rig: bpy.types.Object,
+    add_curve: Curves,
+    wish: _Wish,
+    basis: np.ndarray,
+    now: np.ndarray,
 ) -> None:
     """Keys of the object: its way over the floor, or the one place where it stays."""
     frames = wish.frames
@@ -289,7 +404,12 @@ def _key_object(
 
 
 def _key_control(
-    rig: bpy.types.Object, add_curve: Curves, control: Control, made: Channels, i: int, frames: np.ndarray,
+    rig: bpy.types.Object,
+    add_curve: Curves,
+    control: Control,
+    made: Channels,
+    i: int,
+    frames: np.ndarray,
 ) -> dict[str, list[bpy.types.FCurve]]:
     """Keys of one control; returns its curves by channel."""
     bone = rig.pose.bones[control.bone]
@@ -303,6 +423,7 @@ def _key_control(
             curve = add_curve(path, index, group)
             found.setdefault(channel, []).append(curve)
             return curve
+
         return kept
 
     if control.moves:
@@ -313,10 +434,16 @@ def _key_control(
 
 
 def _settle_loose(
-    context: bpy.types.Context, rig: bpy.types.Object, controls: list[Control], held: Attachments, made: Channels,
-    curves: dict[str, dict[str, list[bpy.types.FCurve]]], frames: np.ndarray,
+    context: bpy.types.Context,
+    rig: bpy.types.Object,
+    controls: list[Control],
+    held: Attachments,
+    made: Channels,
+    curves: dict[str, dict[str, list[bpy.types.FCurve]]],
+    frames: np.ndarray,
 ) -> None:
-    """Where a control is not turned rigidly by another one, look in each frame how it lies, and turn it as was wanted.
+    """Where a control is not turned rigidly by another one, look in each frame how it lies, and
+    turn it as was wanted.
 
     Once for every such control, since each of them may hang on the one before.
     """
@@ -337,9 +464,16 @@ def _settle_loose(
 
 
 def _measured(
-    context: bpy.types.Context, rig: bpy.types.Object, rig_map: RigMap, targets: np.ndarray, source: np.ndarray, wish: _Wish,
+    context: bpy.types.Context,
+    rig: bpy.types.Object,
+    rig_map: RigMap,
+    targets: np.ndarray,
+    source: np.ndarray,
+    wish: _Wish,
 ) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[float, float]]]:
-    """Errors and angles as in ``Baked``, of the joints' targets and the source's joints (T, 22, 3)."""
+    """Errors and angles as in ``Baked``, of the joints' targets and the source's joints (T, 22,
+    3).
+    """
     chosen = np.unique(np.linspace(0, len(wish.frames) - 1, _CHECKED).astype(int))
     bones = {j: rig_map.place(name) for j, name in enumerate(JOINTS) if rig_map.place(name)}
     played = np.full((len(chosen), len(JOINTS), 3), np.nan)
@@ -353,7 +487,15 @@ def _measured(
         return float(np.mean(values)), float(np.max(values))
 
     off = played - targets[chosen]
-    parts = {"wrists": off[:, [20, 21]], "ankles": off[:, [7, 8]], "head": off[:, [15]],
-             "pelvis": off[:, [1, 2]].mean(axis=1, keepdims=True)}
-    errors = {part: told(wish.unit * np.linalg.norm(values, axis=-1)) for part, values in parts.items()}
-    return errors, {limb: told(values) for limb, values in limb_errors(played, source[chosen]).items()}
+    parts = {
+        "wrists": off[:, [20, 21]],
+        "ankles": off[:, [7, 8]],
+        "head": off[:, [15]],
+        "pelvis": off[:, [1, 2]].mean(axis=1, keepdims=True),
+    }
+    errors = {
+        part: told(wish.unit * np.linalg.norm(values, axis=-1)) for part, values in parts.items()
+    }
+    return errors, {
+        limb: told(values) for limb, values in limb_errors(played, source[chosen]).items()
+    }

@@ -1,8 +1,9 @@
 """Overlays in the viewport and the timeline: switches, what draws them, and when.
 
-All are off at first. Blender is asked to draw only while a switch is on or a job shows what grows, and ``gpu`` is imported only
-when something is drawn. The switches live here and not in the file, so opening another file or undoing leaves them as they are;
-nothing here holds on to objects of the file, which ``overlay_data`` looks up at each redraw.
+All are off at first. Blender is asked to draw only while a switch is on or a job shows what grows,
+and ``gpu`` is imported only when something is drawn. The switches live here and not in the file, so
+opening another file or undoing leaves them as they are; nothing here holds on to objects of the
+file, which ``overlay_data`` looks up at each redraw.
 """
 
 from collections.abc import Callable, Iterable
@@ -17,12 +18,23 @@ from . import overlay_data
 from .overlay_data import CIRCLE, KINDS, Drawing, Faults
 
 __all__ = [
-    "Overlays", "beads_of", "corner_of", "hide_faults", "hide_growing", "register", "show_faults", "show_growing",
-    "shown_faults", "switch", "switched_on", "unregister",
+    "Overlays",
+    "beads_of",
+    "corner_of",
+    "hide_faults",
+    "hide_growing",
+    "register",
+    "show_faults",
+    "show_growing",
+    "shown_faults",
+    "switch",
+    "switched_on",
+    "unregister",
 ]
 
 _RADIUS, _EDGE = 52.0, 26.0  # pixels: of the circle; from its labels to the view's edges
-_BAR, _BAR_EDGE = 4.5, 7.0  # pixels: height of a bar in the timeline; of the first one over the region's lower edge
+# pixels: height of a bar in the timeline; of the first one over the region's lower edge
+_BAR, _BAR_EDGE = 4.5, 7.0
 _DISC = (0.10, 0.11, 0.12, 0.72)
 _LETTERS = 12.0  # points
 _LIGHT = np.array((0.3, -0.45, 0.84))  # from where beads look lit
@@ -35,33 +47,56 @@ _batches: dict[tuple[str, int], tuple[Drawing, list[tuple[str, Any]]]] = {}
 
 
 class Overlays(bpy.types.PropertyGroup):
-    """Switches of what is drawn over the view (``WindowManager.dafnet_overlays``); kept for the session, in no file."""
+    """Switches of what is drawn over the view (``WindowManager.dafnet_overlays``); kept for the
+    session, in no file.
+    """
 
     spheres: BoolProperty(
-        name="Sensor", options=set(),
-        description="The spheres round the root that furniture occupies now, which is all that the network sees of it",
-        get=lambda _self: "spheres" in _on, set=lambda _self, on: switch("spheres", on),
+        name="Sensor",
+        options=set(),
+        description=(
+            "The spheres round the root that furniture occupies now, which is all that the "
+            "network sees of it"
+        ),
+        get=lambda _self: "spheres" in _on,
+        set=lambda _self, on: switch("spheres", on),
     )
     path: BoolProperty(
-        name="Root Path", options=set(), description="The root's path on the floor with its facing",
-        get=lambda _self: "path" in _on, set=lambda _self, on: switch("path", on),
+        name="Root Path",
+        options=set(),
+        description="The root's path on the floor with its facing",
+        get=lambda _self: "path" in _on,
+        set=lambda _self, on: switch("path", on),
     )
     marks: BoolProperty(
-        name="Contacts", options=set(),
-        description="Planted feet (green), joints that touch furniture (orange) or are inside it (red)",
-        get=lambda _self: "marks" in _on, set=lambda _self, on: switch("marks", on),
+        name="Contacts",
+        options=set(),
+        description=(
+            "Planted feet (green), joints that touch furniture (orange) or are inside it (red)"
+        ),
+        get=lambda _self: "marks" in _on,
+        set=lambda _self, on: switch("marks", on),
     )
     circle: BoolProperty(
-        name="Action", options=set(), description="How likely each of the network's actions is, as rays of a circle",
-        get=lambda _self: CIRCLE in _on, set=lambda _self, on: switch(CIRCLE, on),
+        name="Action",
+        options=set(),
+        description="How likely each of the network's actions is, as rays of a circle",
+        get=lambda _self: CIRCLE in _on,
+        set=lambda _self, on: switch(CIRCLE, on),
     )
     reach: BoolProperty(
-        name="Head and Hands", options=set(), description="The ways of head and hands, and their targets (red)",
-        get=lambda _self: "reach" in _on, set=lambda _self, on: switch("reach", on),
+        name="Head and Hands",
+        options=set(),
+        description="The ways of head and hands, and their targets (red)",
+        get=lambda _self: "reach" in _on,
+        set=lambda _self, on: switch("reach", on),
     )
     ghosts: BoolProperty(
-        name="Ghosts", options=set(), description="The takes whose ghost is ticked in the list, as figures of lines",
-        get=lambda _self: "ghosts" in _on, set=lambda _self, on: switch("ghosts", on),
+        name="Ghosts",
+        options=set(),
+        description="The takes whose ghost is ticked in the list, as figures of lines",
+        get=lambda _self: "ghosts" in _on,
+        set=lambda _self, on: switch("ghosts", on),
     )
 
 
@@ -80,7 +115,9 @@ def switched_on() -> frozenset[str]:
 
 
 def show_growing(joints: Callable[[], np.ndarray | None]) -> None:
-    """Draw the joints (22, 3), world metres, that the function gives at each redraw; None draws nothing."""
+    """Draw the joints (22, 3), world metres, that the function gives at each redraw; None draws
+    nothing.
+    """
     _growing[:] = [joints]
     _arrange()
 
@@ -172,7 +209,10 @@ def _opened(*_: object) -> None:
 
 
 _LISTENERS: dict[str, Callable[..., None]] = {
-    "depsgraph_update_post": _edited, "frame_change_post": _other_frame, "undo_post": _undone, "redo_post": _undone,
+    "depsgraph_update_post": _edited,
+    "frame_change_post": _other_frame,
+    "undo_post": _undone,
+    "redo_post": _undone,
     "load_post": _opened,
 }
 
@@ -181,12 +221,20 @@ _LISTENERS: dict[str, Callable[..., None]] = {
 
 
 def beads_of(drawing: Drawing) -> tuple[np.ndarray, np.ndarray]:
-    """The beads as octahedra: corners of their triangles (24 B, 3), and their colours (24 B, 4), lighter on the lit side."""
+    """The beads as octahedra: corners of their triangles (24 B, 3), and their colours (24 B, 4),
+    lighter on the lit side.
+    """
     axes = np.eye(3)
-    corners = np.array([
-        (x * axes[0], y * axes[1], z * axes[2]) if x * y * z > 0 else (y * axes[1], x * axes[0], z * axes[2])
-        for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)
-    ])
+    corners = np.array(
+        [
+            (x * axes[0], y * axes[1], z * axes[2])
+            if x * y * z > 0
+            else (y * axes[1], x * axes[0], z * axes[2])
+            for x in (-1, 1)
+            for y in (-1, 1)
+            for z in (-1, 1)
+        ]
+    )
     lit = 0.68 + 0.32 * np.clip(corners.sum(axis=1) @ _LIGHT / np.sqrt(3.0), -1.0, 1.0)
     places = drawing.beads[:, None, None] + drawing.radii[:, None, None, None] * corners
     colours = np.repeat(drawing.bead_colours[:, None], 8, axis=1)
@@ -206,12 +254,19 @@ def _batches_of(kind: str, number: int, drawing: Drawing) -> list[tuple[str, Any
     if len(drawing.beads):
         places, colours = (a.astype(np.float32) for a in beads_of(drawing))
         shader = gpu.shader.from_builtin("SMOOTH_COLOR")
-        made.append(("SMOOTH_COLOR", batch_for_shader(shader, "TRIS", {"pos": places, "color": colours})))
+        made.append(
+            ("SMOOTH_COLOR", batch_for_shader(shader, "TRIS", {"pos": places, "color": colours}))
+        )
     if len(drawing.lines):
         places = drawing.lines.reshape(-1, 3).astype(np.float32)
         colours = np.repeat(drawing.line_colours, 2, axis=0).astype(np.float32)
         shader = gpu.shader.from_builtin("POLYLINE_SMOOTH_COLOR")
-        made.append(("POLYLINE_SMOOTH_COLOR", batch_for_shader(shader, "LINES", {"pos": places, "color": colours})))
+        made.append(
+            (
+                "POLYLINE_SMOOTH_COLOR",
+                batch_for_shader(shader, "LINES", {"pos": places, "color": colours}),
+            )
+        )
     _batches[kind, number] = drawing, made
     return made
 
@@ -271,7 +326,10 @@ def _draw_flat() -> None:
     if not wanted.get(CIRCLE):
         return
     scale = context.preferences.system.ui_scale
-    middle, radius = corner_of(context.area, context.region, (1.4 * _RADIUS + _EDGE) * scale), _RADIUS * scale
+    middle, radius = (
+        corner_of(context.area, context.region, (1.4 * _RADIUS + _EDGE) * scale),
+        _RADIUS * scale,
+    )
     with gpu.matrix.push_pop():
         gpu.matrix.translate((*middle, 0.0))
         gpu.matrix.scale((radius, radius, 1.0))
@@ -279,11 +337,19 @@ def _draw_flat() -> None:
         _draw(CIRCLE, wanted[CIRCLE])
     for drawing in wanted[CIRCLE]:
         for place, text, colour in drawing.labels:
-            _write(text, middle[0] + radius * place[0], middle[1] + radius * place[1], colour, centred=True)
+            _write(
+                text,
+                middle[0] + radius * place[0],
+                middle[1] + radius * place[1],
+                colour,
+                centred=True,
+            )
 
 
 def corner_of(area: bpy.types.Area, region: bpy.types.Region, inset: float) -> tuple[float, float]:
-    """A place ``inset`` pixels from the region's lower right corner that the sidebar does not hide; in the region."""
+    """A place ``inset`` pixels from the region's lower right corner that the sidebar does not hide;
+    in the region.
+    """
     covered = (r for r in area.regions if r.type == "UI" and r.width > 1 and r.x > region.x)
     right = min([region.x + region.width, *(r.x for r in covered)]) - region.x
     return right - inset, inset
@@ -295,7 +361,11 @@ def _fill_disc(radius: float) -> None:
 
     angle = np.linspace(0.0, 2.0 * np.pi, 49)
     rim = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    corners = np.stack([np.zeros_like(rim[1:]), rim[:-1], rim[1:]], axis=1).reshape(-1, 2).astype(np.float32)
+    corners = (
+        np.stack([np.zeros_like(rim[1:]), rim[:-1], rim[1:]], axis=1)
+        .reshape(-1, 2)
+        .astype(np.float32)
+    )
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     gpu.state.blend_set("ALPHA")
     shader.bind()
@@ -303,7 +373,9 @@ def _fill_disc(radius: float) -> None:
     batch_for_shader(shader, "TRIS", {"pos": corners}).draw(shader)
 
 
-def _write(text: str, x: float, y: float, colour: tuple[float, float, float, float], centred: bool = False) -> None:
+def _write(
+    text: str, x: float, y: float, colour: tuple[float, float, float, float], centred: bool = False
+) -> None:
     """Write with the lower middle at (x, y) of the region, or the very middle."""
     import blf
 
@@ -315,7 +387,9 @@ def _write(text: str, x: float, y: float, colour: tuple[float, float, float, flo
 
 
 def _draw_timeline() -> None:
-    """Bars at the frames of the playing take in which feet slide (upper row) and joints touch furniture."""
+    """Bars at the frames of the playing take in which feet slide (upper row) and joints touch
+    furniture.
+    """
     import gpu
     from gpu_extras.batch import batch_for_shader
 
@@ -330,11 +404,15 @@ def _draw_timeline() -> None:
         return
     view, scale = context.region.view2d, context.preferences.system.ui_scale
     origin, step = (view.view_to_region(frame, 0.0, clip=False)[0] for frame in (0.0, 1000.0))
-    left, right = (origin + (step - origin) * (edge / 1000.0) for edge in (bars.first - 0.5, bars.last + 0.5))
+    left, right = (
+        origin + (step - origin) * (edge / 1000.0) for edge in (bars.first - 0.5, bars.last + 0.5)
+    )
     low = (_BAR_EDGE + (1.0 - bars.row) * (_BAR + 1.0)) * scale
     high = low + _BAR * scale
     right = np.maximum(right, left + 1.0)
-    corners = np.stack([left, low, right, low, right, high, left, low, right, high, left, high], axis=1).reshape(-1, 2)
+    corners = np.stack(
+        [left, low, right, low, right, high, left, low, right, high, left, high], axis=1
+    ).reshape(-1, 2)
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     content = {
         "pos": np.c_[corners, np.zeros(len(corners))].astype(np.float32),

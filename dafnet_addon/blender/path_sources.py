@@ -1,4 +1,6 @@
-"""Keys on a character's root from what the animator has already: a drawn curve, something that moves, points on the floor."""
+"""Keys on a character's root from what the animator has already: a drawn curve, something that
+moves, points on the floor.
+"""
 
 import re
 from collections.abc import Callable, Sequence
@@ -25,7 +27,16 @@ from .properties import settings_of
 from .root_keys import MOVES, keyable_root, keyed_along, last_key, unchanged_on_failure
 from .walking import Walk, extended_to, told_of, walk
 
-__all__ = ["along_curve", "as_moved", "chosen", "floor_points", "is_curve", "may_move", "places_of", "through_points"]
+__all__ = [
+    "along_curve",
+    "as_moved",
+    "chosen",
+    "floor_points",
+    "is_curve",
+    "may_move",
+    "places_of",
+    "through_points",
+]
 
 _BEFORE = 0.2  # seconds of rest before the first step
 _SPACING = 0.05  # metres between points on the furniture
@@ -40,15 +51,22 @@ def is_curve(candidate: bpy.types.Object) -> bool:
 def may_move(candidate: bpy.types.Object) -> bool:
     """Whether keys, drivers, constraints or a parent may move it."""
     return bool(
-        any(curve.data_path == "location" for curve in action_curves(candidate)) or candidate.parent or candidate.constraints
-        or (candidate.animation_data and (candidate.animation_data.drivers or candidate.animation_data.nla_tracks))
+        any(curve.data_path == "location" for curve in action_curves(candidate))
+        or candidate.parent
+        or candidate.constraints
+        or (
+            candidate.animation_data
+            and (candidate.animation_data.drivers or candidate.animation_data.nla_tracks)
+        )
     )
 
 
 def chosen(
     context: bpy.types.Context, fits: Callable[[bpy.types.Object], bool]
 ) -> tuple[bpy.types.Object | None, bpy.types.Object | None]:
-    """The character to direct (``armature.sent``), and the active or else the only selected other object that ``fits``."""
+    """The character to direct (``armature.sent``), and the active or else the only selected other
+    object that ``fits``.
+    """
     character = sent(context)[0]
     if character is None:
         return None, None
@@ -59,18 +77,26 @@ def chosen(
 
 
 def floor_points(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The selected empties that are no part of a character, in the order of their names; 10 comes after 9."""
+    """The selected empties that are no part of a character, in the order of their names; 10 comes
+    after 9.
+    """
     characters = [o for o in context.scene.objects if is_character(o)]
     parts = {part for character in characters for part in parts_of(character)}
     found = [o for o in context.selected_objects if o.type == "EMPTY" and o not in parts]
-    return sorted(found, key=lambda o: [(not t.isdigit(), int(t) if t.isdigit() else 0, t.lower())
-                                        for t in re.split(r"(\d+)", o.name)])
+    return sorted(
+        found,
+        key=lambda o: [
+            (not t.isdigit(), int(t) if t.isdigit() else 0, t.lower())
+            for t in re.split(r"(\d+)", o.name)
+        ],
+    )
 
 
 @dataclass(frozen=True)
 class _Directed:
-    """The character's ``root`` in the scene, its ``place`` (3,) and ``yaw`` at frame ``first`` and the furniture then, in
-    canonical metres, of which a Blender unit is ``unit``; the character's ``size`` over the canonical one.
+    """The character's ``root`` in the scene, its ``place`` (3,) and ``yaw`` at frame ``first`` and
+    the furniture then, in canonical metres, of which a Blender unit is ``unit``; the character's
+    ``size`` over the canonical one.
     """
 
     root: bpy.types.Object
@@ -92,27 +118,44 @@ class _Directed:
         return Stop((float(self.place[0]), float(self.place[1])), self.yaw, _BEFORE, seated=seated)
 
 
-def _directed(context: bpy.types.Context, armature: bpy.types.Object, first: int | None = None) -> _Directed:
-    """At frame ``first``, None for the root's last key or else the current frame. The scene's frame is as before."""
+def _directed(
+    context: bpy.types.Context, armature: bpy.types.Object, first: int | None = None
+) -> _Directed:
+    """At frame ``first``, None for the root's last key or else the current frame. The scene's frame
+    is as before.
+    """
     scene = context.scene
     settings = settings_of(armature, scene)
     root = keyable_root(settings)
-    fps, size = scene.render.fps / scene.render.fps_base, character_scale(armature, metres_per_unit(scene))
+    fps, size = (
+        scene.render.fps / scene.render.fps_base,
+        character_scale(armature, metres_per_unit(scene)),
+    )
     unit = metres_per_unit(scene) / size
     if first is None:
         keyed = last_key(root)
         first = scene.frame_current if keyed is None else keyed
     with frame_kept(scene):
-        meshes = [mesh for found in furniture_at(context, settings, first).values() for mesh in found]
+        meshes = [
+            mesh for found in furniture_at(context, settings, first).values() for mesh in found
+        ]
         place, yaw = np.array(root.location, float) * unit, float(root.rotation_euler[2])
-    return _Directed(root, first, unit, size, fps, place, yaw, scaled(Scene(tuple(meshes)), 1.0 / size))
+    return _Directed(
+        root, first, unit, size, fps, place, yaw, scaled(Scene(tuple(meshes)), 1.0 / size)
+    )
 
 
 def _written(
-    context: bpy.types.Context, armature: bpy.types.Object, directed: _Directed, walked: Route,
-    met: Sequence[Passage], *warnings: str,
+    context: bpy.types.Context,
+    armature: bpy.types.Object,
+    directed: _Directed,
+    walked: Route,
+    met: Sequence[Passage],
+    *warnings: str,
 ) -> Walk:
-    """Key a route over what the root has from its first frame on, and tell what is ``met``; before that it moves as it did."""
+    """Key a route over what the root has from its first frame on, and tell what is ``met``; before
+    that it moves as it did.
+    """
     root, first = directed.root, directed.first
     with unchanged_on_failure(root):
         kept = _cut(root, first)
@@ -123,11 +166,18 @@ def _written(
                     curve.keyframe_points.insert(frame, value).interpolation = "LINEAR"
             curve.update()
     last_frame = first + len(walked.path) - 1
-    return Walk(first, last_frame, extended_to(context.scene, armature, last_frame), (*told_of(met, first), *warnings))
+    return Walk(
+        first,
+        last_frame,
+        extended_to(context.scene, armature, last_frame),
+        (*told_of(met, first), *warnings),
+    )
 
 
 def _cut(root: bpy.types.Object, first: int) -> dict[tuple[str, int], list[tuple[int, float]]]:
-    """Remove a root's keys from frame ``first`` on; returns by curve the values of the frames after the last key that stays."""
+    """Remove a root's keys from frame ``first`` on; returns by curve the values of the frames after
+    the last key that stays.
+    """
     kept: dict[tuple[str, int], list[tuple[int, float]]] = {}
     for curve in action_curves(root):
         if curve.data_path not in MOVES:
@@ -135,10 +185,15 @@ def _cut(root: bpy.types.Object, first: int) -> dict[tuple[str, int], list[tuple
         earlier = [point for point in curve.keyframe_points if point.co[0] < first]
         if earlier:
             last = earlier[-1]
-            last.handle_left_type = last.handle_right_type = "FREE"  # else the next key would bend what leads to this one
+            # else the next key would bend what leads to this one
+            last.handle_left_type = last.handle_right_type = "FREE"
             between = range(int(np.floor(last.co[0])) + 1, first)
-            kept[curve.data_path, curve.array_index] = [(frame, curve.evaluate(frame)) for frame in between]
-        for k in reversed([k for k, point in enumerate(curve.keyframe_points) if point.co[0] >= first]):
+            kept[curve.data_path, curve.array_index] = [
+                (frame, curve.evaluate(frame)) for frame in between
+            ]
+        for k in reversed(
+            [k for k, point in enumerate(curve.keyframe_points) if point.co[0] >= first]
+        ):
             curve.keyframe_points.remove(curve.keyframe_points[k], fast=True)
         curve.update()
     return kept
@@ -154,7 +209,13 @@ def _line_of(context: bpy.types.Context, curve: bpy.types.Object) -> np.ndarray:
         bare = bpy.data.objects.new(curve.name, curve.data.copy())
         data = bare.data
         try:
-            data.bevel_mode, data.bevel_depth, data.extrude, data.bevel_object, data.dimensions = "ROUND", 0.0, 0.0, None, "3D"
+            data.bevel_mode, data.bevel_depth, data.extrude, data.bevel_object, data.dimensions = (
+                "ROUND",
+                0.0,
+                0.0,
+                None,
+                "3D",
+            )
             lines = _lines(bare)
         finally:
             bpy.data.objects.remove(bare)
@@ -167,7 +228,9 @@ def _line_of(context: bpy.types.Context, curve: bpy.types.Object) -> np.ndarray:
 
 
 def _lines(owner: bpy.types.Object) -> list[np.ndarray]:
-    """The chains of edges (N, 3) that a curve is drawn with, in its own space; none where it has faces."""
+    """The chains of edges (N, 3) that a curve is drawn with, in its own space; none where it has
+    faces.
+    """
     mesh = owner.to_mesh()
     try:
         if mesh is None or len(mesh.polygons) or not len(mesh.edges):
@@ -177,7 +240,10 @@ def _lines(owner: bpy.types.Object) -> list[np.ndarray]:
         mesh.edges.foreach_get("vertices", edges)
     finally:
         owner.to_mesh_clear()
-    points, pairs = flat.reshape(-1, 3), {tuple(sorted(pair)) for pair in edges.reshape(-1, 2).tolist()}
+    points, pairs = (
+        flat.reshape(-1, 3),
+        {tuple(sorted(pair)) for pair in edges.reshape(-1, 2).tolist()},
+    )
     lines, start = [], 0
     for k in range(1, len(points) + 1):
         if k == len(points) or (k - 1, k) not in pairs:
@@ -188,83 +254,135 @@ def _lines(owner: bpy.types.Object) -> list[np.ndarray]:
 
 
 def along_curve(
-    context: bpy.types.Context, armature: bpy.types.Object, curve: bpy.types.Object, *, speed: float = 1.1,
-    seconds: float = 1.0, keep_facing: bool = False, backwards: bool = False,
+    context: bpy.types.Context,
+    armature: bpy.types.Object,
+    curve: bpy.types.Object,
+    *,
+    speed: float = 1.1,
+    seconds: float = 1.0,
+    keep_facing: bool = False,
+    backwards: bool = False,
 ) -> Walk:
-    """Let the character walk along a curve from the current frame on, and stand at its end for some ``seconds``.
+    """Let the character walk along a curve from the current frame on, and stand at its end for some
+    ``seconds``.
 
-    Where the root has keys before that, it goes from where it is to the curve first; else the walk begins on the curve. Later
-    keys are replaced. ``keep_facing``: it looks where it looks now all the way. ``backwards``: from the curve's end.
-    ``InputError``: no curve, too short, or the root cannot be keyed; nothing is changed then.
+    Where the root has keys before that, it goes from where it is to the curve first; else the walk
+    begins on the curve. Later keys are replaced. ``keep_facing``: it looks where it looks now all
+    the way. ``backwards``: from the curve's end. ``InputError``: no curve, too short, or the root
+    cannot be keyed; nothing is changed then.
     """
     line = _line_of(context, curve)[:: -1 if backwards else 1]
     at = _directed(context, armature, context.scene.frame_current)
     points = line[:, :2] * at.unit
-    keys = [p.co[0] for c in action_curves(at.root) if c.data_path in MOVES for p in c.keyframe_points]
+    keys = [
+        p.co[0] for c in action_curves(at.root) if c.data_path in MOVES for p in c.keyframe_points
+    ]
     away = float(np.linalg.norm(points[0] - at.place[:2]))
     start = at.start() if away < _THERE or (keys and min(keys) < at.first) else None
     if start is not None and away >= _THERE:
         points = np.concatenate([_way(at, start, [points[0]])[:-1], points])
     walked = trail(
-        points, start, speed=speed, fps=at.fps, floor=at.floor, yaw=at.yaw if keep_facing else None, seconds=seconds,
+        points,
+        start,
+        speed=speed,
+        fps=at.fps,
+        floor=at.floor,
+        yaw=at.yaw if keep_facing else None,
+        seconds=seconds,
         name=f"curve '{curve.name}'",
     )
-    return _written(context, armature, at, walked, met_along(at.solids, walked.path, at.fps, end=()))
+    return _written(
+        context, armature, at, walked, met_along(at.solids, walked.path, at.fps, end=())
+    )
 
 
 def _way(at: _Directed, start: Stop, goals: list[np.ndarray]) -> np.ndarray:
-    """Corners (N, 2) of the way round the furniture from ``start`` through the places ``goals`` (2,), with these."""
+    """Corners (N, 2) of the way round the furniture from ``start`` through the places ``goals``
+    (2,), with these.
+    """
     forward = np.array([-np.sin(start.yaw), np.cos(start.yaw)])
     here, corners = np.array(start.position) + (AFTER_SEAT if start.seated else 0.0) * forward, []
-    points = surface_points(at.solids.solids, _SPACING, around([here, *goals])) - np.array([0.0, 0.0, at.floor])
+    points = surface_points(at.solids.solids, _SPACING, around([here, *goals])) - np.array(
+        [0.0, 0.0, at.floor]
+    )
     for goal in goals:
         corners += [*(np.array(corner) for corner in way_round(points, here, goal, at.size)), goal]
         here = goal
     return np.array(corners)
 
 
-def places_of(context: bpy.types.Context, source: bpy.types.Object, frames: Sequence[int]) -> np.ndarray:
-    """Where an object is in some rising frames (N, 3), world, Blender units; the current frame stays."""
+def places_of(
+    context: bpy.types.Context, source: bpy.types.Object, frames: Sequence[int]
+) -> np.ndarray:
+    """Where an object is in some rising frames (N, 3), world, Blender units; the current frame
+    stays.
+    """
     places = {}
     with frame_kept(context.scene):
-        for frame in in_order(frames, Dependencies(context.scene).simulations([source], shaped=False)):
+        for frame in in_order(
+            frames, Dependencies(context.scene).simulations([source], shaped=False)
+        ):
             context.scene.frame_set(frame)
-            places[frame] = tuple(source.evaluated_get(context.evaluated_depsgraph_get()).matrix_world.translation)
+            places[frame] = tuple(
+                source.evaluated_get(context.evaluated_depsgraph_get()).matrix_world.translation
+            )
     return np.array([places[frame] for frame in frames], float)
 
 
-def as_moved(context: bpy.types.Context, armature: bpy.types.Object, source: bpy.types.Object) -> Walk:
-    """Let the root go where ``source`` goes over the floor, at the same frames: those of its keys, else of the scene's range.
+def as_moved(
+    context: bpy.types.Context, armature: bpy.types.Object, source: bpy.types.Object
+) -> Walk:
+    """Let the root go where ``source`` goes over the floor, at the same frames: those of its keys,
+    else of the scene's range.
 
-    The root's keys from there on are replaced. ``InputError``: it hardly moves, or the root cannot be keyed; nothing is changed
-    then.
+    The root's keys from there on are replaced. ``InputError``: it hardly moves, or the root cannot
+    be keyed; nothing is changed then.
     """
     scene = context.scene
-    keys = [p.co[0] for c in action_curves(source) if c.data_path == "location" for p in c.keyframe_points]
-    first, last = (int(np.floor(min(keys))), int(np.ceil(max(keys)))) if keys else (scene.frame_start, scene.frame_end)
+    keys = [
+        p.co[0]
+        for c in action_curves(source)
+        if c.data_path == "location"
+        for p in c.keyframe_points
+    ]
+    first, last = (
+        (int(np.floor(min(keys))), int(np.ceil(max(keys))))
+        if keys
+        else (scene.frame_start, scene.frame_end)
+    )
     at = _directed(context, armature, first)
     places = places_of(context, source, range(first, last + 1))[:, :2] * at.unit
     moved = followed(places, at.fps, at.yaw, at.floor)
     fastest = float(np.linalg.norm(np.diff(moved.path.position, axis=0), axis=1).max() * at.fps)
-    hurried = f"'{source.name}' moves at up to {fastest:.1f} m/s, faster than this character can walk; slow it down."
+    hurried = (
+        f"'{source.name}' moves at up to {fastest:.1f} m/s, faster than this character can walk; "
+        "slow it down."
+    )
     met = met_along(at.solids, moved.path, at.fps)
     return _written(context, armature, at, moved, met, *([hurried] if fastest > FASTEST else []))
 
 
 def through_points(
-    context: bpy.types.Context, armature: bpy.types.Object, points: list[bpy.types.Object], *, speed: float = 1.1,
-    seconds: float = 1.0, to_cursor: bool = False,
+    context: bpy.types.Context,
+    armature: bpy.types.Object,
+    points: list[bpy.types.Object],
+    *,
+    speed: float = 1.1,
+    seconds: float = 1.0,
+    to_cursor: bool = False,
 ) -> Walk:
     """Let the character walk through the places of ``points`` and stand at the last.
 
-    ``to_cursor``: the 3D cursor is the last; it is the only one where there are no points. Goes on from the root's last key,
-    else from the current frame, round the furniture and without rests in between.
-    ``InputError``: no way, or the root cannot be keyed; nothing is changed then.
+    ``to_cursor``: the 3D cursor is the last; it is the only one where there are no points. Goes on
+    from the root's last key, else from the current frame, round the furniture and without rests in
+    between. ``InputError``: no way, or the root cannot be keyed; nothing is changed then.
     """
     if not points:
         return walk(context, armature, None, seconds, speed)
     at = _directed(context, armature)
-    spots = [point.matrix_world.translation for point in points] + [context.scene.cursor.location] * to_cursor
+    spots = [point.matrix_world.translation for point in points] + [
+        context.scene.cursor.location
+    ] * to_cursor
     places = [np.array(spot, float)[:2] * at.unit for spot in spots]
     if len(places) > 1 and np.linalg.norm(places[0] - at.place[:2]) < 0.3:
         del places[0]  # it stands there already
@@ -274,4 +392,6 @@ def through_points(
     via = [(float(x), float(y)) for x, y in way]
     goal = Stop(via.pop(), facing(last), seconds)
     walked = route(start, *via, goal, speed=speed, fps=at.fps, floor=at.floor)
-    return _written(context, armature, at, walked, met_along(at.solids, walked.path, at.fps, end=()))
+    return _written(
+        context, armature, at, walked, met_along(at.solids, walked.path, at.fps, end=())
+    )

@@ -1,4 +1,6 @@
-"""Setting the scene's frames: the current one comes back, and simulations run as they do when the shot is played."""
+"""Setting the scene's frames: the current one comes back, and simulations run as they do when the
+shot is played.
+"""
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -26,9 +28,11 @@ def frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 def in_order(frames: Sequence[int], simulations: Sequence[Simulation]) -> Sequence[int]:
-    """The frames to set, in this order, to see some rising ``frames``: those, or with simulations all from their start on.
+    """The frames to set, in this order, to see some rising ``frames``: those, or with simulations
+    all from their start on.
 
-    A simulation makes each frame of the one before, so it knows no jumps: not over frames, and not back and forth either.
+    A simulation makes each frame of the one before, so it knows no jumps: not over frames, and not
+    back and forth either.
     """
     if not simulations:
         return frames
@@ -36,13 +40,18 @@ def in_order(frames: Sequence[int], simulations: Sequence[Simulation]) -> Sequen
 
 
 def play_steps(
-    context: bpy.types.Context, frames: range, simulations: Sequence[Simulation], look: Look,
+    context: bpy.types.Context,
+    frames: range,
+    simulations: Sequence[Simulation],
+    look: Look,
 ) -> Generator[float, None, None]:
-    """Set each frame and ``look`` at it; yields progress in [0, 1), at which the current frame is as it was.
+    """Set each frame and ``look`` at it; yields progress in [0, 1), at which the current frame is
+    as it was.
 
-    With ``simulations`` the frames run on instead, and the current one comes back at the end or when the generator is closed.
-    ``look`` gets the frame, the evaluated scene, and the objects that Blender has shaped anew for it. ``InputError``: a frame
-    was set by somebody else while a simulation ran.
+    With ``simulations`` the frames run on instead, and the current one comes back at the end or
+    when the generator is closed. ``look`` gets the frame, the evaluated scene, and the objects that
+    Blender has shaped anew for it. ``InputError``: a frame was set by somebody else while a
+    simulation ran.
     """
     scene = context.scene
     played = in_order(frames, simulations)
@@ -50,7 +59,9 @@ def play_steps(
     with frame_kept(scene) if simulations else nullcontext():
         for start in range(0, len(played), _BATCH):
             if simulations and scene.frame_current != last:
-                raise InputError("The current frame was changed while a simulation was read; generate again.")
+                raise InputError(
+                    "The current frame was changed while a simulation was read; generate again."
+                )
             with nullcontext() if simulations else frame_kept(scene), _reshaped(scene) as shaped:
                 for frame in played[start : start + _BATCH]:
                     shaped.clear()
@@ -63,7 +74,9 @@ def play_steps(
 
 @contextmanager
 def _reshaped(scene: bpy.types.Scene) -> Iterator[set[bpy.types.Object]]:
-    """The objects that Blender shapes anew when a frame is set, added by Blender itself until the block ends."""
+    """The objects that Blender shapes anew when a frame is set, added by Blender itself until the
+    block ends.
+    """
     found: set[bpy.types.Object] = set()
 
     def note(changed: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:

@@ -1,4 +1,6 @@
-"""Previews of a scene by the Workbench renderer: an H.264 film and a contact sheet, in seconds and without a screen."""
+"""Previews of a scene by the Workbench renderer: an H.264 film and a contact sheet, in seconds and
+without a screen.
+"""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,7 +23,9 @@ def look_at(ob: bpy.types.Object, position: Sequence[float], target: Sequence[fl
 
 
 def use_workbench(scene: bpy.types.Scene, width: int = 640, height: int = 360) -> None:
-    """Set the scene up for quick renders that look good: studio light, shadows, cavities, smooth edges."""
+    """Set the scene up for quick renders that look good: studio light, shadows, cavities, smooth
+    edges.
+    """
     scene.render.engine = "BLENDER_WORKBENCH"
     scene.render.resolution_x, scene.render.resolution_y = width, height
     scene.render.resolution_percentage = 100
@@ -32,19 +36,23 @@ def use_workbench(scene: bpy.types.Scene, width: int = 640, height: int = 360) -
     shading.light, shading.studio_light = "STUDIO", "paint.sl"
     shading.color_type = "MATERIAL"
     shading.show_shadows, shading.shadow_intensity = True, 0.40
-    shading.show_cavity, shading.cavity_type = True, "SCREEN"  # the other kind is noisy without many samples
+    # the other kind is noisy without many samples
+    shading.show_cavity, shading.cavity_type = True, "SCREEN"
     if scene.world is None:
         scene.world = bpy.data.worlds.new("World")
     scene.world.color = (0.60, 0.62, 0.64)
 
 
 def render_film(
-    scene: bpy.types.Scene, path: Path, every: int = 2, progress: Callable[[float], None] = lambda _: None
+    scene: bpy.types.Scene,
+    path: Path,
+    every: int = 2,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> None:
     """Render every ``every``-th frame of the scene to an H.264 MP4 that plays at the scene's speed.
 
-    ``progress`` is called with the part done, in [0, 1]; the KeyboardInterrupt that it may raise is raised after the frame.
-    The scene's render settings are left as the film needed them.
+    ``progress`` is called with the part done, in [0, 1]; the KeyboardInterrupt that it may raise is
+    raised after the frame. The scene's render settings are left as the film needed them.
     """
     use_workbench(scene)
     output_video(scene)
@@ -74,8 +82,12 @@ def render_film(
         scene.render.fps_base /= every
 
 
-def render_sheet(scene: bpy.types.Scene, path: Path, frames: Sequence[int], columns: int = 4) -> None:
-    """Render ``frames`` and lay them out in a grid, row by row, as one PNG; missing cells stay white."""
+def render_sheet(
+    scene: bpy.types.Scene, path: Path, frames: Sequence[int], columns: int = 4
+) -> None:
+    """Render ``frames`` and lay them out in a grid, row by row, as one PNG; missing cells stay
+    white.
+    """
     use_workbench(scene)
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):  # since 5.0

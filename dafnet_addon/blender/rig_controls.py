@@ -1,8 +1,10 @@
-"""A rig's controls: which are keyed, what each of them moves with, and from the pose wanted to the channels that give it.
+"""A rig's controls: which are keyed, what each of them moves with, and from the pose wanted to the
+channels that give it.
 
-What a control moves with is not always its parent: in control rigs that is a mechanism bone with constraints. So the rig is
-asked: all controls are turned at random, and for each one the earlier control is looked for to which its place and its
-rotation, without its own channels, are rigidly attached; the object itself is the first candidate.
+What a control moves with is not always its parent: in control rigs that is a mechanism bone with
+constraints. So the rig is asked: all controls are turned at random, and for each one the earlier
+control is looked for to which its place and its rotation, without its own channels, are rigidly
+attached; the object itself is the first candidate.
 """
 
 from dataclasses import dataclass
@@ -18,7 +20,16 @@ from ..core.skeleton import JOINTS
 from .rig_reading import Shape, pose_matrices
 from .rigs import RigMap
 
-__all__ = ["Attachments", "Channels", "Control", "channels", "controls_of", "posed", "probe", "settled"]
+__all__ = [
+    "Attachments",
+    "Channels",
+    "Control",
+    "channels",
+    "controls_of",
+    "posed",
+    "probe",
+    "settled",
+]
 
 _TRIES, _TURN = 4, 0.7  # random poses, and how far they turn, radians
 _RIGID = 0.01
@@ -28,8 +39,9 @@ _CARRIED = (1, 2, 3, 6, 9)  # joints that have to go where the pelvis goes
 
 @dataclass(frozen=True)
 class Control:
-    """A bone to key. ``joint``: index of the joint that it turns with, -1 for the root bone. ``moves``: whether its location
-    is keyed. ``pole``: index in ``LIMBS`` of the limb whose plane it gives, which is all that it does.
+    """A bone to key. ``joint``: index of the joint that it turns with, -1 for the root bone.
+    ``moves``: whether its location is keyed. ``pole``: index in ``LIMBS`` of the limb whose plane
+    it gives, which is all that it does.
     """
 
     bone: str
@@ -40,9 +52,10 @@ class Control:
 
 @dataclass(frozen=True)
 class Attachments:
-    """``neutral`` (N, 4, 4): poses of the controls with empty channels, in the armature's space. ``turned_by``, ``moved_by``
-    (N,): the control by which each is turned and moved, -1 for the object. ``loose``: controls that no other turns rigidly.
-    ``axes`` (N, 3, 3): of each control's location channels in the armature's space.
+    """``neutral`` (N, 4, 4): poses of the controls with empty channels, in the armature's space.
+    ``turned_by``, ``moved_by`` (N,): the control by which each is turned and moved, -1 for the
+    object. ``loose``: controls that no other turns rigidly. ``axes`` (N, 3, 3): of each control's
+    location channels in the armature's space.
     """
 
     neutral: np.ndarray
@@ -54,8 +67,8 @@ class Attachments:
 
 @dataclass(frozen=True)
 class Channels:
-    """``turns`` (T, N, 3, 3) and ``moves`` (T, N, 3): rotation and location channels. ``wanted`` (T, N, 3, 3): the rotations
-    in the armature's space that they are to give.
+    """``turns`` (T, N, 3, 3) and ``moves`` (T, N, 3): rotation and location channels. ``wanted``
+    (T, N, 3, 3): the rotations in the armature's space that they are to give.
     """
 
     turns: np.ndarray
@@ -63,7 +76,9 @@ class Channels:
     wanted: np.ndarray
 
 
-def controls_of(rig: bpy.types.Object, rig_map: RigMap, limbs: str, carried_by_root: bool) -> list[Control]:
+def controls_of(
+    rig: bpy.types.Object, rig_map: RigMap, limbs: str, carried_by_root: bool
+) -> list[Control]:
     """The controls to key, parents first; ``limbs`` is FK or IK.
 
     ``InputError``: the rig knows no IK, or a bone that has to move cannot.
@@ -72,12 +87,18 @@ def controls_of(rig: bpy.types.Object, rig_map: RigMap, limbs: str, carried_by_r
     if rig_map.root and rig_map.root != rig_map.joints["pelvis"]:
         controls.append(Control(rig_map.root, _ROOT, moves=carried_by_root))
     elif carried_by_root:
-        raise InputError(f"'{rig.name}' has no root bone set; choose it in the Your Rig panel, or another root motion.")
+        raise InputError(
+            f"'{rig.name}' has no root bone set; choose it in the Your Rig panel, or another root "
+            "motion."
+        )
     replaced: set[int] = set()
     ends: list[Control] = []
     if limbs == "IK":
         if rig_map.limbs.keys() != LIMBS.keys():
-            raise InputError(f"No IK controls of '{rig.name}' are known; set Limbs to FK, or detect its convention again.")
+            raise InputError(
+                f"No IK controls of '{rig.name}' are known; set Limbs to FK, or detect its "
+                "convention again."
+            )
         for k, (limb, joints) in enumerate(LIMBS.items()):
             names = rig_map.limbs[limb]
             replaced |= {*joints, *((joints[2] + 3,) if limb.endswith("leg") else ())}
@@ -87,22 +108,31 @@ def controls_of(rig: bpy.types.Object, rig_map: RigMap, limbs: str, carried_by_r
             ends.append(Control(names["pole"], joints[1], moves=True, pole=k))
     for j, joint in enumerate(JOINTS):
         if joint in rig_map.joints and j not in replaced:
-            controls.append(Control(rig_map.joints[joint], j, moves=j == 0 or _apart(rig, rig_map, j)))
+            controls.append(
+                Control(rig_map.joints[joint], j, moves=j == 0 or _apart(rig, rig_map, j))
+            )
     controls += sorted(ends, key=lambda control: control.pole is not None)
     for control in controls:
         bone = rig.data.bones[control.bone]
         if control.moves and bone.parent and bone.use_connect:
-            raise InputError(f"The bone '{bone.name}' is connected to its parent and cannot move; disconnect it in edit mode.")
+            raise InputError(
+                f"The bone '{bone.name}' is connected to its parent and cannot move; disconnect "
+                "it in edit mode."
+            )
     return controls
 
 
 def _apart(rig: bpy.types.Object, rig_map: RigMap, joint: int) -> bool:
-    """Whether a hand or foot hangs on no bone of the body, as where inverse kinematics was lost on the way into Blender."""
+    """Whether a hand or foot hangs on no bone of the body, as where inverse kinematics was lost on
+    the way into Blender.
+    """
     if joint not in (limb[2] for limb in LIMBS.values()):
         return False
     bone = rig.data.bones[rig_map.joints[JOINTS[joint]]]
     body = {name for name in rig_map.joints.values() if name != rig_map.root}
-    return bone.parent is not None and not any(above.name in body for above in bone.parent_recursive)
+    return bone.parent is not None and not any(
+        above.name in body for above in bone.parent_recursive
+    )
 
 
 def settled(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.types.Object:
@@ -113,7 +143,9 @@ def settled(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.types.Obje
     return rig.evaluated_get(context.evaluated_depsgraph_get())
 
 
-def probe(context: bpy.types.Context, rig: bpy.types.Object, controls: list[Control]) -> Attachments:
+def probe(
+    context: bpy.types.Context, rig: bpy.types.Object, controls: list[Control]
+) -> Attachments:
     """Find what the controls move with; leaves all of their channels empty.
 
     ``InputError``: trunk or legs stay behind when the pelvis is moved.
@@ -122,7 +154,9 @@ def probe(context: bpy.types.Context, rig: bpy.types.Object, controls: list[Cont
     rng = np.random.default_rng(0)
     poses, channels = [], []
     for k in range(_TRIES + 1):
-        turns = matrix_from_vector(_TURN * normalised(rng.normal(size=(len(controls), 3))) * (k < _TRIES))
+        turns = matrix_from_vector(
+            _TURN * normalised(rng.normal(size=(len(controls), 3))) * (k < _TRIES)
+        )
         for control, turn in zip(controls, turns, strict=True):
             rig.pose.bones[control.bone].matrix_basis = Matrix(turn.tolist()).to_4x4()
         poses.append(pose_matrices(settled(context, rig), names))
@@ -148,17 +182,31 @@ def probe(context: bpy.types.Context, rig: bpy.types.Object, controls: list[Cont
 
 
 def _require_carried(
-    context: bpy.types.Context, rig: bpy.types.Object, controls: list[Control], start: np.ndarray, way: float,
+    context: bpy.types.Context,
+    rig: bpy.types.Object,
+    controls: list[Control],
+    start: np.ndarray,
+    way: float,
 ) -> None:
-    """``InputError`` where hips or trunk do not go along when the pelvis is moved by ``way``; ``start`` (N, 3): all places."""
+    """``InputError`` where hips or trunk do not go along when the pelvis is moved by ``way``;
+    ``start`` (N, 3): all places.
+    """
     pelvis = next(k for k, control in enumerate(controls) if control.joint == 0)
     bone = rig.pose.bones[controls[pelvis].bone]
     bone.matrix_basis = Matrix.Translation((0.0, way, 0.0))
-    moved = pose_matrices(settled(context, rig), [control.bone for control in controls])[:, :3, 3] - start
+    moved = (
+        pose_matrices(settled(context, rig), [control.bone for control in controls])[:, :3, 3]
+        - start
+    )
     bone.matrix_basis = Matrix.Identity(4)
     for control, by in zip(controls, moved, strict=True):
-        if control.joint in _CARRIED and np.linalg.norm(by - moved[pelvis]) > 0.5 * np.linalg.norm(moved[pelvis]):
-            raise InputError(f"The bone '{bone.name}' does not carry '{control.bone}'; choose the one above both as pelvis.")
+        if control.joint in _CARRIED and np.linalg.norm(by - moved[pelvis]) > 0.5 * np.linalg.norm(
+            moved[pelvis]
+        ):
+            raise InputError(
+                f"The bone '{bone.name}' does not carry '{control.bone}'; choose the one above "
+                "both as pelvis."
+            )
 
 
 def _spread(values: np.ndarray) -> float:
@@ -171,7 +219,9 @@ def _rotations(matrices: np.ndarray) -> np.ndarray:
 
 
 def _location_axes(rig: bpy.types.Object, name: str) -> np.ndarray:
-    """(3, 3): columns are where the location channels lead, in the armature's space, as the rig is posed now."""
+    """(3, 3): columns are where the location channels lead, in the armature's space, as the rig is
+    posed now.
+    """
     bone = rig.data.bones[name]
     rest = np.array(bone.matrix_local, float)[:3, :3]
     if bone.parent is None:
@@ -183,12 +233,17 @@ def _location_axes(rig: bpy.types.Object, name: str) -> np.ndarray:
 
 
 def channels(
-    controls: list[Control], held: Attachments, shape: Shape, landed: Landed, objects: np.ndarray, carrier: np.ndarray,
+    controls: list[Control],
+    held: Attachments,
+    shape: Shape,
+    landed: Landed,
+    objects: np.ndarray,
+    carrier: np.ndarray,
 ) -> Channels:
     """Channels of all controls for a motion that has landed on the rig.
 
-    ``objects`` (T, 4, 4): the rig's object in the world. ``carrier`` (T, 4, 4): where the root bone carries the rig, as a
-    matrix that the object would otherwise have.
+    ``objects`` (T, 4, 4): the rig's object in the world. ``carrier`` (T, 4, 4): where the root bone
+    carries the rig, as a matrix that the object would otherwise have.
     """
     frames, n = len(objects), len(controls)
     scale = np.linalg.norm(objects[0, :3, 0])
@@ -204,11 +259,19 @@ def channels(
         by, at = held.turned_by[i], held.moved_by[i]
         free = neutral[i] if by < 0 else wanted[:, by] @ neutral[by].T @ neutral[i]
         free = np.broadcast_to(free, (frames, 3, 3))
-        turn = np.broadcast_to(np.eye(3), (frames, 3, 3)) if at < 0 else wanted[:, at] @ neutral[at].T
-        rest = np.broadcast_to(start[i], (frames, 3)) if at < 0 else place[:, at] + rotate(turn, start[i] - start[at])
+        turn = (
+            np.broadcast_to(np.eye(3), (frames, 3, 3)) if at < 0 else wanted[:, at] @ neutral[at].T
+        )
+        rest = (
+            np.broadcast_to(start[i], (frames, 3))
+            if at < 0
+            else place[:, at] + rotate(turn, start[i] - start[at])
+        )
         if control.pole is not None:
             _, middle, end = list(LIMBS.values())[control.pole]
-            out = landed.bends[:, control.pole] * (shape.body.length(middle) + shape.body.length(end))
+            out = landed.bends[:, control.pole] * (
+                shape.body.length(middle) + shape.body.length(end)
+            )
             wanted[:, i], place[:, i] = free, to_rig(landed.motion.joints[:, middle] + out)
         elif control.joint == _ROOT:
             motion = transpose(turned) @ carrier[:, :3, :3] / scale
@@ -229,5 +292,7 @@ def channels(
 
 
 def posed(rig: bpy.types.Object, controls: list[Control], turns: np.ndarray) -> np.ndarray:
-    """Rotations (N, 3, 3) that an evaluated rig's controls would have without their own ``turns`` (N, 3, 3)."""
+    """Rotations (N, 3, 3) that an evaluated rig's controls would have without their own ``turns``
+    (N, 3, 3).
+    """
     return _rotations(pose_matrices(rig, [control.bone for control in controls])) @ transpose(turns)

@@ -1,4 +1,6 @@
-"""What the animator sets on an armature of their own (``Object.dafnet_rig``): its bones by joint, and how to bake onto it."""
+"""What the animator sets on an armature of their own (``Object.dafnet_rig``): its bones by joint,
+and how to bake onto it.
+"""
 
 from typing import Any
 
@@ -20,7 +22,11 @@ def _is_character(_settings: "RigSettings", candidate: bpy.types.Object) -> bool
 class RigRow(bpy.types.PropertyGroup):
     """One joint (``name``) and the bone for it."""
 
-    bone: StringProperty(name="Bone", options=set(), description="Bone that plays this joint; empty where the rig has none")
+    bone: StringProperty(
+        name="Bone",
+        options=set(),
+        description="Bone that plays this joint; empty where the rig has none",
+    )
 
 
 class RigSettings(bpy.types.PropertyGroup):
@@ -28,26 +34,54 @@ class RigSettings(bpy.types.PropertyGroup):
 
     rows: CollectionProperty(type=RigRow, options=set(), description="Bones of the joints")
     active_row: IntProperty(name="Joint", options=set(), description="The row that is marked")
-    convention: StringProperty(name="Convention", options=set(), description="Name of the preset that the bones are from")
-    more: StringProperty(options={"HIDDEN"}, description="What else the preset knows of the rig's controls")
-    root_bone: StringProperty(name="Root Bone", options=set(), description="Bone that carries the whole rig")
+    convention: StringProperty(
+        name="Convention", options=set(), description="Name of the preset that the bones are from"
+    )
+    more: StringProperty(
+        options={"HIDDEN"}, description="What else the preset knows of the rig's controls"
+    )
+    root_bone: StringProperty(
+        name="Root Bone", options=set(), description="Bone that carries the whole rig"
+    )
     character: PointerProperty(
-        name="Character", type=bpy.types.Object, poll=_is_character, options=set(),
+        name="Character",
+        type=bpy.types.Object,
+        poll=_is_character,
+        options=set(),
         description="DAFNet character whose motion is baked onto this armature",
     )
     root_motion: EnumProperty(
-        name="Root Motion", default="OBJECT", options=set(), description="What carries the character through the room",
+        name="Root Motion",
+        default="OBJECT",
+        options=set(),
+        description="What carries the character through the room",
         items=[
-            ("OBJECT", "Object", "The armature object moves over the floor and turns with the character"),
-            ("BONE", "Root Bone", "The root bone moves over the floor and turns with the character"),
+            (
+                "OBJECT",
+                "Object",
+                "The armature object moves over the floor and turns with the character",
+            ),
+            (
+                "BONE",
+                "Root Bone",
+                "The root bone moves over the floor and turns with the character",
+            ),
             ("HIPS", "Hips", "Only the hips move; object and root bone stay"),
         ],
     )
     limbs: EnumProperty(
-        name="Limbs", default="FK", options=set(), description="Which controls of arms and legs are keyed",
+        name="Limbs",
+        default="FK",
+        options=set(),
+        description="Which controls of arms and legs are keyed",
         items=[
             ("FK", "FK", "Each bone of the limbs is turned"),
-            ("IK", "IK", "Hand, foot and pole controls are placed; for rigs whose preset knows them, such as Rigify"),
+            (
+                "IK",
+                "IK",
+                "Hand, foot and pole controls are placed; for rigs whose preset knows them, such "
+                "as Rigify",
+            ),
         ],
     )
 
@@ -74,11 +108,16 @@ def rig_of(context: bpy.types.Context) -> bpy.types.Object | None:
     active = context.object
     if active is not None and active.type != "ARMATURE":
         active = active.parent
-    return active if active is not None and active.type == "ARMATURE" and not is_character(active) else None
+    return (
+        active
+        if active is not None and active.type == "ARMATURE" and not is_character(active)
+        else None
+    )
 
 
 def character_for(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.types.Object:
-    """The character to bake from: the rig's own setting, else a selected one, else the only one of the scene.
+    """The character to bake from: the rig's own setting, else a selected one, else the only one of
+    the scene.
 
     ``InputError`` where there is none, or more than one to choose from.
     """
@@ -86,13 +125,21 @@ def character_for(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.type
     there = [o for o in context.scene.objects if is_character(o)]
     if chosen is not None:
         if chosen not in there:
-            raise InputError(f"The character '{chosen.name}' is not in the scene; choose another one in the Your Rig panel.")
+            raise InputError(
+                f"The character '{chosen.name}' is not in the scene; choose another one in the "
+                "Your Rig panel."
+            )
         return chosen
     several = [o for o in there if o in context.selected_objects] or there
     if not several:
-        raise InputError("There is no DAFNet character in the scene; add one and generate a motion first.")
+        raise InputError(
+            "There is no DAFNet character in the scene; add one and generate a motion first."
+        )
     if len(several) > 1:
-        raise InputError("There are several characters; choose one in the Your Rig panel, or select it with the rig.")
+        raise InputError(
+            "There are several characters; choose one in the Your Rig panel, or select it with "
+            "the rig."
+        )
     return several[0]
 
 
@@ -108,11 +155,17 @@ def show_map(rig: bpy.types.Object, rig_map: rigs.RigMap) -> None:
 
 
 def map_of(rig: bpy.types.Object) -> rigs.RigMap:
-    """The map as the rig's settings have it, or the one that is detected where nothing was set yet."""
+    """The map as the rig's settings have it, or the one that is detected where nothing was set
+    yet.
+    """
     own = rig.dafnet_rig
     if not own.more:
         return rigs.detected(rig)
-    return rigs.edited(rigs.from_text(own.more), own.root_bone or None, {row.name: row.bone for row in own.rows if row.bone})
+    return rigs.edited(
+        rigs.from_text(own.more),
+        own.root_bone or None,
+        {row.name: row.bone for row in own.rows if row.bone},
+    )
 
 
 def presets(_settings: Any, _context: bpy.types.Context) -> list[tuple[str, str, str]]:

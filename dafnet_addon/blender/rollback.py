@@ -1,4 +1,6 @@
-"""What writing a motion changes on an armature, and how it is all taken back where the writing fails."""
+"""What writing a motion changes on an armature, and how it is all taken back where the writing
+fails.
+"""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,7 +12,12 @@ from .compat import playing
 __all__ = ["state_of", "undone_on_failure"]
 
 _TRANSFORM = (
-    "rotation_mode", "location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale",
+    "rotation_mode",
+    "location",
+    "rotation_euler",
+    "rotation_quaternion",
+    "rotation_axis_angle",
+    "scale",
 )
 _Channels = dict[str, object]
 
@@ -34,10 +41,11 @@ def _set(owner: bpy.types.Object | bpy.types.PoseBone, channels: _Channels) -> N
 
 
 def state_of(armature: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
-    """A function that gives the armature, as it may have to be found again, the state that it has now.
+    """A function that gives the armature, as it may have to be found again, the state that it has
+    now.
 
-    That is what it plays, its own transform and its bones', their custom numbers, and its list of takes, to which a bake adds
-    rows at the end.
+    That is what it plays, its own transform and its bones', their custom numbers, and its list of
+    takes, to which a bake adds rows at the end.
     """
     again = playing(armature)
     own = _channels(armature)
@@ -62,12 +70,16 @@ def state_of(armature: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
 
 @contextmanager
 def undone_on_failure(armature: bpy.types.Object) -> Iterator[None]:
-    """A block that writes to an armature: where it fails, whatever the reason, its actions are gone and its state is back."""
+    """A block that writes to an armature: where it fails, whatever the reason, its actions are gone
+    and its state is back.
+    """
     restore, before = state_of(armature), set(bpy.data.actions)
     try:
         yield
     except BaseException:
-        restore(armature)  # first of all, since an action that is removed while it plays leaves its slot's number behind
+        # first of all, since an action that is removed while it plays leaves its slot's number
+        # behind
+        restore(armature)
         for made in set(bpy.data.actions) - before:
             bpy.data.actions.remove(made)
         raise

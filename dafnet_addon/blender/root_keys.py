@@ -1,4 +1,6 @@
-"""Keys on a character's root: it then goes where it was sent, or nothing is changed and a sentence says why."""
+"""Keys on a character's root: it then goes where it was sent, or nothing is changed and a sentence
+says why.
+"""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -24,12 +26,16 @@ _NEAR, _TURNED = 1e-3, 0.01
 
 
 def keyable_root(settings: Settings) -> bpy.types.Object:
-    """The root, whose keys are to be written: its own place must be its place in the world, and its action play alone.
+    """The root, whose keys are to be written: its own place must be its place in the world, and its
+    action play alone.
 
     ``InputError``: there is none, or something stands in the way.
     """
     if settings.root is None:
-        raise InputError(f"The character '{settings.armature}' has no root; choose its root object in the DAFNet panel.")
+        raise InputError(
+            f"The character '{settings.armature}' has no root; choose its root object in the "
+            "DAFNet panel."
+        )
     root = find_object(settings, settings.root, "root")
     for reason in _in_the_way(root):
         raise InputError(f"The root '{root.name}' {reason}")
@@ -48,19 +54,29 @@ def _in_the_way(root: bpy.types.Object) -> Iterator[str]:
     data = root.animation_data
     if data is None:
         return
-    if any(not driver.mute and driver.data_path.startswith((*MOVES, "delta_")) for driver in data.drivers):
+    if any(
+        not driver.mute and driver.data_path.startswith((*MOVES, "delta_"))
+        for driver in data.drivers
+    ):
         yield "has drivers; remove them to key it."
     if data.use_tweak_mode or any(track.is_solo for track in data.nla_tracks):
         yield "plays an NLA strip in tweak or solo mode; leave it to key it."
     if data.action is None:
         return
     if data.action_blend_type != "REPLACE" or data.action_influence < 1.0:
-        yield "mixes its action with NLA strips; set the action's blending to Replace and its influence to 1 to key it."
+        yield (
+            "mixes its action with NLA strips; set the action's blending to Replace and its "
+            "influence to 1 to key it."
+        )
     if data.action.library or data.action.override_library:
         yield f"has its keys in a linked action; make '{data.action.name}' local to key it."
     users = bpy.data.user_map(subset=[data.action])[data.action] - {root}
-    for other in sorted((each for each in users if shares_curves(root, each)), key=lambda each: each.name):
-        yield f"has its keys in common with '{other.name}'; make its action a single user to key it."
+    for other in sorted(
+        (each for each in users if shares_curves(root, each)), key=lambda each: each.name
+    ):
+        yield (
+            f"has its keys in common with '{other.name}'; make its action a single user to key it."
+        )
     for curve in action_curves(root):
         if curve.data_path in MOVES:
             yield from _in_the_way_of_keys(curve)
@@ -80,7 +96,12 @@ def _in_the_way_of_keys(curve: bpy.types.FCurve) -> Iterator[str]:
 
 def last_key(root: bpy.types.Object) -> int | None:
     """The frame of a root's last key, or the whole one after it; None where it has none."""
-    keyed = [float(p.co[0]) for c in action_curves(root) if c.data_path in MOVES for p in c.keyframe_points]
+    keyed = [
+        float(p.co[0])
+        for c in action_curves(root)
+        if c.data_path in MOVES
+        for p in c.keyframe_points
+    ]
     return int(np.ceil(max(keyed))) if keyed else None
 
 
@@ -111,32 +132,45 @@ def unchanged_on_failure(root: bpy.types.Object) -> Iterator[None]:
 
 
 def keyed_along(
-    context: bpy.types.Context, root: bpy.types.Object, route: Route, *, first: int, scale: float, fps: float,
+    context: bpy.types.Context,
+    root: bpy.types.Object,
+    route: Route,
+    *,
+    first: int,
+    scale: float,
+    fps: float,
 ) -> None:
     """``write_keys``, and see that the root goes there.
 
-    ``InputError``: it does not, whatever moves it instead; to be called in ``unchanged_on_failure``.
+    ``InputError``: it does not, whatever moves it instead; to be called in
+    ``unchanged_on_failure``.
     """
     frames = write_keys(root, route, first=first, scale=scale, fps=fps)
     shown = frames[np.unique(np.linspace(0, len(frames) - 1, _LOOKS).astype(int))]
     with frame_kept(context.scene):
         for k in shown:
             context.scene.frame_set(first + int(k))
-            matrix = np.array(root.evaluated_get(context.evaluated_depsgraph_get()).matrix_world, float)
+            matrix = np.array(
+                root.evaluated_get(context.evaluated_depsgraph_get()).matrix_world, float
+            )
             off = np.linalg.norm(matrix[:3, 3] - route.path.position[k] * scale) / scale
             wrong = np.arctan2(-matrix[0, 1], matrix[1, 1]) - route.path.yaw[k]
             if not off < _NEAR or not abs(np.angle(np.exp(1j * wrong))) < _TURNED:
                 raise InputError(
-                    f"Something else than its keys moves the root '{root.name}', so nothing was keyed; "
+                    f"Something else than its keys moves the root '{root.name}', so nothing was "
+                    "keyed; "
                     "look for physics, NLA strips or scripts."
                 )
 
 
-def write_keys(root: bpy.types.Object, route: Route, *, first: int, scale: float, fps: float) -> np.ndarray:
-    """Key location and heading about ten times a second from frame ``first`` on, and where the root comes to rest.
+def write_keys(
+    root: bpy.types.Object, route: Route, *, first: int, scale: float, fps: float
+) -> np.ndarray:
+    """Key location and heading about ten times a second from frame ``first`` on, and where the root
+    comes to rest.
 
-    ``scale``: the route's metres in Blender units. Returns the frames of the route that are keyed. ``InputError``: Blender
-    takes no keys.
+    ``scale``: the route's metres in Blender units. Returns the frames of the route that are keyed.
+    ``InputError``: Blender takes no keys.
     """
     frames = set(range(0, len(route.path), max(1, round(fps / _KEYS_A_SECOND))))
     frames |= {len(route.path) - 1, *(k for rest in route.rests for k in (rest.first, rest.last))}
@@ -144,7 +178,9 @@ def write_keys(root: bpy.types.Object, route: Route, *, first: int, scale: float
         root.location = route.path.position[k] * scale
         root.rotation_euler = (0.0, 0.0, float(route.path.yaw[k]))
         if not all(root.keyframe_insert(path, frame=first + k) for path in MOVES):
-            raise InputError(f"Blender takes no keys for the root '{root.name}'; unlock its action and curves.")
+            raise InputError(
+                f"Blender takes no keys for the root '{root.name}'; unlock its action and curves."
+            )
     _eased(action_curves(root), first)
     return np.array(sorted(frames))
 

@@ -1,7 +1,9 @@
-"""The scene as plain arrays: evaluated furniture, the root, targets, mode and source pose, frame by frame, in metres.
+"""The scene as plain arrays: evaluated furniture, the root, targets, mode and source pose, frame by
+frame, in metres.
 
-One unit of Blender is ``metres_per_unit`` metres; everything handed to the core is in metres. The evaluated scene is
-read, so keys, constraints, drivers, modifiers and instances all count; what is hidden in the viewport does not exist.
+One unit of Blender is ``metres_per_unit`` metres; everything handed to the core is in metres. The
+evaluated scene is read, so keys, constraints, drivers, modifiers and instances all count; what is
+hidden in the viewport does not exist.
 """
 
 from collections.abc import Generator, Iterator
@@ -13,7 +15,15 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.progress import drained
-from ..core.root import POSITION_SIGMA, YAW_SIGMA, root_from_joints, root_from_matrices, smoothed, to_root, to_world
+from ..core.root import (
+    POSITION_SIGMA,
+    YAW_SIGMA,
+    root_from_joints,
+    root_from_matrices,
+    smoothed,
+    to_root,
+    to_world,
+)
 from ..core.rotations import normalised
 from ..core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
 from ..core.solids import Scene
@@ -34,13 +44,20 @@ from .takes import stored
 __all__ = ["ReadScene", "read_steps", "read_scene"]
 
 _TURNED = np.radians(0.1)
-_OFF = 8.0  # degrees, mean, by which a copied upper body may lie otherwise than its source without a word
-_TARGETS = {"head": "head target", "hand_left": "left hand target", "hand_right": "right hand target"}
+# degrees, mean, by which a copied upper body may lie otherwise than its source without a word
+_OFF = 8.0
+_TARGETS = {
+    "head": "head target",
+    "hand_left": "left hand target",
+    "hand_right": "right hand target",
+}
 
 
 @dataclass(frozen=True)
 class ReadScene:
-    """What generation needs: the furniture, the controls at the scene's frame rate, and sentences for the user."""
+    """What generation needs: the furniture, the controls at the scene's frame rate, and sentences
+    for the user.
+    """
 
     scene: Scene
     controls: Controls
@@ -55,32 +72,46 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> ReadScene:
 def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[float, None, ReadScene]:
     """Read the scene; yields progress in [0, 1], at which the current frame is as it was.
 
-    Only where a simulation that is not baked moves what is read, the frames run on in order from the simulation's start, and
-    the current one comes back at the end, also of a generator that is closed.
+    Only where a simulation that is not baked moves what is read, the frames run on in order from
+    the simulation's start, and the current one comes back at the end, also of a generator that is
+    closed.
 
-    Furniture: every mesh of the collection and of the collections in it, as the viewport evaluates it at the first
-    frame, with its matrix for each frame if it moves; shapes that change over time are warned about. The character, whatever
-    follows it in any way, the root and the targets are never furniture, nor are helpers: see ``furniture``.
+    Furniture: every mesh of the collection and of the collections in it, as the viewport evaluates
+    it at the first frame, with its matrix for each frame if it moves; shapes that change over time
+    are warned about. The character, whatever follows it in any way, the root and the targets are
+    never furniture, nor are helpers: see ``furniture``.
 
-    Targets: the empties' places. Their rotations count where they are keyed, or where a target was ever turned in its
-    parent's space; a target that was only moved leaves head and hands free to turn.
+    Targets: the empties' places. Their rotations count where they are keyed, or where a target was
+    ever turned in its parent's space; a target that was only moved leaves head and hands free to
+    turn.
 
-    Upper body: the source's bones, carried from the source's root onto this character's and to its size. The source is
-    another character or any rig whose bones are known (``rig_properties.map_of``). Its root is its object if it is one of
-    our characters, else it is found from hips and shoulders.
+    Upper body: the source's bones, carried from the source's root onto this character's and to its
+    size. The source is another character or any rig whose bones are known
+    (``rig_properties.map_of``). Its root is its object if it is one of our characters, else it is
+    found from hips and shoulders.
 
-    ``InputError``: something that is needed is missing, gone, linked, empty or not a number, or follows the character itself.
+    ``InputError``: something that is needed is missing, gone, linked, empty or not a number, or
+    follows the character itself.
     """
     scene = find_scene(settings)
     if context.scene != scene:
-        raise InputError(f"The scene '{settings.scene}' is not the active one; make it active and generate again.")
+        raise InputError(
+            f"The scene '{settings.scene}' is not the active one; make it active and generate "
+            "again."
+        )
     if scene.render.frame_map_old != scene.render.frame_map_new:
-        raise InputError(f"The scene '{settings.scene}' stretches time; set its Time Stretching back to 100 : 100.")
+        raise InputError(
+            f"The scene '{settings.scene}' stretches time; set its Time Stretching back to 100 : "
+            "100."
+        )
     unit = metres_per_unit(scene)
     armature = find_object(settings, settings.armature, "character")
     size = require_bakeable(armature, unit)
     if settings.root is None:
-        raise InputError(f"The character '{armature.name}' has no root; choose its root object in the DAFNet panel.")
+        raise InputError(
+            f"The character '{armature.name}' has no root; choose its root object in the DAFNet "
+            "panel."
+        )
     root = find_object(settings, settings.root, "root")
     names = {role: name for role in _TARGETS if (name := getattr(settings, role))}
     targets = {role: find_object(settings, name, _TARGETS[role]) for role, name in names.items()}
@@ -95,7 +126,8 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
     frames = range(settings.frame_start, settings.frame_end + 1)
     simulations = dependencies.simulations([root, *targets.values(), *members], shaped=False)
     simulations += dependencies.simulations(sources)
-    simulations += [each for each in dependencies.simulations(members) if each.since < frames[0]]  # it has a shape by then
+    # it has a shape by then
+    simulations += [each for each in dependencies.simulations(members) if each.since < frames[0]]
     tracks = _Tracks(armature, root, targets, source, places)
 
     def look(frame: int, depsgraph: bpy.types.Depsgraph, shaped: set[bpy.types.Object]) -> None:
@@ -121,20 +153,39 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
             given[f"{role}_rotation"] = matrices[:, :3, :3]
     if source and "FULL" in modes:
         if dependencies.follows(source, armature):
-            raise InputError(f"The upper body's source '{source.name}' follows the character itself; mute what ties it to it.")
+            raise InputError(
+                f"The upper body's source '{source.name}' follows the character itself; mute what "
+                "ties it to it."
+            )
         bones, bodies = np.array(tracks.bones), np.array(tracks.bodies)
-        given["upper_body"], off = _carried(source, source_map, bones, bodies, unit, root_matrices, size, fps)
+        given["upper_body"], off = _carried(
+            source, source_map, bones, bodies, unit, root_matrices, size, fps
+        )
         if off:
-            warnings += (f"'{source.name}' is followed, but {off}; see whether its bones are the right ones in Your Rig.",)
+            warnings += (
+                f"'{source.name}' is followed, but {off}; see whether its bones are the right "
+                "ones in Your Rig.",
+            )
     elif settings.upper_body_take and "FULL" in modes:
-        given["upper_body"] = _of_take(settings, np.array([mode == "FULL" for mode in modes]), root_matrices, size, fps)
+        given["upper_body"] = _of_take(
+            settings, np.array([mode == "FULL" for mode in modes]), root_matrices, size, fps
+        )
     elif "FULL" in modes:
-        raise InputError(f"The mode of '{armature.name}' is FULL but no source is set; choose one to copy from.")
+        raise InputError(
+            f"The mode of '{armature.name}' is FULL but no source is set; choose one to copy from."
+        )
     for role in targets:
         if min(tracks.influences[role]) < 1.0:
             given[f"{role}_influence"] = np.array(tracks.influences[role])
     mode = modes[0] if len(set(modes)) == 1 else tuple(modes)
-    controls = Controls(fps=fps, root=root_matrices, mode=mode, blend=settings.blend_frames / fps, scale=size, **given)
+    controls = Controls(
+        fps=fps,
+        root=root_matrices,
+        mode=mode,
+        blend=settings.blend_frames / fps,
+        scale=size,
+        **given,
+    )
 
     solids = furniture.solids(unit) if furniture else ()
     yield 1.0
@@ -142,13 +193,25 @@ def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[floa
 
 
 class _Tracks:
-    """What is read of a character and of what leads it, frame by frame; matrices (4, 4) in Blender units."""
+    """What is read of a character and of what leads it, frame by frame; matrices (4, 4) in Blender
+    units.
+    """
 
     def __init__(
-        self, armature: bpy.types.Object, root: bpy.types.Object, targets: dict[str, bpy.types.Object],
-        source: bpy.types.Object | None, places: list[str | None],
+        self,
+        armature: bpy.types.Object,
+        root: bpy.types.Object,
+        targets: dict[str, bpy.types.Object],
+        source: bpy.types.Object | None,
+        places: list[str | None],
     ) -> None:
-        self._armature, self._root, self._targets, self._source, self._places = armature, root, targets, source, places
+        self._armature, self._root, self._targets, self._source, self._places = (
+            armature,
+            root,
+            targets,
+            source,
+            places,
+        )
         self.modes: list[str] = []
         self.influences: dict[str, list[float]] = {role: [] for role in targets}
         self.root: list[np.ndarray] = []
@@ -174,18 +237,28 @@ class _Tracks:
 
 
 def _require_independent(
-    dependencies: Dependencies, armature: bpy.types.Object, leading: dict[str, bpy.types.Object],
+    dependencies: Dependencies,
+    armature: bpy.types.Object,
+    leading: dict[str, bpy.types.Object],
 ) -> None:
-    """What leads the character may not follow it, nor be pushed by it, or each take would change the next."""
+    """What leads the character may not follow it, nor be pushed by it, or each take would change
+    the next.
+    """
     if dependencies.setting_follows(armature, "dafnet.", armature):
-        raise InputError(f"A driver of mode or influences of '{armature.name}' reads the character itself; remove it.")
+        raise InputError(
+            f"A driver of mode or influences of '{armature.name}' reads the character itself; "
+            "remove it."
+        )
     for what, leader in leading.items():
         if dependencies.follows(leader, armature, shaped=False):
-            raise InputError(f"The {what} follows the character itself; let it follow something else.")
+            raise InputError(
+                f"The {what} follows the character itself; let it follow something else."
+            )
         for simulation in dependencies.simulations([leader], shaped=False):
             if _meets(simulation, dependencies, armature):
                 raise InputError(
-                    f"The character itself may push '{simulation.name}', which moves the {what}; bake the simulation."
+                    f"The character itself may push '{simulation.name}', which moves the {what}; "
+                    "bake the simulation."
                 )
 
 
@@ -198,26 +271,45 @@ def _require_alive(depsgraph: bpy.types.Depsgraph, needed: list[bpy.types.Object
     alive = {each.original for each in depsgraph.ids}
     for each in needed:
         if each not in alive:
-            raise InputError(f"'{each.name}' or its collection is disabled in viewports; enable it, or hide it with H.")
+            raise InputError(
+                f"'{each.name}' or its collection is disabled in viewports; enable it, or hide it "
+                "with H."
+            )
 
 
 def _told(
-    armature: bpy.types.Object, furniture: Furniture | None, dependencies: Dependencies, simulations: list[Simulation],
+    armature: bpy.types.Object,
+    furniture: Furniture | None,
+    dependencies: Dependencies,
+    simulations: list[Simulation],
 ) -> Iterator[str]:
     """Warnings about what can be used, but hardly as it was meant."""
     if laid_over(armature):
-        yield f"Bones of '{armature.name}' have constraints or drivers, which change the take; mute them to see it as made."
+        yield (
+            f"Bones of '{armature.name}' have constraints or drivers, which change the take; mute "
+            "them to see it as made."
+        )
     if furniture:
         yield from furniture.told()
-    pushed = (simulation.name for simulation in simulations if _meets(simulation, dependencies, armature))
+    pushed = (
+        simulation.name for simulation in simulations if _meets(simulation, dependencies, armature)
+    )
     for name in dict.fromkeys(pushed):
-        yield f"The character itself may push '{name}', so that each take changes the next; bake the simulation."
+        yield (
+            f"The character itself may push '{name}', so that each take changes the next; bake "
+            "the simulation."
+        )
 
 
 def _rigid(matrices: np.ndarray, unit: float, what: str) -> np.ndarray:
-    """Matrices (T, 4, 4) in metres, without scale and shear: y stays as it is, z and then x are made to fit it."""
+    """Matrices (T, 4, 4) in metres, without scale and shear: y stays as it is, z and then x are
+    made to fit it.
+    """
     if not np.isfinite(matrices).all():
-        raise InputError(f"The {what} has a transform that is not a number; clear its transform or fix what drives it.")
+        raise InputError(
+            f"The {what} has a transform that is not a number; clear its transform or fix what "
+            "drives it."
+        )
     length = np.linalg.norm(matrices[:, :3, :3], axis=1, keepdims=True)
     if (length < 1e-9).any():
         raise InputError(f"The {what} is scaled to zero; give it a scale.")
@@ -234,19 +326,26 @@ def _is_turned(target: bpy.types.Object, local: np.ndarray) -> bool:
     """Whether a target's rotation is meant: keyed, or anywhere other than its parent's."""
     if any("rotation" in curve.data_path for curve in action_curves(target)):
         return True
-    axes = local[:, :3, :3] / np.maximum(np.linalg.norm(local[:, :3, :3], axis=1, keepdims=True), 1e-9)
+    axes = local[:, :3, :3] / np.maximum(
+        np.linalg.norm(local[:, :3, :3], axis=1, keepdims=True), 1e-9
+    )
     return bool(np.abs(axes - np.eye(3)).max() > _TURNED)
 
 
 def _upper_body_source(
-    settings: Settings, armature: bpy.types.Object,
+    settings: Settings,
+    armature: bpy.types.Object,
 ) -> tuple[bpy.types.Object | None, RigMap | None]:
-    """The upper body's source, and which of its bones are which joints where it is no character of ours."""
+    """The upper body's source, and which of its bones are which joints where it is no character of
+    ours.
+    """
     if settings.upper_body_source is None:
         return None, None
     source = find_object(settings, settings.upper_body_source, "upper body's source")
     if source.type != "ARMATURE" or source == armature:
-        raise InputError(f"'{source.name}' cannot be the upper body's source; choose another armature.")
+        raise InputError(
+            f"'{source.name}' cannot be the upper body's source; choose another armature."
+        )
     if is_character(source):
         return source, None
     rig_map = map_of(source)
@@ -254,41 +353,66 @@ def _upper_body_source(
     return source, rig_map
 
 
-def _of_take(settings: Settings, full: np.ndarray, root: np.ndarray, size: float, fps: float) -> np.ndarray:
-    """Upper body (T, 14, 3) of the chosen take, frame by frame of the scene, on this character's root and of its ``size``.
+def _of_take(
+    settings: Settings, full: np.ndarray, root: np.ndarray, size: float, fps: float
+) -> np.ndarray:
+    """Upper body (T, 14, 3) of the chosen take, frame by frame of the scene, on this character's
+    root and of its ``size``.
 
-    ``InputError``: it is of another frame rate, or does not cover the frames that are ``full`` (T,).
+    ``InputError``: it is of another frame rate, or does not cover the frames that are ``full``
+    (T,).
     """
     action = find_action(settings.upper_body_take or "")
     take, _ = stored(action)
     if abs(take.fps - fps) > 1e-3:
-        raise InputError(f"The take '{action.name}' has {take.fps:g} frames a second, the scene {fps:g}; generate it again.")
+        raise InputError(
+            f"The take '{action.name}' has {take.fps:g} frames a second, the scene {fps:g}; "
+            "generate it again."
+        )
     at = np.arange(len(full)) + settings.frame_start - action.dafnet.frame_start
     if ((at < 0) | (at >= len(take)))[full].any():
-        raise InputError(f"The take '{action.name}' does not cover the frames whose mode is FULL; choose a longer one.")
+        raise InputError(
+            f"The take '{action.name}' does not cover the frames whose mode is FULL; choose a "
+            "longer one."
+        )
     at = np.clip(at, 0, len(take) - 1)
     path, _ = root_from_matrices(take.root[at])
     return _onto(root, fps, size / take.scale * to_root(path, take.joints[at][:, list(UPPER)]))
 
 
 def _onto(root: np.ndarray, fps: float, local: np.ndarray) -> np.ndarray:
-    """Points (T, N, 3) of a root's frames in the world, that root being this character's, ``root`` (T, 4, 4)."""
-    return to_world(smoothed(root_from_matrices(root)[0], POSITION_SIGMA * fps / 30.0, YAW_SIGMA * fps / 30.0), local)
+    """Points (T, N, 3) of a root's frames in the world, that root being this character's, ``root``
+    (T, 4, 4).
+    """
+    return to_world(
+        smoothed(root_from_matrices(root)[0], POSITION_SIGMA * fps / 30.0, YAW_SIGMA * fps / 30.0),
+        local,
+    )
 
 
 def _carried(
-    source: bpy.types.Object, rig_map: RigMap | None, bones: np.ndarray, bodies: np.ndarray,
-    unit: float, root: np.ndarray, size: float, fps: float,
+    source: bpy.types.Object,
+    rig_map: RigMap | None,
+    bones: np.ndarray,
+    bodies: np.ndarray,
+    unit: float,
+    root: np.ndarray,
+    size: float,
+    fps: float,
 ) -> tuple[np.ndarray, str]:
-    """Upper body (T, 14, 3), world metres, on this character's ``root`` (T, 4, 4) and of its ``size``; and what of it is off.
+    """Upper body (T, 14, 3), world metres, on this character's ``root`` (T, 4, 4) and of its
+    ``size``; and what of it is off.
 
-    ``bones`` (T, 22, 4, 4): the source's bones in its own space; ``bodies`` (T, 4, 4): its object's matrices; both in
-    Blender units.
+    ``bones`` (T, 22, 4, 4): the source's bones in its own space; ``bodies`` (T, 4, 4): its object's
+    matrices; both in Blender units.
     """
     what = f"upper body's source '{source.name}'"
     there = np.array([rig_map is None or rig_map.place(name) is not None for name in JOINTS])
     if not np.isfinite(bones[:, there]).all() or not np.isfinite(bodies).all():
-        raise InputError(f"The {what} has a transform that is not a number; clear its transform or fix what drives it.")
+        raise InputError(
+            f"The {what} has a transform that is not a number; clear its transform or fix what "
+            "drives it."
+        )
     off: dict[str, float] = {}
     if rig_map is None:
         joints = unit * (bodies[:, None] @ bones)[..., :3, 3]
@@ -305,5 +429,9 @@ def _carried(
     upper = [j - 1 for j in UPPER[1:]]
     lengths = np.linalg.norm(offsets[:, upper], axis=-1).mean(axis=0).sum()
     ratio = size * np.linalg.norm(OFFSETS[1:][upper], axis=-1).sum() / lengths
-    told = ", ".join(f"the {limb} by {degrees:.0f} degrees" for limb, degrees in off.items() if degrees > _OFF)
-    return _onto(root, fps, ratio * to_root(path, joints[:, list(UPPER)])), f"{told} off" if told else ""
+    told = ", ".join(
+        f"the {limb} by {degrees:.0f} degrees" for limb, degrees in off.items() if degrees > _OFF
+    )
+    return _onto(
+        root, fps, ratio * to_root(path, joints[:, list(UPPER)])
+    ), f"{told} off" if told else ""

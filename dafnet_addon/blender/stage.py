@@ -1,6 +1,8 @@
-"""Still pictures of many poses at once: a bare floor, furniture, coloured mannequins, lines, and a camera that holds them all.
+"""Still pictures of many poses at once: a bare floor, furniture, coloured mannequins, lines, and a
+camera that holds them all.
 
-Mannequins are plain meshes, posed here and not by an armature, so that dozens of poses of one take stand in one picture.
+Mannequins are plain meshes, posed here and not by an armature, so that dozens of poses of one take
+stand in one picture.
 """
 
 from collections.abc import Iterable, Sequence
@@ -38,7 +40,9 @@ def mixed(a: Colour, b: Colour, share: float) -> Colour:
 
 
 def solids(parts: Iterable[Part], place: Place) -> list[Box]:
-    """A piece of furniture as the network is told of it: each part a box, a round one of the same area."""
+    """A piece of furniture as the network is told of it: each part a box, a round one of the same
+    area.
+    """
     turn = yaw_matrix(np.array(place.yaw))
     out = []
     for part in parts:
@@ -52,8 +56,8 @@ def solids(parts: Iterable[Part], place: Place) -> list[Box]:
 class Stage:
     """Opens an empty file and sets it up for pictures from one side.
 
-    ``toward``: azimuth from which the camera looks, degrees counter-clockwise from +x seen from above; ``above``: its angle
-    over the floor, degrees.
+    ``toward``: azimuth from which the camera looks, degrees counter-clockwise from +x seen from
+    above; ``above``: its angle over the floor, degrees.
     """
 
     def __init__(self, toward: float, above: float = 18.0) -> None:
@@ -81,12 +85,16 @@ class Stage:
         self._mesh("Floor", floor, [(0, 1, 2, 3)], _FLOOR)
 
     def _mannequin(self) -> tuple[bpy.types.Mesh, np.ndarray, np.ndarray]:
-        """The mannequin's mesh, the joint (V,) that moves each vertex, and the vertices (V, 3) in that joint's rest frame."""
+        """The mannequin's mesh, the joint (V,) that moves each vertex, and the vertices (V, 3) in
+        that joint's rest frame.
+        """
         armature = bpy.data.objects.new("Mannequin", bpy.data.armatures.new("Mannequin"))
         collection = bpy.data.collections.new("Template")  # in no scene, so never drawn
         body = add_body(collection, armature, 1.0)
         names = [group.name for group in body.vertex_groups]
-        bones = np.array([JOINTS.index(names[vertex.groups[0].group]) for vertex in body.data.vertices])
+        bones = np.array(
+            [JOINTS.index(names[vertex.groups[0].group]) for vertex in body.data.vertices]
+        )
         flat = np.empty(3 * len(bones))
         body.data.vertices.foreach_get("co", flat)
         return body.data, bones, flat.reshape(-1, 3) @ FACING - REST[bones]
@@ -100,7 +108,9 @@ class Stage:
             self._materials[colour] = made
         return self._materials[colour]
 
-    def _mesh(self, name: str, vertices: np.ndarray, faces: Sequence[tuple[int, ...]], colour: Colour) -> None:
+    def _mesh(
+        self, name: str, vertices: np.ndarray, faces: Sequence[tuple[int, ...]], colour: Colour
+    ) -> None:
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata(vertices.tolist(), [], faces)
         mesh.materials.append(self._material(colour))
@@ -110,10 +120,14 @@ class Stage:
         """Put a piece of furniture there."""
         made = add_piece(self.scene.collection, "Furniture", parts, place)
         corners = np.array([tuple(corner) for corner in made.bound_box])
-        self.seen.append(rotate(yaw_matrix(np.array(place.yaw)), corners) + np.array([*place.position, 0.0]))
+        self.seen.append(
+            rotate(yaw_matrix(np.array(place.yaw)), corners) + np.array([*place.position, 0.0])
+        )
 
     def pose(self, frames: np.ndarray, pelvis: np.ndarray, colour: Colour) -> None:
-        """Put a mannequin there: global joint frames (22, 3, 3) and its pelvis (3,), world, metres."""
+        """Put a mannequin there: global joint frames (22, 3, 3) and its pelvis (3,), world,
+        metres.
+        """
         joints = forward_kinematics(frames, pelvis)
         vertices = joints[self._bones] + rotate(frames[self._bones], self._rest)
         mesh = self._template.copy()
@@ -128,7 +142,12 @@ class Stage:
     def line(self, points: np.ndarray, colour: Colour, radius: float = 0.012) -> None:
         """Draw a tube through points (N, 3)."""
         curve = bpy.data.curves.new("Line", "CURVE")
-        curve.dimensions, curve.bevel_depth, curve.bevel_resolution, curve.use_fill_caps = "3D", radius, 2, True
+        curve.dimensions, curve.bevel_depth, curve.bevel_resolution, curve.use_fill_caps = (
+            "3D",
+            radius,
+            2,
+            True,
+        )
         spline = curve.splines.new("POLY")
         spline.points.add(len(points) - 1)
         spline.points.foreach_set("co", np.c_[points, np.ones(len(points))].ravel())
@@ -140,15 +159,25 @@ class Stage:
         """Draw a ball."""
         rings = np.linspace(0.0, np.pi, 9)
         turns = np.linspace(0.0, 2.0 * np.pi, 17)[:-1]
-        shape = np.array([(np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)) for a in rings for b in turns])
+        shape = np.array(
+            [
+                (np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a))
+                for a in rings
+                for b in turns
+            ]
+        )
         faces = [
             (16 * r + s, 16 * (r + 1) + s, 16 * (r + 1) + (s + 1) % 16, 16 * r + (s + 1) % 16)
-            for r in range(8) for s in range(16)
+            for r in range(8)
+            for s in range(16)
         ]
         self._mesh("Ball", center + radius * shape, faces, colour)
 
-    def look(self, width: int, height: int, margin: float = 0.05, seen: np.ndarray | None = None) -> None:
-        """Let the camera stand as near as holds all points (N, 3) that are ``seen``, else all that was put on the stage.
+    def look(
+        self, width: int, height: int, margin: float = 0.05, seen: np.ndarray | None = None
+    ) -> None:
+        """Let the camera stand as near as holds all points (N, 3) that are ``seen``, else all that
+        was put on the stage.
 
         ``margin``: share of the picture that stays free at each edge.
         """
@@ -161,7 +190,9 @@ class Stage:
             high = (points[:, axis] + reach * points[:, 2]).max()
             low = (-points[:, axis] + reach * points[:, 2]).max()
             place[axis] = 0.5 * (high - low)
-            place[2] = max(place[2], 0.5 * (high + low) / reach) if axis else 0.5 * (high + low) / reach
+            place[2] = (
+                max(place[2], 0.5 * (high + low) / reach) if axis else 0.5 * (high + low) / reach
+            )
         self._place = place
         frame = np.eye(4)
         frame[:3, :3], frame[:3, 3] = self.axes.T, place @ self.axes
@@ -169,7 +200,9 @@ class Stage:
         self._camera.data.clip_start, self._camera.data.clip_end = 0.1, 300.0
 
     def pixels(self, points: np.ndarray) -> np.ndarray:
-        """Where the camera sees points (N, 3): (N, 2) pixels, right and down from the picture's upper left corner."""
+        """Where the camera sees points (N, 3): (N, 2) pixels, right and down from the picture's
+        upper left corner.
+        """
         local = points @ self.axes.T - self._place
         shown = local[:, :2] / (-local[:, 2:] * self._reach)
         return 0.5 * (shown * (1.0, -1.0) + 1.0) * self._size
@@ -181,8 +214,13 @@ class Stage:
         display = self.scene.display
         display.render_aa = "8"
         display.shading.show_specular_highlight = False  # or the floor would not be of one tone
-        # Blender's studio light lies in a frame whose y is up and whose z comes towards who looks along +y.
-        display.light_direction = (0.6 * np.cos(self._light_from), 0.8, -0.6 * np.sin(self._light_from))
+        # Blender's studio light lies in a frame whose y is up and whose z comes towards who looks
+        # along +y.
+        display.light_direction = (
+            0.6 * np.cos(self._light_from),
+            0.8,
+            -0.6 * np.sin(self._light_from),
+        )
         display.shading.shadow_intensity = 0.30
         settings = self.scene.render.image_settings
         if hasattr(settings, "media_type"):  # since 5.0

@@ -20,7 +20,8 @@ from .scene_reader import read_scene
 __all__ = ["Found", "find_furniture"]
 
 _NEAR = 1.5  # metres over the floor: of what counts as near
-_LOW, _HIGH = 0.07, 2.0  # metres over the floor: floors and rugs are lower, lamps and ceilings higher
+# metres over the floor: floors and rugs are lower, lamps and ceilings higher
+_LOW, _HIGH = 0.07, 2.0
 _SPACING = 0.1  # metres between points on a surface
 _LOOKS = 10  # places a second along the path
 _UNSEEN = {"CURVE", "SURFACE", "META", "FONT"}
@@ -29,7 +30,9 @@ _UNSEEN = {"CURVE", "SURFACE", "META", "FONT"}
 
 @dataclass(frozen=True)
 class Found:
-    """``taken``: names of what lies in ``collection`` now; ``warnings``: sentences about what the sensor cannot see."""
+    """``taken``: names of what lies in ``collection`` now; ``warnings``: sentences about what the
+    sensor cannot see.
+    """
 
     collection: bpy.types.Collection
     taken: tuple[str, ...]
@@ -37,11 +40,13 @@ class Found:
 
 
 def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Found:
-    """Link the visible meshes near the root's path into a collection "… Furniture", which becomes the character's.
+    """Link the visible meshes near the root's path into a collection "… Furniture", which becomes
+    the character's.
 
-    The character, other armatures with what is parented to or deformed by them, and floors are none. What the collection holds
-    of an earlier time and is not near any more is unlinked again, as far as it lies in another collection as well.
-    ``InputError``: there is no root or nothing near it, or the scene cannot be read; nothing is changed then.
+    The character, other armatures with what is parented to or deformed by them, and floors are
+    none. What the collection holds of an earlier time and is not near any more is unlinked again,
+    as far as it lies in another collection as well. ``InputError``: there is no root or nothing
+    near it, or the scene cannot be read; nothing is changed then.
     """
     scene, own = context.scene, armature.dafnet
     settings = settings_of(armature, scene, mode="FREE")
@@ -60,25 +65,36 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
         near = {name for name, distance in away.items() if distance < _NEAR * size}
         if not near:
             raise InputError(
-                f"No visible mesh lies within {_NEAR:g} m of the root's path; key the root to the furniture first."
+                f"No visible mesh lies within {_NEAR:g} m of the root's path; key the root to the "
+                "furniture first."
             )
         for each in list(made.objects):
             if each.name not in near:
                 made.objects.unlink(each)
-        read = read_scene(context, settings_of(armature, scene, mode="FREE", furniture=made.name_full))
+        read = read_scene(
+            context, settings_of(armature, scene, mode="FREE", furniture=made.name_full)
+        )
         warnings = [*read.warnings, *drained(shot_steps(read.scene, read.controls)).warnings]
     except InputError:
         bpy.data.collections.remove(made)
         raise
     if unseen := sorted(f"'{name}'" for name in near if away[name] > REACH * size):
-        warnings.append(f"Never nearer than {REACH:g} m, so the character does not see it: {', '.join(unseen)}.")
-    return Found(_kept(scene, own, made), tuple(sorted(near)), (*_hidden(candidates, path, unit, size), *warnings))
+        warnings.append(
+            f"Never nearer than {REACH:g} m, so the character does not see it: {', '.join(unseen)}."
+        )
+    return Found(
+        _kept(scene, own, made),
+        tuple(sorted(near)),
+        (*_hidden(candidates, path, unit, size), *warnings),
+    )
 
 
 def _kept(
     scene: bpy.types.Scene, own: bpy.types.PropertyGroup, made: bpy.types.Collection
 ) -> bpy.types.Collection:
-    """The collection of an earlier time with what is in ``made``, else ``made`` itself, as the character's furniture."""
+    """The collection of an earlier time with what is in ``made``, else ``made`` itself, as the
+    character's furniture.
+    """
     wanted = f"{own.id_data.name} Furniture"
     earlier = own.furniture
     if earlier is None or earlier == made or earlier.name != wanted or earlier.library:
@@ -99,14 +115,21 @@ def _path(context: bpy.types.Context, settings: Settings, armature: bpy.types.Ob
     """Places (N, 3) of the root during the shot, world, metres."""
     scene = context.scene
     if settings.root is None:
-        raise InputError(f"The character '{armature.name}' has no root; choose its root object in the DAFNet panel.")
+        raise InputError(
+            f"The character '{armature.name}' has no root; choose its root object in the DAFNet "
+            "panel."
+        )
     step = max(1, round(scene.render.fps / scene.render.fps_base / _LOOKS))
     frames = [*range(settings.frame_start, settings.frame_end, step), settings.frame_end]
-    return places_of(context, find_object(settings, settings.root, "root"), frames) * metres_per_unit(scene)
+    return places_of(
+        context, find_object(settings, settings.root, "root"), frames
+    ) * metres_per_unit(scene)
 
 
 def _bodies(scene: bpy.types.Scene) -> set[bpy.types.Object]:
-    """Characters and other armatures, with what is parented to them, deformed by them, or directs them."""
+    """Characters and other armatures, with what is parented to them, deformed by them, or directs
+    them.
+    """
     found: set[bpy.types.Object] = set()
     for each in scene.objects:
         if each.type == "ARMATURE":
@@ -117,7 +140,9 @@ def _bodies(scene: bpy.types.Scene) -> set[bpy.types.Object]:
 
 
 def _distance(meshes: list[Mesh], path: np.ndarray, size: float) -> float:
-    """Metres from the path (N, 3) over the floor to what of the meshes stands on it; infinite beyond what is near."""
+    """Metres from the path (N, 3) over the floor to what of the meshes stands on it; infinite
+    beyond what is near.
+    """
     low, high = path.min(0) - _NEAR * size, path.max(0) + _NEAR * size
     points = surface_points(meshes, _SPACING * size, (low[:2], high[:2]))
     points = points[((points > low) & (points < high))[:, :2].all(1)]
@@ -127,7 +152,9 @@ def _distance(meshes: list[Mesh], path: np.ndarray, size: float) -> float:
     return float(np.min(beside, where=(over > _LOW * size) & (over < _HIGH * size), initial=np.inf))
 
 
-def _hidden(candidates: list[bpy.types.Object], path: np.ndarray, unit: float, size: float) -> list[str]:
+def _hidden(
+    candidates: list[bpy.types.Object], path: np.ndarray, unit: float, size: float
+) -> list[str]:
     """Sentences about what stands beside the path and is hidden, or no mesh."""
     hidden: list[str] = []
     others: list[str] = []
@@ -135,18 +162,28 @@ def _hidden(candidates: list[bpy.types.Object], path: np.ndarray, unit: float, s
         seen = each.visible_get()
         if (each.type == "MESH" and seen) or each.type not in {"MESH", *_UNSEEN}:
             continue
-        if each.type == "CURVE" and not (each.data.bevel_depth or each.data.extrude or each.data.bevel_object):
+        if each.type == "CURVE" and not (
+            each.data.bevel_depth or each.data.extrude or each.data.bevel_object
+        ):
             continue
         matrix = np.array(each.matrix_world, float)
         corners = (np.array(each.bound_box) @ matrix[:3, :3].T + matrix[:3, 3]) * unit
         low, high = corners.min(0), corners.max(0)
         beyond = np.maximum(np.maximum(low[:2] - path[:, :2], path[:, :2] - high[:2]), 0.0)
         beside = np.linalg.norm(beyond, axis=1) < _NEAR * size
-        if (beside & (high[2] - path[:, 2] > _LOW * size) & (low[2] - path[:, 2] < _HIGH * size)).any():
+        if (
+            beside & (high[2] - path[:, 2] > _LOW * size) & (low[2] - path[:, 2] < _HIGH * size)
+        ).any():
             (others if seen else hidden).append(f"'{each.name}'")
     out = []
     if hidden:
-        out.append(f"Hidden beside the path, so not there for the character: {', '.join(hidden)}; show what is to count.")
+        out.append(
+            f"Hidden beside the path, so not there for the character: {', '.join(hidden)}; show "
+            "what is to count."
+        )
     if others:
-        out.append(f"No meshes, so not there for the character: {', '.join(others)}; convert what is to count.")
+        out.append(
+            f"No meshes, so not there for the character: {', '.join(others)}; convert what is to "
+            "count."
+        )
     return out

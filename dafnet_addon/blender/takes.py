@@ -1,7 +1,9 @@
-"""A character's takes: actions that carry what they were made of, listed on the armature, found again in a reopened file.
+"""A character's takes: actions that carry what they were made of, listed on the armature, found
+again in a reopened file.
 
-An action's ``dafnet`` settings say how it was drawn and how good it is; the motion before the clean-up and what was asked for
-are packed beside them, so a take that is copied or appended to another file keeps them.
+An action's ``dafnet`` settings say how it was drawn and how good it is; the motion before the
+clean-up and what was asked for are packed beside them, so a take that is copied or appended to
+another file keeps them.
 """
 
 import bpy
@@ -13,29 +15,52 @@ from ..core.take import Controls, Take
 from .compat import assign_action
 from .properties import PACKED
 
-__all__ = ["active_take", "add_take", "draw_of", "drop_take", "frames_of", "play_take", "stored", "takes_of"]
+__all__ = [
+    "active_take",
+    "add_take",
+    "draw_of",
+    "drop_take",
+    "frames_of",
+    "play_take",
+    "stored",
+    "takes_of",
+]
 
 _STATURE = 1.7  # metres, by which ``end_effector_error`` was divided
 _FIGURES = {
-    "sliding": "foot_sliding_per_frame", "collisions": "bad_collisions_per_frame", "miss": "end_effector_error", "jerk": "jerk",
+    "sliding": "foot_sliding_per_frame",
+    "collisions": "bad_collisions_per_frame",
+    "miss": "end_effector_error",
+    "jerk": "jerk",
 }
 _unpacked: dict[int, tuple[int, tuple[Take, Controls]]] = {}
 
 
 def add_take(
-    armature: bpy.types.Object, action: bpy.types.Action, take: Take, controls: Controls, draw: Draw, frame_start: int
+    armature: bpy.types.Object,
+    action: bpy.types.Action,
+    take: Take,
+    controls: Controls,
+    draw: Draw,
+    frame_start: int,
 ) -> None:
     """Keep with ``action`` what it was made of, and list it as the armature's active take."""
     action[PACKED] = packed(take, controls)
     kept = action.dafnet
     kept.seed, kept.temperature, kept.frame_start = draw.seed, draw.temperature, frame_start
     kept.lower_seed = draw.seed if draw.lower_seed is None else draw.lower_seed
-    kept.lower_temperature = draw.temperature if draw.lower_temperature is None else draw.lower_temperature
+    kept.lower_temperature = (
+        draw.temperature if draw.lower_temperature is None else draw.lower_temperature
+    )
     kept.log_likelihood = take.log_likelihood
     for before, figures in (("", take.metrics), ("raw_", take.raw_metrics)):
         for name, figure in _FIGURES.items():
             value = figures.get(figure)
-            setattr(kept, before + name, -1.0 if value is None else value * (_STATURE if name == "miss" else 1.0))
+            setattr(
+                kept,
+                before + name,
+                -1.0 if value is None else value * (_STATURE if name == "miss" else 1.0),
+            )
     own = armature.dafnet
     own.takes.add().action = action
     own.active_take = len(own.takes) - 1
@@ -62,7 +87,9 @@ def stored(action: bpy.types.Action) -> tuple[Take, Controls]:
     """The take and its controls. ``InputError`` where the action holds none."""
     data = action.get(PACKED)
     if not isinstance(data, bytes):
-        raise InputError(f"The action '{action.name}' is no take, or its motion was removed; generate one.")
+        raise InputError(
+            f"The action '{action.name}' is no take, or its motion was removed; generate one."
+        )
     key, mark = action.as_pointer(), hash(data)
     if key not in _unpacked or _unpacked[key][0] != mark:
         _unpacked.clear()  # one is enough: what asks again asks for the same
@@ -86,7 +113,9 @@ def play_take(armature: bpy.types.Object, action: bpy.types.Action) -> None:
 
 
 def drop_take(armature: bpy.types.Object, index: int) -> None:
-    """Take a row out of the list; another take plays instead, and Blender forgets the action with the file, if unused."""
+    """Take a row out of the list; another take plays instead, and Blender forgets the action with
+    the file, if unused.
+    """
     own = armature.dafnet
     action = own.takes[index].action
     own.takes.remove(index)

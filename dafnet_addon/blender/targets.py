@@ -1,4 +1,6 @@
-"""The empties that a character follows, made where it has none: the root, and the targets of head and hands."""
+"""The empties that a character follows, made where it has none: the root, and the targets of head
+and hands.
+"""
 
 import bpy
 import numpy as np
@@ -8,8 +10,11 @@ from .armature import character_scale
 
 __all__ = ["add_root", "add_targets", "lacks_root", "missing_targets"]
 
-_TARGETS = {"head": ("head", "Head", 0.2), "hand_left": ("left_wrist", "Left Hand", 0.15),
-            "hand_right": ("right_wrist", "Right Hand", 0.15)}
+_TARGETS = {
+    "head": ("head", "Head", 0.2),
+    "hand_left": ("left_wrist", "Left Hand", 0.15),
+    "hand_right": ("right_wrist", "Right Hand", 0.15),
+}
 """The bone of each, its name, and the size that it is shown at, metres of a body of 1.75 m."""
 
 
@@ -25,7 +30,9 @@ def add_root(context: bpy.types.Context, armature: bpy.types.Object) -> bpy.type
     ``InputError``: it has one already, or is no character or linked; nothing is changed then.
     """
     if not lacks_root(context, armature):
-        raise InputError(f"'{armature.name}' has a root already; animate '{armature.dafnet.root.name}'.")
+        raise InputError(
+            f"'{armature.name}' has a root already; animate '{armature.dafnet.root.name}'."
+        )
     if armature.library:
         raise InputError(f"The character '{armature.name}' is linked; make it local to add a root.")
     size = character_scale(armature)
@@ -33,7 +40,8 @@ def add_root(context: bpy.types.Context, armature: bpy.types.Object) -> bpy.type
     root = bpy.data.objects.new(f"{armature.name} Root", None)
     root.empty_display_type, root.empty_display_size = "ARROWS", 0.4 * size
     root.location = place.translation
-    root.rotation_euler = (0.0, 0.0, place.to_euler().z % (2.0 * np.pi) - np.pi)  # armatures look along -y, roots along y
+    # armatures look along -y, roots along y
+    root.rotation_euler = (0.0, 0.0, place.to_euler().z % (2.0 * np.pi) - np.pi)
     armature.users_collection[0].objects.link(root)
     armature.dafnet.root = root
     return root
@@ -42,19 +50,29 @@ def add_root(context: bpy.types.Context, armature: bpy.types.Object) -> bpy.type
 def missing_targets(context: bpy.types.Context, armature: bpy.types.Object) -> list[str]:
     """The targets of the settings that are not set or not in the scene."""
     found = {role: getattr(armature.dafnet, role) for role in _TARGETS}
-    return [role for role, target in found.items() if target is None or target.name not in context.scene.objects]
+    return [
+        role
+        for role, target in found.items()
+        if target is None or target.name not in context.scene.objects
+    ]
 
 
 def add_targets(context: bpy.types.Context, armature: bpy.types.Object) -> list[bpy.types.Object]:
-    """Make the missing ones where head and hands are in the current frame, in the character's collection.
+    """Make the missing ones where head and hands are in the current frame, in the character's
+    collection.
 
-    ``InputError``: nothing is missing, or the armature is no character or linked; nothing is changed then.
+    ``InputError``: nothing is missing, or the armature is no character or linked; nothing is
+    changed then.
     """
     missing = missing_targets(context, armature)
     if not missing:
-        raise InputError(f"'{armature.name}' has targets for head and hands already; animate those.")
+        raise InputError(
+            f"'{armature.name}' has targets for head and hands already; animate those."
+        )
     if armature.library:
-        raise InputError(f"The character '{armature.name}' is linked; make it local to add targets.")
+        raise InputError(
+            f"The character '{armature.name}' is linked; make it local to add targets."
+        )
     size = character_scale(armature)
     evaluated = armature.evaluated_get(context.evaluated_depsgraph_get())
     made = []

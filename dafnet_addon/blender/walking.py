@@ -27,7 +27,9 @@ _BEFORE_SEAT = BEFORE_SEAT + 0.2  # metres from a seat within which one is comin
 
 @dataclass(frozen=True)
 class Walk:
-    """Frames ``first`` to ``last`` of the new keys; whether the scene's end had to be moved for them; sentences to be said."""
+    """Frames ``first`` to ``last`` of the new keys; whether the scene's end had to be moved for
+    them; sentences to be said.
+    """
 
     first: int
     last: int
@@ -36,14 +38,19 @@ class Walk:
 
 
 def walk(
-    context: bpy.types.Context, armature: bpy.types.Object, seat: bpy.types.Object | None, seconds: float = 3.0,
+    context: bpy.types.Context,
+    armature: bpy.types.Object,
+    seat: bpy.types.Object | None,
+    seconds: float = 3.0,
     speed: float = 1.1,
 ) -> Walk:
-    """Let the character walk to ``seat`` and sit there for some ``seconds``, or, for None, to the 3D cursor and stand.
+    """Let the character walk to ``seat`` and sit there for some ``seconds``, or, for None, to the
+    3D cursor and stand.
 
-    Goes on from the root's last key, else from the current frame, where nothing before is changed. The seat has to be in the
-    character's furniture collection; where it has none, the seat's own becomes that. ``InputError``: there is nothing to sit
-    on, no way, no room before the seat, or the root cannot be keyed; nothing is changed then.
+    Goes on from the root's last key, else from the current frame, where nothing before is changed.
+    The seat has to be in the character's furniture collection; where it has none, the seat's own
+    becomes that. ``InputError``: there is nothing to sit on, no way, no room before the seat, or
+    the root cannot be keyed; nothing is changed then.
     """
     scene, own = context.scene, armature.dafnet
     furniture = own.furniture
@@ -69,7 +76,9 @@ def walk(
 
 
 def extended_to(scene: bpy.types.Scene, armature: bpy.types.Object, last: int) -> bool:
-    """Let the range that the character generates reach to frame ``last``; whether its end had to be moved for that."""
+    """Let the range that the character generates reach to frame ``last``; whether its end had to be
+    moved for that.
+    """
     own = armature.dafnet
     if last <= (scene.frame_end if own.use_scene_range else own.frame_end):
         return False
@@ -83,7 +92,14 @@ def extended_to(scene: bpy.types.Scene, armature: bpy.types.Object, last: int) -
 def told_of(met: Sequence[Passage], first: int) -> tuple[str, ...]:
     """A sentence about the furniture that a walk from frame ``first`` on leads through, if any."""
     places = listed(met, lambda each: f"from frame {first + each.first} to {first + each.last}")
-    return (f"The walk leads through furniture, {places}; make room there, or key the root another way.",) if met else ()
+    return (
+        (
+            f"The walk leads through furniture, {places}; make room there, or key the root "
+            "another way.",
+        )
+        if met
+        else ()
+    )
 
 
 def _collection_of(
@@ -93,15 +109,24 @@ def _collection_of(
     for collection in seat.users_collection:
         if collection != scene.collection and armature.name not in collection.all_objects:
             return collection
-    raise InputError(f"'{seat.name}' lies in no collection of its own; put the furniture into one and choose it.")
+    raise InputError(
+        f"'{seat.name}' lies in no collection of its own; put the furniture into one and choose it."
+    )
 
 
 def _route(
-    found: dict[str, list[Mesh]], seat: bpy.types.Object | None, place: np.ndarray, yaw: float, goal: np.ndarray,
-    seconds: float, speed: float, fps: float, size: float,
+    found: dict[str, list[Mesh]],
+    seat: bpy.types.Object | None,
+    place: np.ndarray,
+    yaw: float,
+    goal: np.ndarray,
+    seconds: float,
+    speed: float,
+    fps: float,
+    size: float,
 ) -> tuple[Route, tuple[Passage, ...]]:
-    """The walk in metres of the canonical body, from the root's ``place`` (3,) to the seat or to ``goal`` (3,), and the
-    furniture that it leads through.
+    """The walk in metres of the canonical body, from the root's ``place`` (3,) to the seat or to
+    ``goal`` (3,), and the furniture that it leads through.
     """
     floor = float(place[2])
 
@@ -109,25 +134,39 @@ def _route(
         return scaled(Scene(tuple(meshes)), 1.0 / size)
 
     everything = canonical([mesh for meshes in found.values() for mesh in meshes])
-    start = Stop((float(place[0]), float(place[1])), yaw, _BEFORE, seated=on_a_seat(everything.solids, place[:2], floor))
+    start = Stop(
+        (float(place[0]), float(place[1])),
+        yaw,
+        _BEFORE,
+        seated=on_a_seat(everything.solids, place[:2], floor),
+    )
     if seat is None:
         away = goal[:2] - place[:2]
         end = Stop((float(goal[0]), float(goal[1])), float(np.arctan2(-away[0], away[1])), seconds)
         route = walk_to(everything.solids, start, end, speed, fps, floor, size)
         return route, met_along(everything, route.path, fps, end=())
-    names = [name for name in (seat.name, *(child.name for child in seat.children_recursive)) if name in found]
+    names = [
+        name
+        for name in (seat.name, *(child.name for child in seat.children_recursive))
+        if name in found
+    ]
     if not names:
-        raise InputError(f"'{seat.name}' is not in the character's furniture collection; move it there.")
+        raise InputError(
+            f"'{seat.name}' is not in the character's furniture collection; move it there."
+        )
     solids = canonical([mesh for name in names for mesh in found[name]]).solids
     spot = seat_of(solids, place[:2], floor, seat.name, size=size)
     end = Stop((float(spot.position[0]), float(spot.position[1])), spot.yaw, seconds, seated=True)
     route = walk_to(everything.solids, start, end, speed, fps, floor, size)
-    met = met_along(everything, route.path, fps, [SatOn(spot.position, spot.height, frozenset(names))])
+    met = met_along(
+        everything, route.path, fps, [SatOn(spot.position, spot.height, frozenset(names))]
+    )
     away = np.linalg.norm(route.path.position[:, :2] - spot.position, axis=1)
     comes = int(np.flatnonzero(away > _BEFORE_SEAT)[-1])
     for each in met:
         if each.last > comes and each.name not in names:
             raise InputError(
-                f"'{each.name}' stands where one comes to sit on '{seat.name}'; pull '{seat.name}' out, or choose another seat."
+                f"'{each.name}' stands where one comes to sit on '{seat.name}'; pull "
+                f"'{seat.name}' out, or choose another seat."
             )
     return route, met

@@ -1,10 +1,11 @@
-"""After the model: motion is smoothed, hands and feet come out of furniture, planted feet stay where they are, nobody sinks
-into a seat, head and hands reach their targets exactly.
+"""After the model: motion is smoothed, hands and feet come out of furniture, planted feet stay
+where they are, nobody sinks into a seat, head and hands reach their targets exactly.
 
-All is done on joint positions of a body with constant bones, 30 frames a second, and leaves them constant; the take's own poses
-are untouched, so that the strengths can be changed without sampling again. Corrections begin and end softly: what is added to a
-joint is held or faded where nothing asks for it. What bends all of the motion comes first; feet before the seat, since they may
-lower the pelvis; targets last.
+All is done on joint positions of a body with constant bones, 30 frames a second, and leaves them
+constant; the take's own poses are untouched, so that the strengths can be changed without sampling
+again. Corrections begin and end softly: what is added to a joint is held or faded where nothing
+asks for it. What bends all of the motion comes first; feet before the seat, since they may lower
+the pelvis; targets last.
 """
 
 from collections.abc import Callable, Generator
@@ -19,44 +20,78 @@ from .root import gaussian
 from .rotations import matrix_from_vector, smoothstep
 from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, TOE_HEIGHT, joint
 
-__all__ = ["CleanUp", "cleaned", "cleaning_steps", "cleared", "planted", "seated", "smoothed_out", "standing_still", "reaching"]
+__all__ = [
+    "CleanUp",
+    "cleaned",
+    "cleaning_steps",
+    "cleared",
+    "planted",
+    "seated",
+    "smoothed_out",
+    "standing_still",
+    "reaching",
+]
 
 Distance = Callable[[np.ndarray], np.ndarray]
 """Signed distances (T, N) of world points (T, N, 3) to the furniture, negative inside; metres."""
 
-_TOES, _ANKLES = [joint("left_foot"), joint("right_foot")], [joint("left_ankle"), joint("right_ankle")]
+_TOES, _ANKLES = (
+    [joint("left_foot"), joint("right_foot")],
+    [joint("left_ankle"), joint("right_ankle")],
+)
 _KNEES, _HIPS = [joint("left_knee"), joint("right_knee")], [joint("left_hip"), joint("right_hip")]
 _OVER_LEGS = [j for j in range(22) if j not in {*_KNEES, *_ANKLES, *_TOES}]
 _THIGH, _SHIN = (float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("knee", "ankle"))
-_ARMS = {f"hand_{side}": [joint(f"{side}_{n}") for n in ("shoulder", "elbow", "wrist")] for side in ("left", "right")}
-_UPPER_ARM, _FOREARM = (float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("elbow", "wrist"))
+_ARMS = {
+    f"hand_{side}": [joint(f"{side}_{n}") for n in ("shoulder", "elbow", "wrist")]
+    for side in ("left", "right")
+}
+_UPPER_ARM, _FOREARM = (
+    float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("elbow", "wrist")
+)
 
-_LOW, _SLOW = 0.035, 0.45  # metres over a planted toe base; metres a second that a foot slides and is still meant to stand
+# metres over a planted toe base; metres a second that a foot slides and is still meant to stand
+_LOW, _SLOW = 0.035, 0.45
 _PLANTS, _MENDS = 4, 3  # frames: the shortest stand; the longest gap in one
 _SLIPS = 0.12  # metres from its place at which a foot is let go
 _FADE = 1 / 3  # seconds in which what is added dies away
-_SITS_OVER, _SINKS = 0.08, 0.15  # metres of a pelvis over a hard seat, at least; the most that it is lifted by
+# metres of a pelvis over a hard seat, at least; the most that it is lifted by
+_SITS_OVER, _SINKS = 0.08, 0.15
 _SMOOTHING = 2.5  # frames; deviation of the Gaussian at full strength
-_SKIN, _DEEPEST = 0.03, 0.20  # metres between a wrist or ankle and the surface that it must not sink into; the most it is moved
+# metres between a wrist or ankle and the surface that it must not sink into; the most it is moved
+_SKIN, _DEEPEST = 0.03, 0.20
 _STEADY = 3.0  # frames; deviation of the Gaussian over what brings a hand or foot out
 _NUDGE = 0.01  # metres; for slopes of the distance
 _STRAIGHT = 0.999  # of a leg's or arm's length, which is how far they reach
 
-_FARTHEST_HEAD, _FARTHEST_LEAN = 0.20, 0.25  # metres that the trunk is bent by for a target, at most
+# metres that the trunk is bent by for a target, at most
+_FARTHEST_HEAD, _FARTHEST_LEAN = 0.20, 0.25
 _SOFT = 0.15  # share of that in which it stops
-_SUPPLE = {joint(n): share for n, share in (
-    ("spine1", 0.4), ("spine2", 0.4), ("spine3", 0.4), ("neck", 1.0), ("left_collar", 0.3), ("right_collar", 0.3),
-    ("left_shoulder", 1.0), ("right_shoulder", 1.0), ("left_elbow", 1.0), ("right_elbow", 1.0),
-)}
+_SUPPLE = {
+    joint(n): share
+    for n, share in (
+        ("spine1", 0.4),
+        ("spine2", 0.4),
+        ("spine3", 0.4),
+        ("neck", 1.0),
+        ("left_collar", 0.3),
+        ("right_collar", 0.3),
+        ("left_shoulder", 1.0),
+        ("right_shoulder", 1.0),
+        ("left_elbow", 1.0),
+        ("right_elbow", 1.0),
+    )
+}
 """How willingly joints turn for a target."""
 _DAMPING, _ROUNDS, _STEP = 0.03, 15, 0.10  # metres; rounds of least squares; metres in one of them
 
 
 @dataclass(frozen=True)
 class CleanUp:
-    """Strengths from 0 (off) to 1 of what is done after the model: ``feet`` stand still where they are planted, head and hands
-    ``reach`` their targets, the pelvis is lifted out of the ``seat`` that it has sunk into, hands and feet are kept ``clear``
-    of furniture, and motion is made more ``smooth``.
+    """Strengths from 0 (off) to 1 of what is done after the model: ``feet`` stand still where they
+    are planted, head and hands ``reach`` their targets, the pelvis is lifted out of the ``seat``
+    that it has sunk into, hands and feet are kept ``clear`` of furniture, and motion is made more
+    ``smooth``.
     """
 
     feet: float = 0.0
@@ -68,7 +103,10 @@ class CleanUp:
     def __post_init__(self) -> None:
         strengths = astuple(self)
         if not all(0.0 <= strength <= 1.0 for strength in strengths):
-            raise InputError(f"The clean-up's strengths are {', '.join(map(str, strengths))}; give numbers from 0 to 1.")
+            raise InputError(
+                f"The clean-up's strengths are {', '.join(map(str, strengths))}; give numbers "
+                "from 0 to 1."
+            )
 
     @property
     def asked(self) -> bool:
@@ -93,7 +131,9 @@ def _runs(flags: np.ndarray) -> np.ndarray:
 
 
 def _between(offset: np.ndarray, asked: np.ndarray, fps: float = 30.0) -> np.ndarray:
-    """Offsets (T, 3) where they are ``asked`` (T,), led over to the next ones or faded out elsewhere."""
+    """Offsets (T, 3) where they are ``asked`` (T,), led over to the next ones or faded out
+    elsewhere.
+    """
     longest = max(1, round(_FADE * fps))
     out = np.where(asked[:, None], offset, 0.0)
     for start, end in _runs(~asked):
@@ -102,24 +142,36 @@ def _between(offset: np.ndarray, asked: np.ndarray, fps: float = 30.0) -> np.nda
         t = np.arange(1, end - start + 1, dtype=float)
         rest = end - start + 1
         fade = min(longest, rest)
-        out[start:end] = (1 - smoothstep(t / fade))[:, None] * before + smoothstep((t - rest + fade) / fade)[:, None] * after
+        out[start:end] = (1 - smoothstep(t / fade))[:, None] * before + smoothstep(
+            (t - rest + fade) / fade
+        )[:, None] * after
     return out
 
 
-def standing_still(joints: np.ndarray, floor: np.ndarray | float = 0.0) -> list[tuple[int, int, int]]:
-    """Stands of both feet: (foot, start, end exclusive), foot 0 is the left one, of joints (T, 22, 3).
+def standing_still(
+    joints: np.ndarray, floor: np.ndarray | float = 0.0
+) -> list[tuple[int, int, int]]:
+    """Stands of both feet: (foot, start, end exclusive), foot 0 is the left one, of joints (T, 22,
+    3).
 
-    A foot stands while its toe base is low over the ``floor``, a height or one for each frame, and not fast; it is let go, and
-    stands anew, where it has slipped too far for that.
+    A foot stands while its toe base is low over the ``floor``, a height or one for each frame, and
+    not fast; it is let go, and stands anew, where it has slipped too far for that.
     """
     stands = []
     for foot, toe in enumerate(_TOES):
         place = joints[:, toe]
-        speed = np.linalg.norm(np.gradient(place, axis=0), axis=-1) * 30.0 if len(joints) > 1 else np.zeros(len(joints))
+        speed = (
+            np.linalg.norm(np.gradient(place, axis=0), axis=-1) * 30.0
+            if len(joints) > 1
+            else np.zeros(len(joints))
+        )
         on = (place[:, 2] - floor < TOE_HEIGHT + _LOW) & (speed < _SLOW)
         for start, end in _runs(~on):
             if start > 0 and end < len(on) and end - start <= _MENDS:
-                on[start:end] = (place[start:end, 2] - np.broadcast_to(floor, len(on))[start:end] < TOE_HEIGHT + _LOW).all()
+                on[start:end] = (
+                    place[start:end, 2] - np.broadcast_to(floor, len(on))[start:end]
+                    < TOE_HEIGHT + _LOW
+                ).all()
         for start, end in _runs(on):
             while end - start >= _PLANTS:
                 away = np.linalg.norm(place[start:end, :2] - place[start, :2], axis=-1) > _SLIPS
@@ -130,8 +182,11 @@ def standing_still(joints: np.ndarray, floor: np.ndarray | float = 0.0) -> list[
     return stands
 
 
-def planted(joints: np.ndarray, floor: np.ndarray | float = 0.0, strength: float = 1.0) -> np.ndarray:
-    """Joints (T, 22, 3) with every standing foot held at one place, legs and, where they do not reach, the pelvis following.
+def planted(
+    joints: np.ndarray, floor: np.ndarray | float = 0.0, strength: float = 1.0
+) -> np.ndarray:
+    """Joints (T, 22, 3) with every standing foot held at one place, legs and, where they do not
+    reach, the pelvis following.
 
     Metres, world, 30 frames a second; ``floor``: its height, one or one for each frame.
     """
@@ -154,8 +209,12 @@ def planted(joints: np.ndarray, floor: np.ndarray | float = 0.0, strength: float
     return _on_legs(joints, -down, ankles, joints[:, _KNEES] + moved / 2)
 
 
-def _on_legs(joints: np.ndarray, lift: np.ndarray, ankles: np.ndarray, poles: np.ndarray) -> np.ndarray:
-    """Joints (T, 22, 3) with all but the legs lifted (T,), and legs bent to ``poles`` that reach ``ankles`` (T, 2, 3)."""
+def _on_legs(
+    joints: np.ndarray, lift: np.ndarray, ankles: np.ndarray, poles: np.ndarray
+) -> np.ndarray:
+    """Joints (T, 22, 3) with all but the legs lifted (T,), and legs bent to ``poles`` that reach
+    ``ankles`` (T, 2, 3).
+    """
     out = joints.copy()
     out[:, _OVER_LEGS, 2] += lift[:, None]
     out[:, _KNEES], out[:, _ANKLES] = two_bone(out[:, _HIPS], ankles, poles, _THIGH, _SHIN)
@@ -164,16 +223,24 @@ def _on_legs(joints: np.ndarray, lift: np.ndarray, ankles: np.ndarray, poles: np
 
 
 def _lowered(hips: np.ndarray, ankles: np.ndarray, held: np.ndarray) -> np.ndarray:
-    """How far down (T,) the pelvis has to go for standing legs (T, 2) to reach their ankles (T, 2, 3), smooth in time."""
+    """How far down (T,) the pelvis has to go for standing legs (T, 2) to reach their ankles (T, 2,
+    3), smooth in time.
+    """
     reach = _STRAIGHT * (_THIGH + _SHIN)
     across = np.linalg.norm((hips - ankles)[..., :2], axis=-1)
     highest = np.sqrt(np.maximum(reach**2 - across**2, 0.0))
-    need = np.where(held & (across < reach), hips[..., 2] - ankles[..., 2] - highest, 0.0).max(1).clip(0.0, 0.15)
+    need = (
+        np.where(held & (across < reach), hips[..., 2] - ankles[..., 2] - highest, 0.0)
+        .max(1)
+        .clip(0.0, 0.15)
+    )
     return _covering(need)
 
 
 def _covering(need: np.ndarray) -> np.ndarray:
-    """A smooth curve (T,) nowhere under the ``need``: its running maximum, averaged over no more than it looks ahead."""
+    """A smooth curve (T,) nowhere under the ``need``: its running maximum, averaged over no more
+    than it looks ahead.
+    """
     if not need.any():
         return need
     ahead = np.lib.stride_tricks.sliding_window_view(np.pad(need, 5, mode="edge"), 11).max(1)
@@ -183,19 +250,25 @@ def _covering(need: np.ndarray) -> np.ndarray:
 
 
 def seated(joints: np.ndarray, tops: np.ndarray, strength: float = 1.0) -> np.ndarray:
-    """Joints (T, 22, 3) whose pelvis is no lower than 8 cm over the seat that it has sunk into; the feet stay, or hang.
+    """Joints (T, 22, 3) whose pelvis is no lower than 8 cm over the seat that it has sunk into; the
+    feet stay, or hang.
 
-    ``tops`` (T,): heights of what is under the root (``tops_under``), NaN where nothing. A pelvis may be over a hard seat by
-    8 to 16 cm; on a soft one it comes to lie on the cushion, which does not give way.
+    ``tops`` (T,): heights of what is under the root (``tops_under``), NaN where nothing. A pelvis
+    may be over a hard seat by 8 to 16 cm; on a soft one it comes to lie on the cushion, which does
+    not give way.
     """
-    need = np.maximum(_SITS_OVER - joints[:, 0, 2] + np.where(np.isfinite(tops), tops, -np.inf), 0.0)
+    need = np.maximum(
+        _SITS_OVER - joints[:, 0, 2] + np.where(np.isfinite(tops), tops, -np.inf), 0.0
+    )
     for start, end in _runs(need > 0.0):
         if need[start:end].max() > _SINKS:
             need[start:end] = 0.0  # under a table, not on it
     lift = strength * _covering(need)
     if not lift.any():
         return joints
-    return _on_legs(joints, lift, joints[:, _ANKLES], joints[:, _KNEES] + lift[:, None, None] * (0.0, 0.0, 0.5))
+    return _on_legs(
+        joints, lift, joints[:, _ANKLES], joints[:, _KNEES] + lift[:, None, None] * (0.0, 0.0, 0.5)
+    )
 
 
 def smoothed_out(joints: np.ndarray, strength: float = 1.0) -> np.ndarray:
@@ -204,7 +277,9 @@ def smoothed_out(joints: np.ndarray, strength: float = 1.0) -> np.ndarray:
 
 
 def _out_of(points: np.ndarray, distance: Distance) -> np.ndarray:
-    """How (T, N, 3) points (T, N, 3) have to move to be as far from furniture as skin keeps them, steady in time."""
+    """How (T, N, 3) points (T, N, 3) have to move to be as far from furniture as skin keeps them,
+    steady in time.
+    """
     depth = np.clip(_SKIN - distance(points), 0.0, _DEEPEST)
     if not depth.any():
         return np.zeros_like(points)
@@ -214,11 +289,13 @@ def _out_of(points: np.ndarray, distance: Distance) -> np.ndarray:
     return gaussian(depth[..., None] * away, _STEADY)
 
 
-def cleared(joints: np.ndarray, distance: Distance, targets: dict[str, np.ndarray], strength: float = 1.0) -> np.ndarray:
+def cleared(
+    joints: np.ndarray, distance: Distance, targets: dict[str, np.ndarray], strength: float = 1.0
+) -> np.ndarray:
     """Joints (T, 22, 3) whose wrists and ankles are out of the furniture, arms and legs following.
 
-    Hands are moved any way that is out, feet level; what has a target (``reaching``) is left to it. Sitting thighs and a back
-    that leans on something are not touched.
+    Hands are moved any way that is out, feet level; what has a target (``reaching``) is left to it.
+    Sitting thighs and a back that leans on something are not touched.
     """
     wrists = [chain[2] for chain in _ARMS.values()]
     out_of = strength * _out_of(joints[:, [*wrists, *_ANKLES]], distance)
@@ -227,15 +304,24 @@ def cleared(joints: np.ndarray, distance: Distance, targets: dict[str, np.ndarra
     for k, name in enumerate(_ARMS):
         out_of[np.isfinite(targets.get(name, np.full((len(joints), 3), np.nan))).all(-1), k] = 0.0
     out_of[:, 2:, 2] = 0.0
-    out = _on_legs(joints, np.zeros(len(joints)), joints[:, _ANKLES] + out_of[:, 2:], joints[:, _KNEES] + out_of[:, 2:] / 2)
+    out = _on_legs(
+        joints,
+        np.zeros(len(joints)),
+        joints[:, _ANKLES] + out_of[:, 2:],
+        joints[:, _KNEES] + out_of[:, 2:] / 2,
+    )
     for k, (shoulder, elbow, wrist) in enumerate(_ARMS.values()):
         goal, pole = joints[:, wrist] + out_of[:, k], joints[:, elbow] + out_of[:, k] / 2
-        out[:, elbow], out[:, wrist] = two_bone(joints[:, shoulder], goal, pole, _UPPER_ARM, _FOREARM)
+        out[:, elbow], out[:, wrist] = two_bone(
+            joints[:, shoulder], goal, pole, _UPPER_ARM, _FOREARM
+        )
     return out
 
 
 def _limited(vectors: np.ndarray, most: float) -> np.ndarray:
-    return vectors * np.minimum(1.0, most / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9))
+    return vectors * np.minimum(
+        1.0, most / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
+    )
 
 
 def _softly_limited(vectors: np.ndarray, most: float) -> np.ndarray:
@@ -243,13 +329,20 @@ def _softly_limited(vectors: np.ndarray, most: float) -> np.ndarray:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     bend = _SOFT * most
     over = np.maximum(length - (most - bend), 0.0)
-    return vectors * (np.where(over > 0.0, most - bend * np.exp(-over / bend), length) / np.maximum(length, 1e-9))
+    return vectors * (
+        np.where(over > 0.0, most - bend * np.exp(-over / bend), length) / np.maximum(length, 1e-9)
+    )
 
 
 def _wished(
-    joints: np.ndarray, targets: dict[str, np.ndarray], strength: float, fps: float,
+    joints: np.ndarray,
+    targets: dict[str, np.ndarray],
+    strength: float,
+    fps: float,
 ) -> dict[str, np.ndarray]:
-    """Where each effector with targets should be in all frames (T, 3): on them, and softly led to and from them."""
+    """Where each effector with targets should be in all frames (T, 3): on them, and softly led to
+    and from them.
+    """
     out = {}
     for name, target in targets.items():
         asked = np.isfinite(target).all(-1)
@@ -261,12 +354,17 @@ def _wished(
 
 
 def reaching(
-    joints: np.ndarray, targets: dict[str, np.ndarray], strength: float = 1.0, fps: float = 30.0,
+    joints: np.ndarray,
+    targets: dict[str, np.ndarray],
+    strength: float = 1.0,
+    fps: float = 30.0,
 ) -> np.ndarray:
-    """Joints (T, 22, 3) whose head and wrists are at their ``targets``: (T, 3) by the names of ``END_EFFECTORS``, NaN if free.
+    """Joints (T, 22, 3) whose head and wrists are at their ``targets``: (T, 3) by the names of
+    ``END_EFFECTORS``, NaN if free.
 
-    Damped least squares over spine, neck, collars and arms: a straight arm is shortened by the trunk rather than by a sudden
-    elbow. A target that is out of reach is approached as near as arms and a modest lean allow.
+    Damped least squares over spine, neck, collars and arms: a straight arm is shortened by the
+    trunk rather than by a sudden elbow. A target that is out of reach is approached as near as arms
+    and a modest lean allow.
     """
     wished = _wished(joints, targets, strength, fps)
     if not wished:
@@ -284,20 +382,27 @@ def reaching(
         if max(float(np.abs(want).max()) for _, want in wants) < 1e-4:
             break
         bent = _bent(out, wants, damping)
-        # Levenberg and Marquardt: of a target that is out of reach a bold step may lead farther away, to and fro.
-        missed, misses = (sum(((goal - x[:, j]) ** 2).sum(-1) for j, goal in goals.items()) for x in (out, bent))
+        # Levenberg and Marquardt: of a target that is out of reach a bold step may lead farther
+        # away, to and fro.
+        missed, misses = (
+            sum(((goal - x[:, j]) ** 2).sum(-1) for j, goal in goals.items()) for x in (out, bent)
+        )
         better = misses < missed
         out[better] = bent[better]
         damping = np.where(better, np.maximum(damping / 2.0, _DAMPING), damping * 4.0)
     for name, (shoulder, elbow, wrist) in _ARMS.items():
         if name in wished:
-            out[:, elbow], out[:, wrist] = two_bone(out[:, shoulder], goals[wrist], out[:, elbow], _UPPER_ARM, _FOREARM)
+            out[:, elbow], out[:, wrist] = two_bone(
+                out[:, shoulder], goals[wrist], out[:, elbow], _UPPER_ARM, _FOREARM
+            )
     return out
 
 
-def _bent(joints: np.ndarray, wants: list[tuple[int, np.ndarray]], damping: np.ndarray) -> np.ndarray:
-    """Joints with the trunk turned so that they move as wanted: (joint, displacement (T, 3)); one step of least squares with
-    ``damping`` (T,), metres.
+def _bent(
+    joints: np.ndarray, wants: list[tuple[int, np.ndarray]], damping: np.ndarray
+) -> np.ndarray:
+    """Joints with the trunk turned so that they move as wanted: (joint, displacement (T, 3)); one
+    step of least squares with ``damping`` (T,), metres.
     """
     moves = np.concatenate([_limited(want, _STEP) for _, want in wants], axis=1)
     turning = [at for at in _SUPPLE if any(_HANGS[j, at] and j != at for j, _ in wants)]
@@ -305,13 +410,19 @@ def _bent(joints: np.ndarray, wants: list[tuple[int, np.ndarray]], damping: np.n
     for at in turning:
         rows = []
         for j, _ in wants:
-            lever = joints[:, j] - joints[:, at] if _HANGS[j, at] and j != at else np.zeros((len(joints), 3))
+            lever = (
+                joints[:, j] - joints[:, at]
+                if _HANGS[j, at] and j != at
+                else np.zeros((len(joints), 3))
+            )
             skew = np.zeros((len(joints), 3, 3))
             skew[:, 0, 1], skew[:, 0, 2], skew[:, 1, 2] = lever[:, 2], -lever[:, 1], lever[:, 0]
             rows.append(_SUPPLE[at] * (skew - np.swapaxes(skew, 1, 2)))
         columns.append(np.concatenate(rows, axis=1))
     jacobian = np.concatenate(columns, axis=2)
-    square = jacobian @ np.swapaxes(jacobian, 1, 2) + (damping**2)[:, None, None] * np.eye(moves.shape[1])
+    square = jacobian @ np.swapaxes(jacobian, 1, 2) + (damping**2)[:, None, None] * np.eye(
+        moves.shape[1]
+    )
     turns = np.einsum("tmn,tm->tn", jacobian, np.linalg.solve(square, moves[..., None])[..., 0])
     joints = joints.copy()
     for k, at in enumerate(turning):
@@ -323,21 +434,30 @@ def _bent(joints: np.ndarray, wants: list[tuple[int, np.ndarray]], damping: np.n
 
 
 def cleaned(
-    joints: np.ndarray, targets: dict[str, np.ndarray], settings: CleanUp, floor: np.ndarray | float = 0.0,
-    tops: np.ndarray | None = None, distance: Distance | None = None,
+    joints: np.ndarray,
+    targets: dict[str, np.ndarray],
+    settings: CleanUp,
+    floor: np.ndarray | float = 0.0,
+    tops: np.ndarray | None = None,
+    distance: Distance | None = None,
 ) -> np.ndarray:
     """``cleaning_steps`` drained."""
     return drained(cleaning_steps(joints, targets, settings, floor, tops, distance))
 
 
 def cleaning_steps(
-    joints: np.ndarray, targets: dict[str, np.ndarray], settings: CleanUp, floor: np.ndarray | float = 0.0,
-    tops: np.ndarray | None = None, distance: Distance | None = None,
+    joints: np.ndarray,
+    targets: dict[str, np.ndarray],
+    settings: CleanUp,
+    floor: np.ndarray | float = 0.0,
+    tops: np.ndarray | None = None,
+    distance: Distance | None = None,
 ) -> Generator[float, None, np.ndarray]:
-    """Joints (T, 22, 3) after all that ``settings`` ask for; canonical metres, world, 30 frames a second, constant bones.
+    """Joints (T, 22, 3) after all that ``settings`` ask for; canonical metres, world, 30 frames a
+    second, constant bones.
 
-    ``floor``: its height, one or one for each frame; ``tops``: see ``seated``; ``distance``: to the furniture, if there is any.
-    Yields progress.
+    ``floor``: its height, one or one for each frame; ``tops``: see ``seated``; ``distance``: to the
+    furniture, if there is any. Yields progress.
     """
     if settings.smooth > 0.0:
         joints = smoothed_out(joints, settings.smooth)

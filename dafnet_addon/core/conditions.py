@@ -1,4 +1,6 @@
-"""From the animator's controls and the scene to what the model is told at each frame, at 30 fps and on the canonical body."""
+"""From the animator's controls and the scene to what the model is told at each frame, at 30 fps and
+on the canonical body.
+"""
 
 from collections.abc import Generator
 from dataclasses import dataclass, replace
@@ -30,25 +32,42 @@ from .skeleton import END_EFFECTORS, MODEL_ORDER, UPPER
 from .solids import Box, Mesh, Scene
 from .take import Controls
 
-__all__ = ["Change", "Shot", "Told", "over_a_seat", "rolled", "shot_steps", "targets_of", "turns_of", "PREROLL"]
+__all__ = [
+    "Change",
+    "Shot",
+    "Told",
+    "over_a_seat",
+    "rolled",
+    "shot_steps",
+    "targets_of",
+    "turns_of",
+    "PREROLL",
+]
 
 PREROLL = 70
-"""Frames for which the root stands still before the first one, so that the model's memory has settled."""
+"""Frames for which the root stands still before the first one, so that the model's memory has
+settled.
+"""
 
 _EFFECTORS = {name: MODEL_ORDER.index(j) for name, j in END_EFFECTORS.items()}
 _TILT, _SPRINT = np.radians(5.0), 10.5  # radians; metres a second
-_REACH_FROM, _REACH = np.array([0.0, 0.0, 1.0]), 1.25  # a sphere that holds every head and wrist of the training poses
+# a sphere that holds every head and wrist of the training poses
+_REACH_FROM, _REACH = np.array([0.0, 0.0, 1.0]), 1.25
 _STILL, _CROWDED = 0.02, 0.35
 _AROUND = 6  # spheres of the sensor's innermost ring
-_UNDER = (np.hypot(SPHERES[:, 0], SPHERES[:, 1]) < 0.2) & (SPHERES[:, 2] > 0.2) & (SPHERES[:, 2] < 0.9)
+_UNDER = (
+    (np.hypot(SPHERES[:, 0], SPHERES[:, 1]) < 0.2) & (SPHERES[:, 2] > 0.2) & (SPHERES[:, 2] < 0.9)
+)
 _SOLID = 0.3
 
 
 @dataclass(frozen=True)
 class Change:
-    """A change of mode at the frame ``start``; ``ease`` (M,): how far the new mode counts at that frame and those after it.
+    """A change of mode at the frame ``start``; ``ease`` (M,): how far the new mode counts at that
+    frame and those after it.
 
-    ``observation`` (M, 66), ``share`` (M, 22): what would be told at these frames if the mode stayed as it was before.
+    ``observation`` (M, 66), ``share`` (M, 22): what would be told at these frames if the mode
+    stayed as it was before.
     """
 
     start: int
@@ -66,8 +85,8 @@ class Change:
 class Told:
     """What is asked of the body at N frames of a root's path, in its frames, canonical metres.
 
-    ``observation`` (N, 66): c_ob, model order; ``share`` (N, 22): how far each joint in it counts, 0 where it is not given;
-    ``changes``: those changes of mode that make a difference to either.
+    ``observation`` (N, 66): c_ob, model order; ``share`` (N, 22): how far each joint in it counts,
+    0 where it is not given; ``changes``: those changes of mode that make a difference to either.
     """
 
     observation: np.ndarray
@@ -77,9 +96,10 @@ class Told:
 
 @dataclass(frozen=True)
 class Shot:
-    """``conditions`` of ``PREROLL`` + N frames at 30 fps; ``path`` (N): R^τ, canonical metres; ``told``: what is asked at its
-    frames; ``scene``: the furniture within reach at these frames, canonical metres. ``own_path``, ``own_told``, ``own_scene``:
-    the same at the controls' own frames. ``warnings``: sentences for the user.
+    """``conditions`` of ``PREROLL`` + N frames at 30 fps; ``path`` (N): R^τ, canonical metres;
+    ``told``: what is asked at its frames; ``scene``: the furniture within reach at these frames,
+    canonical metres. ``own_path``, ``own_told``, ``own_scene``: the same at the controls' own
+    frames. ``warnings``: sentences for the user.
     """
 
     conditions: Conditions
@@ -92,44 +112,68 @@ class Shot:
     warnings: tuple[str, ...]
 
 
-def _path_of(controls: Controls, times: np.ndarray, target: np.ndarray, warnings: list[str]) -> RootPath:
+def _path_of(
+    controls: Controls, times: np.ndarray, target: np.ndarray, warnings: list[str]
+) -> RootPath:
     """R^τ: the root flattened, at 30 fps, smoothed once."""
     raw, tilt = root_from_matrices(np.asarray(controls.root, float))
     if tilt > _TILT:
-        warnings.append(f"The root tilts by up to {np.degrees(tilt):.0f}°; only its heading and position were used.")
+        warnings.append(
+            f"The root tilts by up to {np.degrees(tilt):.0f}°; only its heading and position were "
+            "used."
+        )
     moved = np.ptp(raw.position, axis=0).max() / controls.scale
     if len(raw) == 1:
-        warnings.append("There is only one frame, so the result is a pose; widen the frame range to get motion.")
+        warnings.append(
+            "There is only one frame, so the result is a pose; widen the frame range to get motion."
+        )
     elif moved < _STILL and np.ptp(raw.yaw) < _STILL:
-        warnings.append("The root does not move, so the character stays where it is; animate the root to make it walk.")
+        warnings.append(
+            "The root does not move, so the character stays where it is; animate the root to make "
+            "it walk."
+        )
     step = np.linalg.norm(np.diff(raw.position, axis=0), axis=1) / controls.scale
     if len(step) and step.max() > _SPRINT / controls.fps:
         frame = int(np.argmax(step)) + 1
         warnings.append(
-            f"The root jumps {step.max() * controls.scale:.1f} m, {frame} frames after the first; slow it down there."
+            f"The root jumps {step.max() * controls.scale:.1f} m, {frame} frames after the first; "
+            "slow it down there."
         )
     position = resample_positions(raw.position / controls.scale, times, target)
     path = RootPath(position, resample_positions(raw.yaw, times, target))
     return smoothed(path)
 
 
-def _targets(controls: Controls, name: str, times: np.ndarray, target: np.ndarray, path: RootPath) -> np.ndarray | None:
+def _targets(
+    controls: Controls, name: str, times: np.ndarray, target: np.ndarray, path: RootPath
+) -> np.ndarray | None:
     value = getattr(controls, name)
     if value is None:
         return None
-    return to_root(path, resample_positions(np.asarray(value, float) / controls.scale, times, target))
+    return to_root(
+        path, resample_positions(np.asarray(value, float) / controls.scale, times, target)
+    )
 
 
 def _body(controls: Controls, times: np.ndarray, target: np.ndarray, path: RootPath) -> np.ndarray:
-    """The upper body to follow (N, 14, 3), root frame; between a frame that has one and one that has none, the nearest's."""
+    """The upper body to follow (N, 14, 3), root frame; between a frame that has one and one that
+    has none, the nearest's.
+    """
     if controls.upper_body is None:
-        raise InputError("The mode is FULL but there is no upper body to follow; choose a source, or use FREE or EE.")
+        raise InputError(
+            "The mode is FULL but there is no upper body to follow; choose a source, or use FREE "
+            "or EE."
+        )
     body = np.asarray(controls.upper_body, float) / controls.scale
     full = _modes(controls) == "FULL"
     if not np.isfinite(body[full]).all():
-        raise InputError("The upper body to follow has a joint that is not a number; fix its animation.")
+        raise InputError(
+            "The upper body to follow has a joint that is not a number; fix its animation."
+        )
     between = resample_positions(body, times, target)
-    return to_root(path, np.where(np.isfinite(between), between, resample_nearest(body, times, target)))
+    return to_root(
+        path, np.where(np.isfinite(between), between, resample_nearest(body, times, target))
+    )
 
 
 def _influence(controls: Controls, name: str, times: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -137,13 +181,22 @@ def _influence(controls: Controls, name: str, times: np.ndarray, target: np.ndar
     value = getattr(controls, f"{name}_influence")
     if value is None:
         return np.ones(len(target))
-    return np.clip(resample_positions(np.asarray(value, float)[:, None], times, target)[:, 0], 0.0, 1.0)
+    return np.clip(
+        resample_positions(np.asarray(value, float)[:, None], times, target)[:, 0], 0.0, 1.0
+    )
 
 
 def _observed(
-    controls: Controls, modes: np.ndarray, times: np.ndarray, target: np.ndarray, path: RootPath, warnings: list[str]
+    controls: Controls,
+    modes: np.ndarray,
+    times: np.ndarray,
+    target: np.ndarray,
+    path: RootPath,
+    warnings: list[str],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """c_ob (N, 66), root frame, model order, and how far each joint in it counts (N, 22), 0 where it is not given."""
+    """c_ob (N, 66), root frame, model order, and how far each joint in it counts (N, 22), 0 where
+    it is not given.
+    """
     frames = len(path)
     observation, share = np.zeros((frames, 22, 3)), np.zeros((frames, 22))
     for name, slot in _EFFECTORS.items():
@@ -156,7 +209,10 @@ def _observed(
         if (used & (far > _REACH)).any():
             metres = float(np.nanmax(np.where(used, far, np.nan))) * controls.scale
             words = name.replace("_", " ")
-            warnings.append(f"The target of '{words}' is up to {metres:.1f} m away; it is reached for, not reached.")
+            warnings.append(
+                f"The target of '{words}' is up to {metres:.1f} m away; it is reached for, not "
+                "reached."
+            )
             within = _REACH_FROM + normalised(place - _REACH_FROM) * _REACH
             place = np.where((far > _REACH)[:, None], within, place)
         observation[used, slot], share[used, slot] = place[used], influence[used]
@@ -188,25 +244,35 @@ def _told(controls: Controls, path: RootPath, fps: float, warnings: list[str]) -
 
 def _modes(controls: Controls) -> np.ndarray:
     """That of each frame (T,)."""
-    return np.array([controls.mode] * len(controls) if isinstance(controls.mode, str) else controls.mode)
+    return np.array(
+        [controls.mode] * len(controls) if isinstance(controls.mode, str) else controls.mode
+    )
 
 
 def _starts(modes: np.ndarray, length: float) -> list[tuple[int, np.ndarray]]:
-    """The frames at which another mode begins, and how far it counts there and after it (M,), ``length`` frames long.
+    """The frames at which another mode begins, and how far it counts there and after it (M,),
+    ``length`` frames long.
 
-    No more than two are under way at once: of modes that change sooner the first has come over when the third begins.
+    No more than two are under way at once: of modes that change sooner the first has come over when
+    the third begins.
     """
     most = round(length)
     starts = (np.flatnonzero(modes[1:] != modes[:-1]) + 1).tolist() if most else []
     out = []
     for start, third in zip(starts, [*starts[2:], *2 * [len(modes) + most]], strict=False):
         longest = min(most, third - start)
-        out.append((start, smoothstep((np.arange(min(longest, len(modes) - start)) + 1.0) / (longest + 1.0))))
+        out.append(
+            (
+                start,
+                smoothstep((np.arange(min(longest, len(modes) - start)) + 1.0) / (longest + 1.0)),
+            )
+        )
     return out
 
 
 def _hold(change: Change, observation: np.ndarray, share: np.ndarray) -> None:
-    """What a mode that has ended tells no more stays, beside the root, as it was: targets may end with it.
+    """What a mode that has ended tells no more stays, beside the root, as it was: targets may end
+    with it.
 
     ``observation`` (66,), ``share`` (22,): of the frame before the change.
     """
@@ -219,26 +285,33 @@ def _hold(change: Change, observation: np.ndarray, share: np.ndarray) -> None:
 
 def _altered(change: Change, observation: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Of which joints (M, 22) a change of mode tells something else, at each of its frames."""
-    now, then = (each.reshape(-1, 22, 3) for each in (observation[change.frames], change.observation))
+    now, then = (
+        each.reshape(-1, 22, 3) for each in (observation[change.frames], change.observation)
+    )
     counts = share[change.frames]
     return (counts != change.share) | ((counts > 0.0) & (now != then).any(-1))
 
 
 def targets_of(path: RootPath, told: Told) -> dict[str, np.ndarray]:
-    """Where head and wrists have to be: world positions (N, 3), canonical metres, NaN where they are free, even in part, or on
-    their way from what another mode asked.
+    """Where head and wrists have to be: world positions (N, 3), canonical metres, NaN where they
+    are free, even in part, or on their way from what another mode asked.
     """
     places = to_world(path, told.observation.reshape(-1, 22, 3))
     given = told.share >= 1.0
     for change in told.changes:
         given[change.frames] &= ~_altered(change, told.observation, told.share)
-    return {name: np.where(given[:, slot, None], places[:, slot], np.nan) for name, slot in _EFFECTORS.items()}
+    return {
+        name: np.where(given[:, slot, None], places[:, slot], np.nan)
+        for name, slot in _EFFECTORS.items()
+    }
 
 
 def turns_of(controls: Controls, path: RootPath) -> dict[str, Turn]:
-    """How head and hands have to be turned, at the controls' own frames, those of ``path``: by name, where anything is asked.
+    """How head and hands have to be turned, at the controls' own frames, those of ``path``: by
+    name, where anything is asked.
 
-    As positions do, a rotation counts in the mode EE, by its influence, and more and more after a change of mode.
+    As positions do, a rotation counts in the mode EE, by its influence, and more and more after a
+    change of mode.
     """
     modes, times = _modes(controls), frame_times(len(controls), controls.fps)
     out = {}
@@ -281,28 +354,42 @@ def _at_model_rate(scene: Scene, times: np.ndarray, target: np.ndarray) -> Scene
 def _look_around(scene: Scene, path: RootPath, occupied: np.ndarray, warnings: list[str]) -> None:
     met = passages(scene, path, MODEL_FPS, seats_along(scene, path, MODEL_FPS))
     if met:
-        places = listed(met, lambda each: f"from {each.first / MODEL_FPS:.1f} to {each.last / MODEL_FPS:.1f} s")
-        warnings.append(f"The root runs through furniture in the shot, {places}; move the path or the furniture.")
+        places = listed(
+            met, lambda each: f"from {each.first / MODEL_FPS:.1f} to {each.last / MODEL_FPS:.1f} s"
+        )
+        warnings.append(
+            f"The root runs through furniture in the shot, {places}; move the path or the "
+            "furniture."
+        )
     crowd = occupied.mean(axis=1)
     if crowd.max() > _CROWDED:
         warnings.append(
-            f"Furniture fills {100 * crowd.max():.0f} % of the character's surroundings {np.argmax(crowd) / MODEL_FPS:.1f} s "
+            f"Furniture fills {100 * crowd.max():.0f} % of the character's surroundings "
+            f"{np.argmax(crowd) / MODEL_FPS:.1f} s "
             "into the shot, more than the sensor can tell apart; give the character room."
         )
 
 
 def over_a_seat(occupancy: np.ndarray) -> bool:
-    """Whether a root that sees this (2640,) is over a seat or bed, not beside one: at a seat's height all around is solid."""
+    """Whether a root that sees this (2640,) is over a seat or bed, not beside one: at a seat's
+    height all around is solid.
+    """
     around = occupancy[_UNDER].reshape(-1, _AROUND)
     return bool(((around > _SOLID).sum(axis=1) >= _AROUND - 1).any())
 
 
 def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]:
-    """Everything that the model is told; yields progress in [0, 1], solid by solid. Raises InputError for bad controls."""
+    """Everything that the model is told; yields progress in [0, 1], solid by solid. Raises
+    InputError for bad controls.
+    """
     if not isinstance(scene, Scene) or not isinstance(controls, Controls):
-        raise InputError("What is to be generated is not given as a Scene and Controls; make one of each.")
+        raise InputError(
+            "What is to be generated is not given as a Scene and Controls; make one of each."
+        )
     for solid in scene.solids:
-        in_frames(solid.matrices() if isinstance(solid, Box) else solid.matrix, solid.name, len(controls))
+        in_frames(
+            solid.matrices() if isinstance(solid, Box) else solid.matrix, solid.name, len(controls)
+        )
     warnings: list[str] = []
     frames = covering_frames(len(controls), controls.fps)
     times, target = frame_times(len(controls), controls.fps), frame_times(frames, MODEL_FPS)
@@ -311,30 +398,44 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
 
     if not scene.solids:
         warnings.append("There is no furniture; the character walks and stands on a bare floor.")
-    # Nothing farther away than the body, or the upper body that it is given, is felt or seen: it need not be measured.
+    # Nothing farther away than the body, or the upper body that it is given, is felt or seen: it
+    # need not be measured.
     farthest = float(np.linalg.norm(told.observation.reshape(-1, 3), axis=1).max())
     places = path.position * controls.scale
     moved = _at_model_rate(scene, times, target)
     near = beside(moved, places, max(REACH_OF_A_BODY, farthest + BAND), controls.scale)
-    # Measured in the body's own metres: a giant's grids reach as far for its size as a child's, and are as fine.
+    # Measured in the body's own metres: a giant's grids reach as far for its size as a child's, and
+    # are as fine.
     own_scene = scaled(_those(scene, moved, near), 1.0 / controls.scale)
     floor = float(np.median(path.position[:, 2]))
-    scene, said = yield from within(prepared_steps(scaled(near, 1.0 / controls.scale), floor, controls.scale), 0.0, 0.5)
+    scene, said = yield from within(
+        prepared_steps(scaled(near, 1.0 / controls.scale), floor, controls.scale), 0.0, 0.5
+    )
     warnings += said
     occupied = yield from within(occupancy_steps(scene, path), 0.5, 1.0)
     _look_around(scene, path, occupied, warnings)
 
-    # Before the first frame nothing but a seat under the root is there, so that who starts beside furniture starts standing.
+    # Before the first frame nothing but a seat under the root is there, so that who starts beside
+    # furniture starts standing.
     before = occupied[:1] if over_a_seat(occupied[0]) else np.zeros_like(occupied[:1])
     whole = RootPath(rolled(path.position), rolled(path.yaw))
     conditions = Conditions(
-        velocities(whole), ahead(whole), np.concatenate([np.repeat(before, PREROLL, axis=0), occupied]),
-        rolled(told.observation), rolled(told.share > 0.0).astype(float),
+        velocities(whole),
+        ahead(whole),
+        np.concatenate([np.repeat(before, PREROLL, axis=0), occupied]),
+        rolled(told.observation),
+        rolled(told.share > 0.0).astype(float),
     )
     own_path = resample_path(path, MODEL_FPS, controls.fps, len(controls))
     return Shot(
-        conditions, path, told, scene, own_path, _told(controls, own_path, controls.fps, []),
-        _with_grids(own_scene, scene), tuple(warnings),
+        conditions,
+        path,
+        told,
+        scene,
+        own_path,
+        _told(controls, own_path, controls.fps, []),
+        _with_grids(own_scene, scene),
+        tuple(warnings),
     )
 
 
@@ -346,7 +447,9 @@ def rolled(values: np.ndarray) -> np.ndarray:
 def _those(scene: Scene, moved: Scene, near: Scene) -> Scene:
     """The solids of a scene whose counterparts in the same scene, ``moved``, are ``near``."""
     found = {id(solid) for solid in near.solids}
-    return Scene(tuple(a for a, b in zip(scene.solids, moved.solids, strict=True) if id(b) in found))
+    return Scene(
+        tuple(a for a, b in zip(scene.solids, moved.solids, strict=True) if id(b) in found)
+    )
 
 
 def _with_grids(scene: Scene, ready: Scene) -> Scene:

@@ -1,13 +1,14 @@
 """Signed distance grids of triangle meshes, made once and then sampled for every frame.
 
-A grid lives in the mesh's *rigid space*: scale, shear and mirroring are in its vertices, in metres, and only the rigid
-motion (``rigid_split``) stays outside, so furniture may move without being measured again. Distances are truncated
-beyond ``BAND``; the sensor needs 7 cm, the collision metric 10 cm. All of it is NumPy, so that a scene looks the same
-inside Blender and outside; that is faster than asking a BVH tree for each node, and agrees with one (see the tests).
+A grid lives in the mesh's *rigid space*: scale, shear and mirroring are in its vertices, in metres,
+and only the rigid motion (``rigid_split``) stays outside, so furniture may move without being
+measured again. Distances are truncated beyond ``BAND``; the sensor needs 7 cm, the collision metric
+10 cm. All of it is NumPy, so that a scene looks the same inside Blender and outside; that is faster
+than asking a BVH tree for each node, and agrees with one (see the tests).
 
-Real furniture is rarely a clean solid. What is inside is therefore voted on by rays along the three axes, for each
-loose part of its own, so that overlapping parts unite; a part that the votes call open (a single-sided board, a sheet)
-is a thin shell, whose distance has no sign.
+Real furniture is rarely a clean solid. What is inside is therefore voted on by rays along the three
+axes, for each loose part of its own, so that overlapping parts unite; a part that the votes call
+open (a single-sided board, a sheet) is a thin shell, whose distance has no sign.
 """
 
 import hashlib
@@ -21,8 +22,16 @@ from .progress import drained, within
 from .solids import Box, Mesh, Scene
 
 __all__ = [
-    "BAND", "FLOOR", "DistanceGrid", "rigid_frames", "rigid_split", "build_grid", "grid_of", "prepared",
-    "prepared_steps", "scaled",
+    "BAND",
+    "FLOOR",
+    "DistanceGrid",
+    "rigid_frames",
+    "rigid_split",
+    "build_grid",
+    "grid_of",
+    "prepared",
+    "prepared_steps",
+    "scaled",
 ]
 
 BAND = 0.15
@@ -45,10 +54,11 @@ _CACHED_BYTES = 1 << 29
 
 @dataclass(frozen=True)
 class DistanceGrid:
-    """Signed distance (negative inside, metres) at the nodes of a regular grid in a mesh's rigid space.
+    """Signed distance (negative inside, metres) at the nodes of a regular grid in a mesh's rigid
+    space.
 
-    ``origin`` (3,): the first node. ``spacing``: metres between nodes. ``values`` (nx, ny, nz) float32, at most
-    ``truncation``, which all nodes of the border have.
+    ``origin`` (3,): the first node. ``spacing``: metres between nodes. ``values`` (nx, ny, nz)
+    float32, at most ``truncation``, which all nodes of the border have.
     """
 
     origin: np.ndarray
@@ -57,7 +67,9 @@ class DistanceGrid:
     truncation: float = BAND
 
     def sample(self, points: np.ndarray) -> np.ndarray:
-        """Trilinear distance (…) float32 at ``points`` (…, 3) in the rigid space; the truncation outside the grid."""
+        """Trilinear distance (…) float32 at ``points`` (…, 3) in the rigid space; the truncation
+        outside the grid.
+        """
         shape = np.array(self.values.shape)
         at = ((points - self.origin) / self.spacing).astype(np.float32)
         at = np.clip(at, 0.0, (shape - 1 - 1e-3).astype(np.float32))
@@ -78,7 +90,9 @@ class DistanceGrid:
         return near + fx * (far - near)
 
     def bounds(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """Corners (3,), (3,) of the box outside which samples are at least ``reach``; turned inside out if empty."""
+        """Corners (3,), (3,) of the box outside which samples are at least ``reach``; turned inside
+        out if empty.
+        """
         near = self.values < reach
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for axis in range(3):
@@ -91,20 +105,24 @@ class DistanceGrid:
     def scaled(self, factor: float) -> "DistanceGrid":
         """The grid of the same mesh, ``factor`` times as large."""
         values = self.values * np.float32(factor)
-        return DistanceGrid(self.origin * factor, self.spacing * factor, values, self.truncation * factor)
+        return DistanceGrid(
+            self.origin * factor, self.spacing * factor, values, self.truncation * factor
+        )
 
 
 def rigid_split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Split affine matrices (…, 4, 4) into rigid frames (…, 4, 4) and linear parts (…, 3, 3): matrix = rigid @ linear.
+    """Split affine matrices (…, 4, 4) into rigid frames (…, 4, 4) and linear parts (…, 3, 3):
+    matrix = rigid @ linear.
 
-    Polar decomposition; a mirrored matrix is mirrored along x first, so that the linear part of a moving object of
-    constant scale is the same in every frame.
+    Polar decomposition; a mirrored matrix is mirrored along x first, so that the linear part of a
+    moving object of constant scale is the same in every frame.
     """
     m = np.asarray(matrix, float)
     mirror = np.where(np.linalg.det(m[..., :3, :3]) < 0, -1.0, 1.0)[..., None]
     flip = np.concatenate([mirror, np.ones_like(mirror), np.ones_like(mirror)], axis=-1)
     u, _, vt = np.linalg.svd(m[..., :3, :3] * flip[..., None, :])
-    u[..., :, 2] *= np.sign(np.linalg.det(u @ vt))[..., None]  # only a flattened object, whose last singular value is 0
+    # only a flattened object, whose last singular value is 0
+    u[..., :, 2] *= np.sign(np.linalg.det(u @ vt))[..., None]
     rigid = m.copy()
     rigid[..., :3, :3] = u @ vt
     return rigid, np.swapaxes(rigid[..., :3, :3], -1, -2) @ m[..., :3, :3]
@@ -116,7 +134,9 @@ def rigid_frames(solid: Box | Mesh) -> np.ndarray:
 
 
 def _welded(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices at one place become one; collapsed and doubled triangles, which would spoil the parity, go."""
+    """Vertices at one place become one; collapsed and doubled triangles, which would spoil the
+    parity, go.
+    """
     low = vertices.min(axis=0)
     step = max(1e-5, float(np.ptp(vertices, axis=0).max()) / (1 << 20))
     x, y, z = np.rint((vertices - low) / step).astype(np.int64).T
@@ -151,19 +171,25 @@ def _ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _triangle_table(corners: np.ndarray) -> np.ndarray:
-    """(F, 16): first corner, two edges, unit normal, and the edges' products, for ``_triangle_distance``."""
+    """(F, 16): first corner, two edges, unit normal, and the edges' products, for
+    ``_triangle_distance``.
+    """
     a, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(ab, ac)
     area = np.linalg.norm(normal, axis=1)
     aa, bb, cross = (ab * ab).sum(1), (ac * ac).sum(1), (ab * ac).sum(1)
     inverse = np.where(area > 1e-12, 1.0 / np.maximum(area, 1e-12) ** 2, 0.0)
-    return np.column_stack([a, ab, ac, normal / np.maximum(area, 1e-12)[:, None], aa, bb, cross, inverse])
+    return np.column_stack(
+        [a, ab, ac, normal / np.maximum(area, 1e-12)[:, None], aa, bb, cross, inverse]
+    )
 
 
 def _triangle_distance(points: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Distance (N,) of each point (N, 3) to its own triangle, rows (N, 16) of the table."""
     x = points - rows[:, :3]
-    u, v, height, xx = (np.einsum("ij,ij->i", x, y) for y in (rows[:, 3:6], rows[:, 6:9], rows[:, 9:12], x))
+    u, v, height, xx = (
+        np.einsum("ij,ij->i", x, y) for y in (rows[:, 3:6], rows[:, 6:9], rows[:, 9:12], x)
+    )
     aa, bb, cross, inverse = rows[:, 12:].T.copy()
     s, t = (bb * u - cross * v) * inverse, (aa * v - cross * u) * inverse
     on_face = (s >= 0) & (t >= 0) & (s + t <= 1) & (inverse > 0)
@@ -178,11 +204,13 @@ def _triangle_distance(points: np.ndarray, rows: np.ndarray) -> np.ndarray:
 def _unsigned(
     corners: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, int, int]
 ) -> Generator[float, None, np.ndarray]:
-    """Distance (nx, ny, nz) float32 to the nearest of the triangles (F, 3, 3), truncated at ``BAND``; yields progress.
+    """Distance (nx, ny, nz) float32 to the nearest of the triangles (F, 3, 3), truncated at
+    ``BAND``; yields progress.
 
-    Points strewn over each triangle name it to the nodes around them; then every node names its nearest triangle to its
-    six neighbours, until none finds a nearer one. Every distance is an exact one to a triangle; that it is the nearest
-    is missed at few nodes, by millimetres, where triangles are smaller than the spacing.
+    Points strewn over each triangle name it to the nodes around them; then every node names its
+    nearest triangle to its six neighbours, until none finds a nearer one. Every distance is an
+    exact one to a triangle; that it is the nearest is missed at few nodes, by millimetres, where
+    triangles are smaller than the spacing.
     """
     _, ny, nz = shape
     table = _triangle_table(corners)
@@ -246,20 +274,27 @@ def _unsigned(
 
 
 def _rows_and_columns(corners: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Of the points (F,), (F,) that are strewn over each triangle, along its longest and its shortest side."""
+    """Of the points (F,), (F,) that are strewn over each triangle, along its longest and its
+    shortest side.
+    """
     sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
     rows, columns = np.ceil(sides.max(axis=1) / spacing), np.ceil(sides.min(axis=1) / spacing)
     return rows.astype(np.int64) + 1, columns.astype(np.int64) + 1
 
 
 def _inside(
-    corners: np.ndarray, parts: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, int, int]
+    corners: np.ndarray,
+    parts: np.ndarray,
+    origin: np.ndarray,
+    spacing: float,
+    shape: tuple[int, int, int],
 ) -> Generator[float, None, np.ndarray]:
-    """Nodes (nx, ny, nz) that at least two of the three axes' grid lines find inside a loose part, by parity of
-    crossings; yields progress.
+    """Nodes (nx, ny, nz) that at least two of the three axes' grid lines find inside a loose part,
+    by parity of crossings; yields progress.
 
-    A line that crosses a part an odd number of times says nothing about it. Edges belong to one of their two triangles
-    (half-open intervals), so a closed part is crossed an even number of times by every line.
+    A line that crosses a part an odd number of times says nothing about it. Edges belong to one of
+    their two triangles (half-open intervals), so a closed part is crossed an even number of times
+    by every line.
     """
     votes = np.zeros(shape, np.int8)
     local = (corners - origin) / spacing
@@ -269,11 +304,13 @@ def _inside(
         first = np.ceil(points[:, :, 0].min(axis=1)).astype(int)
         triangle, i = _ragged(np.ceil(points[:, :, 0].max(axis=1)).astype(int) - first)
         row = i + first[triangle]
-        ends = np.empty((len(triangle), 2, 2))  # (v, depth) at the two edges of the triangle that cross the row
+        # (v, depth) at the two edges of the triangle that cross the row
+        ends = np.empty((len(triangle), 2, 2))
         entered = np.zeros(len(triangle), int)
         for a, b in ((0, 1), (1, 2), (2, 0)):
             lower, upper = points[triangle, a], points[triangle, b]
-            swap = (lower[:, 0] > upper[:, 0])[:, None]  # the same order, and so the same crossing, for both neighbours
+            # the same order, and so the same crossing, for both neighbours
+            swap = (lower[:, 0] > upper[:, 0])[:, None]
             lower, upper = np.where(swap, upper, lower), np.where(swap, lower, upper)
             k = np.flatnonzero((lower[:, 0] <= row) & (row < upper[:, 0]))
             lower, upper = lower[k], upper[k]
@@ -285,12 +322,18 @@ def _inside(
         span, j = _ragged(np.ceil(ends[:, 1, 0]).astype(int) - first)
         column = j + first[span]
         start, stop = ends[span, 0], ends[span, 1]
-        depth = start[:, 1] + (column - start[:, 0]) / (stop[:, 0] - start[:, 0]) * (stop[:, 1] - start[:, 1])
+        depth = start[:, 1] + (column - start[:, 0]) / (stop[:, 0] - start[:, 0]) * (
+            stop[:, 1] - start[:, 1]
+        )
         line, part = row[span] * shape[v] + column, parts[triangle[span]]
 
         order = np.lexsort((depth, part, line))
         line, part, depth = line[order], part[order], depth[order]
-        group = np.concatenate([[0], np.cumsum((np.diff(line) != 0) | (np.diff(part) != 0))]) if len(line) else line
+        group = (
+            np.concatenate([[0], np.cumsum((np.diff(line) != 0) | (np.diff(part) != 0))])
+            if len(line)
+            else line
+        )
         count = np.bincount(group)
         place = np.arange(len(group)) - (np.cumsum(count) - count)[group]
         even = count[group] % 2 == 0
@@ -303,8 +346,12 @@ def _inside(
     return votes >= 2
 
 
-def _furniture(corners: np.ndarray, part: np.ndarray, floor: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """Which triangles (F,) are no floor, and which of them belong to rooms and buildings, as ``build_grid`` tells."""
+def _furniture(
+    corners: np.ndarray, part: np.ndarray, floor: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which triangles (F,) are no floor, and which of them belong to rooms and buildings, as
+    ``build_grid`` tells.
+    """
     parts = int(part.max()) + 1
     low, high = np.full((parts, 3), np.inf), np.full((parts, 3), -np.inf)
     np.minimum.at(low, part, corners.min(axis=1))
@@ -325,7 +372,9 @@ def _furniture(corners: np.ndarray, part: np.ndarray, floor: np.ndarray | None) 
     return (top > FLOOR)[part] & ~underfoot, room[part]
 
 
-def build_grid(vertices: np.ndarray, triangles: np.ndarray, floor: np.ndarray | None = None) -> DistanceGrid:
+def build_grid(
+    vertices: np.ndarray, triangles: np.ndarray, floor: np.ndarray | None = None
+) -> DistanceGrid:
     """``_grid_steps`` drained."""
     return drained(_grid_steps(vertices, triangles, floor))
 
@@ -333,16 +382,19 @@ def build_grid(vertices: np.ndarray, triangles: np.ndarray, floor: np.ndarray | 
 def _grid_steps(
     vertices: np.ndarray, triangles: np.ndarray, floor: np.ndarray | None
 ) -> Generator[float, None, DistanceGrid]:
-    """Distance grid of a mesh, ``vertices`` (V, 3) in its rigid space, metres; ``triangles`` (F, 3).
+    """Distance grid of a mesh, ``vertices`` (V, 3) in its rigid space, metres; ``triangles`` (F,
+    3).
 
-    ``floor`` (4,): upward unit normal and offset of the root's plane, so that a point's height over it is
-    ``point @ floor[:3] + floor[3]``; without it nothing is taken for floor. Nodes are 2 cm apart, wider for a mesh that
-    would need too many: from 53 square metres of surface or 48 cubic metres of box on; 4 cm for a furnished room.
+    ``floor`` (4,): upward unit normal and offset of the root's plane, so that a point's height over
+    it is ``point @ floor[:3] + floor[3]``; without it nothing is taken for floor. Nodes are 2 cm
+    apart, wider for a mesh that would need too many: from 53 square metres of surface or 48 cubic
+    metres of box on; 4 cm for a furnished room.
 
-    Ignored: loose parts that rise less than 5 cm over the floor (floors, slabs, rugs), and the floor of rooms and
-    buildings. A part that could hold a standing person (1.4 m in each direction, 1.9 m in one), or that reaches under
-    the floor and also carries it, is a room or a building: its surfaces are thin shells, because the character walks
-    where rays would find the inside of a solid.
+    Ignored: loose parts that rise less than 5 cm over the floor (floors, slabs, rugs), and the
+    floor of rooms and buildings. A part that could hold a standing person (1.4 m in each direction,
+    1.9 m in one), or that reaches under the floor and also carries it, is a room or a building: its
+    surfaces are thin shells, because the character walks where rays would find the inside of a
+    solid.
     """
     triangles = np.asarray(triangles, np.int64).reshape(-1, 3)
     empty = DistanceGrid(np.zeros(3), _FINEST, np.full((2, 2, 2), BAND, np.float32))
@@ -360,9 +412,16 @@ def _grid_steps(
 
     first, last = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     size = last - first + 2 * (BAND + _FINEST)
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    area = (
+        0.5
+        * np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        ).sum()
+    )
     spacing = max(
-        _FINEST, (2 * BAND * area / _MAX_BAND_NODES) ** (1 / 3), (3 * area / _MAX_BAND_NODES) ** (1 / 2),
+        _FINEST,
+        (2 * BAND * area / _MAX_BAND_NODES) ** (1 / 3),
+        (3 * area / _MAX_BAND_NODES) ** (1 / 2),
         (size.prod() / _MAX_NODES) ** (1 / 3),
     )
     while _too_many(corners, last - first, spacing):
@@ -375,7 +434,9 @@ def _grid_steps(
 
 
 def _too_many(corners: np.ndarray, size: np.ndarray, spacing: float) -> bool:
-    """Whether a grid over ``size`` (3,) had too many nodes, or its triangles too many points: of huge sheets and needles."""
+    """Whether a grid over ``size`` (3,) had too many nodes, or its triangles too many points: of
+    huge sheets and needles.
+    """
     rows, columns = _rows_and_columns(corners, spacing)
     nodes = (np.ceil((size + 2 * (BAND + spacing)) / spacing) + 1).prod()
     return bool(nodes > 2 * _MAX_NODES or (rows * columns).sum() - 4 * len(corners) > _MAX_SEEDS)
@@ -385,7 +446,9 @@ _cache: OrderedDict[bytes, DistanceGrid] = OrderedDict()
 
 
 def _floor_plane(rigid: np.ndarray, floor: float) -> np.ndarray | None:
-    """Root's plane (4,) in the rigid space; None for an object that does not stay at one height over it, or upright."""
+    """Root's plane (4,) in the rigid space; None for an object that does not stay at one height
+    over it, or upright.
+    """
     frames = rigid.reshape(-1, 4, 4)
     planes = np.concatenate([frames[:, 2, :3], frames[:, 2, 3:] - floor], axis=1)
     if np.abs(planes - planes[0]).max() > 0.01:
@@ -401,8 +464,8 @@ def grid_of(mesh: Mesh, floor: float) -> DistanceGrid:
 def _grid_of_steps(mesh: Mesh, floor: float) -> Generator[float, None, DistanceGrid]:
     """The mesh's distance grid: its own, one made before for the same geometry, or a new one.
 
-    ``floor``: height of the root's plane in the world (metres). The scale of the first frame counts. Grids are kept in
-    memory by geometry, scale and floor, the last half gigabyte of them.
+    ``floor``: height of the root's plane in the world (metres). The scale of the first frame
+    counts. Grids are kept in memory by geometry, scale and floor, the last half gigabyte of them.
     """
     if mesh.grid is not None:
         return mesh.grid
@@ -429,9 +492,12 @@ def prepared(scene: Scene, floor: float) -> tuple[Scene, tuple[str, ...]]:
 
 
 def prepared_steps(
-    scene: Scene, floor: float, size: float = 1.0,
+    scene: Scene,
+    floor: float,
+    size: float = 1.0,
 ) -> Generator[float, None, tuple[Scene, tuple[str, ...]]]:
-    """The scene with every mesh's grid filled, and warnings for the user, one sentence each; yields progress.
+    """The scene with every mesh's grid filled, and warnings for the user, one sentence each; yields
+    progress.
 
     ``size``: that of the character for which the scene was ``scaled``.
     """
@@ -445,12 +511,18 @@ def prepared_steps(
             across = max(grid.values.shape) * grid.spacing
             linear = rigid_split(solid.matrix)[1].reshape(-1, 3, 3)
             if np.abs(linear - linear[0]).max() > 0.01 * max(np.abs(linear[0]).max(), 1e-6):
-                warnings.append(f"The scale of '{solid.name}' is animated; its size on the first frame is used.")
+                warnings.append(
+                    f"The scale of '{solid.name}' is animated; its size on the first frame is used."
+                )
             if grid.spacing > _COARSE and across > _VAST:
-                warnings.append(f"'{solid.name}' is {across * size:,.0f} m across, so it is hardly seen: is its unit right?")
+                warnings.append(
+                    f"'{solid.name}' is {across * size:,.0f} m across, so it is hardly seen: is "
+                    "its unit right?"
+                )
             elif grid.spacing > _COARSE:
                 warnings.append(
-                    f"'{solid.name}' is so large that it is seen only every {100 * size * grid.spacing:.0f} cm; "
+                    f"'{solid.name}' is so large that it is seen only every "
+                    f"{100 * size * grid.spacing:.0f} cm; "
                     "separate the furniture from it, or split it into parts."
                 )
         solids.append(solid)
@@ -458,11 +530,16 @@ def prepared_steps(
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
-    """The scene ``factor`` times as large, about the world's origin; grids that are there are kept."""
+    """The scene ``factor`` times as large, about the world's origin; grids that are there are
+    kept.
+    """
     solids: list[Box | Mesh] = []
     for solid in scene.solids:
         if isinstance(solid, Box):
-            center, half_size = np.asarray(solid.center) * factor, np.asarray(solid.half_size) * factor
+            center, half_size = (
+                np.asarray(solid.center) * factor,
+                np.asarray(solid.half_size) * factor,
+            )
             solids.append(replace(solid, center=center, half_size=half_size))
         else:
             matrix = np.diag([factor, factor, factor, 1.0]) @ np.asarray(solid.matrix, float)

@@ -8,7 +8,9 @@ _LONGEST = 1000  # characters; a path may be as long
 
 
 class DafnetError(Exception):
-    """Root of every error raised on purpose; its text is one sentence for the user, safe to show whatever names are in it."""
+    """Root of every error raised on purpose; its text is one sentence for the user, safe to show
+    whatever names are in it.
+    """
 
     def __init__(self, sentence: str) -> None:
         super().__init__(printable(sentence, _LONGEST))

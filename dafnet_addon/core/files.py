@@ -32,23 +32,28 @@ def save_text(path: Path, text: str) -> None:
 
 
 def require_writable(path: Path) -> None:
-    """Raise InputError where ``path`` cannot be written, before anything is computed for it; makes nothing."""
+    """Raise InputError where ``path`` cannot be written, before anything is computed for it; makes
+    nothing.
+    """
     if path.is_dir():
         raise InputError(f"'{path}' is a folder; give the output another name.")
     folder = _existing(path.absolute().parent)
     if not folder.is_dir():
         raise InputError(f"'{folder}' is no folder; give the output another place.")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"The folder '{folder}' may not be written to; give the output another place.")
+        raise InputError(
+            f"The folder '{folder}' may not be written to; give the output another place."
+        )
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A new name beside ``path`` to write to; what lies there when the block ends well becomes ``path`` in one step.
+    """A new name beside ``path`` to write to; what lies there when the block ends well becomes
+    ``path`` in one step.
 
     Until then ``path`` is what it was, whatever fails and whenever the process is killed. Links are
-    followed, folders that are missing are made. Where the block fails, neither the new name nor a new
-    folder is left. Raises InputError where the disk refuses.
+    followed, folders that are missing are made. Where the block fails, neither the new name nor a
+    new folder is left. Raises InputError where the disk refuses.
     """
     path = Path(os.path.realpath(path))
     name = secrets.token_hex(8)
@@ -62,7 +67,8 @@ def whole_file(path: Path) -> Iterator[Path]:
         _replace(part, path)
     except OSError as error:
         raise InputError(
-            f"'{path}' cannot be written ({error.strerror or error}); give the output another place."
+            f"'{path}' cannot be written ({error.strerror or error}); give the output another "
+            "place."
         ) from error
     finally:
         for left in (part, part.with_name(part.name + "@")):
@@ -82,7 +88,8 @@ def _replace(part: Path, path: Path) -> None:
         os.replace(part, path)
     except PermissionError as error:  # on Windows, where an open file is not replaced
         raise InputError(
-            f"'{path}' cannot be replaced; close it in other programs, or give the output another name."
+            f"'{path}' cannot be replaced; close it in other programs, or give the output another "
+            "name."
         ) from error
     if os.name == "posix":  # elsewhere a folder cannot be opened
         folder = os.open(path.parent, os.O_RDONLY)
@@ -126,7 +133,8 @@ def _runs(process: int) -> bool:
         handle = ctypes.windll.kernel32.OpenProcess(0x1000, False, process)  # to ask, not to touch
         if handle:
             ctypes.windll.kernel32.CloseHandle(handle)
-        return bool(handle) or ctypes.windll.kernel32.GetLastError() == 5  # it is there, but not ours
+        # it is there, but not ours
+        return bool(handle) or ctypes.windll.kernel32.GetLastError() == 5
     try:
         os.kill(process, 0)
     except ProcessLookupError:

@@ -1,4 +1,6 @@
-"""Scene and controls in, a take out: the one code path under the operator, the command line and the Python API."""
+"""Scene and controls in, a take out: the one code path under the operator, the command line and the
+Python API.
+"""
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
@@ -11,7 +13,15 @@ from .checks import MOST_SEED, number, whole
 from .cleanup import CleanUp, cleaning_steps, reaching
 from .conditions import PREROLL, Change, Shot, rolled, shot_steps, targets_of, turns_of
 from .errors import InputError
-from .kinematics import Bent, come_over, fit, forward_kinematics, global_from_local, local_from_global, turned
+from .kinematics import (
+    Bent,
+    come_over,
+    fit,
+    forward_kinematics,
+    global_from_local,
+    local_from_global,
+    turned,
+)
 from .metrics import summary
 from .occupancy import distance, tops_under
 from .progress import drained, within
@@ -29,7 +39,15 @@ from .solids import Scene
 from .take import Controls, Take
 from .weights import Weights
 
-__all__ = ["RAW", "Draw", "clean_again_steps", "cleaned_up", "generate", "generate_steps", "takes_steps"]
+__all__ = [
+    "RAW",
+    "Draw",
+    "clean_again_steps",
+    "cleaned_up",
+    "generate",
+    "generate_steps",
+    "takes_steps",
+]
 
 RAW = CleanUp()
 """The model's own motion."""
@@ -42,9 +60,11 @@ _CONDITIONED, _SAMPLED = 0.15, 0.85
 
 @dataclass(frozen=True)
 class Draw:
-    """What one take is drawn with: ``seed`` and ``temperature``; the legs may have their own, None goes with the body's.
+    """What one take is drawn with: ``seed`` and ``temperature``; the legs may have their own, None
+    goes with the body's.
 
-    Seeds are whole numbers from 0 to ``MOST_SEED``, temperatures from 0 to 10. Raises InputError for others.
+    Seeds are whole numbers from 0 to ``MOST_SEED``, temperatures from 0 to 10. Raises InputError
+    for others.
     """
 
     seed: int = 0
@@ -59,22 +79,34 @@ class Draw:
         if self.lower_seed is not None:
             hold("lower_seed", whole(self.lower_seed, "The seed of the legs", 0, MOST_SEED))
         if self.lower_temperature is not None:
-            hold("lower_temperature", number(self.lower_temperature, "The temperature of the legs", 0.0, _HOTTEST))
+            hold(
+                "lower_temperature",
+                number(self.lower_temperature, "The temperature of the legs", 0.0, _HOTTEST),
+            )
 
 
 def _kept(resume: Take, frame: int, controls: Controls, path: RootPath) -> np.ndarray:
-    """The resumed take's poses (PREROLL + N, 66) before a frame of the controls, in the new path's frames.
+    """The resumed take's poses (PREROLL + N, 66) before a frame of the controls, in the new path's
+    frames.
 
-    The two may have other rates, and the body another size: it keeps its place in the world beside the take's root.
+    The two may have other rates, and the body another size: it keeps its place in the world beside
+    the take's root.
     """
     seconds = len(resume) / resume.fps
     if not 0 < frame / controls.fps <= seconds * (1.0 + _HAIR):
-        raise InputError(f"Frame {frame} is not inside the take, which lasts {seconds:.2f} s; go on from a frame in it.")
+        raise InputError(
+            f"Frame {frame} is not inside the take, which lasts {seconds:.2f} s; go on from a "
+            "frame in it."
+        )
     count = min(covering_frames(frame, controls.fps), len(resume.path), len(path))
-    old = RootPath(resume.path.position[:count] * (resume.scale / controls.scale), resume.path.yaw[:count])
+    old = RootPath(
+        resume.path.position[:count] * (resume.scale / controls.scale), resume.path.yaw[:count]
+    )
     new = RootPath(path.position[:count], path.yaw[:count])
     shot = resume.poses[PREROLL : PREROLL + count].reshape(count, 22, 3)
-    return np.concatenate([resume.poses[:PREROLL], to_root(new, to_world(old, shot)).reshape(count, 66)])
+    return np.concatenate(
+        [resume.poses[:PREROLL], to_root(new, to_world(old, shot)).reshape(count, 66)]
+    )
 
 
 def cleaned_up(joints: np.ndarray, shot: Shot, settings: CleanUp) -> np.ndarray:
@@ -82,18 +114,26 @@ def cleaned_up(joints: np.ndarray, shot: Shot, settings: CleanUp) -> np.ndarray:
     return drained(_clean_up_steps(joints, shot, settings))
 
 
-def _clean_up_steps(joints: np.ndarray, shot: Shot, settings: CleanUp) -> Generator[float, None, np.ndarray]:
-    """Joints (N, 22, 3) of a shot, canonical metres, on constant bones, after all that ``settings`` ask for."""
+def _clean_up_steps(
+    joints: np.ndarray, shot: Shot, settings: CleanUp
+) -> Generator[float, None, np.ndarray]:
+    """Joints (N, 22, 3) of a shot, canonical metres, on constant bones, after all that ``settings``
+    ask for.
+    """
     tops = tops_under(shot.scene, shot.path) if settings.seat else None
     floor = shot.path.position[:, 2]
     reach = partial(distance, shot.scene, floor=floor) if shot.scene.solids else None
     yield 0.2
     targets = targets_of(shot.path, shot.told)
-    return (yield from within(cleaning_steps(joints, targets, settings, floor, tops, reach), 0.2, 1.0))
+    return (
+        yield from within(cleaning_steps(joints, targets, settings, floor, tops, reach), 0.2, 1.0)
+    )
 
 
 def _led_over(observation: np.ndarray, share: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """An observation (T, 66) whose targets, which count by their ``share`` (T, 22), are led from where joints are ``free``."""
+    """An observation (T, 66) whose targets, which count by their ``share`` (T, 22), are led from
+    where joints are ``free``.
+    """
     way = np.repeat(share, 3, axis=-1)
     return (1.0 - way) * free + way * observation
 
@@ -105,7 +145,9 @@ def _bent(joints: np.ndarray, fps: float = MODEL_FPS) -> Bent:
 
 
 def _joints(motion: Bent) -> np.ndarray:
-    return forward_kinematics(global_from_local(matrix_from_quaternion(motion.local)), motion.pelvis)
+    return forward_kinematics(
+        global_from_local(matrix_from_quaternion(motion.local)), motion.pelvis
+    )
 
 
 def _model_joints(poses: np.ndarray, path: RootPath) -> np.ndarray:
@@ -114,7 +156,9 @@ def _model_joints(poses: np.ndarray, path: RootPath) -> np.ndarray:
 
 
 def _as_unchanged(poses: np.ndarray, unchanged: np.ndarray, change: Change, path: RootPath) -> Bent:
-    """The motion (M, …) over a change of mode as it would have gone on: M poses ``unchanged`` (M, 66) after the take's."""
+    """The motion (M, …) over a change of mode as it would have gone on: M poses ``unchanged`` (M,
+    66) after the take's.
+    """
     begin, frames = max(0, change.start - _LEAD), change.frames
     after = RootPath(path.position[begin : frames.stop], path.yaw[begin : frames.stop])
     whole = np.concatenate([poses[begin : PREROLL + change.start], unchanged])
@@ -123,7 +167,9 @@ def _as_unchanged(poses: np.ndarray, unchanged: np.ndarray, change: Change, path
 
 
 def _eased(motion: Bent, poses: np.ndarray, unchanged: np.ndarray, shot: Shot) -> Bent:
-    """The model's motion, coming over at changes of mode from the poses ``unchanged`` (M, 66) to its own (PREROLL + N, 66)."""
+    """The model's motion, coming over at changes of mode from the poses ``unchanged`` (M, 66) to
+    its own (PREROLL + N, 66).
+    """
     changes, used = [], 0
     for change in shot.told.changes:
         own = unchanged[used : used + len(change.ease)]
@@ -133,16 +179,26 @@ def _eased(motion: Bent, poses: np.ndarray, unchanged: np.ndarray, shot: Shot) -
 
 
 def _finished_steps(
-    poses: np.ndarray, unchanged: np.ndarray, action: np.ndarray, shot: Shot, controls: Controls, clean_up: CleanUp,
+    poses: np.ndarray,
+    unchanged: np.ndarray,
+    action: np.ndarray,
+    shot: Shot,
+    controls: Controls,
+    clean_up: CleanUp,
     log_likelihood: float,
 ) -> Generator[float, None, Take]:
-    """The take of the model's poses (PREROLL + N, 66), with ``action`` (T, K) at the controls' rate; yields progress.
+    """The take of the model's poses (PREROLL + N, 66), with ``action`` (T, K) at the controls'
+    rate; yields progress.
 
-    Changes of mode are eased first, so that feet are planted afterwards; what concerns the furniture and the floor is cleaned
-    up at the model's rate; targets are reached at the controls' own frames, where they are given.
+    Changes of mode are eased first, so that feet are planted afterwards; what concerns the
+    furniture and the floor is cleaned up at the model's rate; targets are reached at the controls'
+    own frames, where they are given.
     """
     started = perf_counter()
-    source, target = frame_times(len(shot.path), MODEL_FPS), frame_times(len(controls), controls.fps)
+    source, target = (
+        frame_times(len(shot.path), MODEL_FPS),
+        frame_times(len(controls), controls.fps),
+    )
     same = len(source) == len(target) and np.allclose(source, target)
     floor = shot.own_path.position[:, 2]
     reach = partial(distance, shot.own_scene, floor=floor) if shot.own_scene.solids else None
@@ -153,7 +209,10 @@ def _finished_steps(
         """A motion at the controls' frames."""
         if same:
             return motion
-        return Bent(resample_rotations(motion.local, source, target), resample_positions(motion.pelvis, source, target))
+        return Bent(
+            resample_rotations(motion.local, source, target),
+            resample_positions(motion.pelvis, source, target),
+        )
 
     joints = _model_joints(poses, shot.path)
     motion = _eased(_bent(joints), poses, unchanged, shot)
@@ -162,7 +221,9 @@ def _finished_steps(
     metrics = raw = judged(_joints(own))
     yield 0.4
     if clean_up.asked:
-        joints = yield from within(_clean_up_steps(_joints(motion), shot, replace(clean_up, reach=0.0)), 0.4, 0.6)
+        joints = yield from within(
+            _clean_up_steps(_joints(motion), shot, replace(clean_up, reach=0.0)), 0.4, 0.6
+        )
         yield 0.6
         if not same:
             joints = _joints(at_own_rate(_bent(joints)))
@@ -175,44 +236,76 @@ def _finished_steps(
 
     if turns := turns_of(controls, shot.own_path):
         frames = turned(global_from_local(matrix_from_quaternion(own.local)), turns)
-        own = own._replace(local=continuous_signs(quaternion_from_matrix(local_from_global(frames))))
+        own = own._replace(
+            local=continuous_signs(quaternion_from_matrix(local_from_global(frames)))
+        )
     root = RootPath(shot.own_path.position * controls.scale, shot.own_path.yaw)
     return Take(
-        controls.fps, _joints(own) * controls.scale, own.local, root.matrices(), action, controls.scale, poses, shot.path,
-        unchanged, log_likelihood, raw, metrics, {"fitting": perf_counter() - started}, shot.warnings,
+        controls.fps,
+        _joints(own) * controls.scale,
+        own.local,
+        root.matrices(),
+        action,
+        controls.scale,
+        poses,
+        shot.path,
+        unchanged,
+        log_likelihood,
+        raw,
+        metrics,
+        {"fitting": perf_counter() - started},
+        shot.warnings,
     )
 
 
 def takes_steps(
-    scene: Scene, controls: Controls, weights: Weights, draws: Sequence[Draw], *, resume: Take | None = None,
-    resume_frame: int = 0, device: str | None = None, clean_up: CleanUp = RAW,
+    scene: Scene,
+    controls: Controls,
+    weights: Weights,
+    draws: Sequence[Draw],
+    *,
+    resume: Take | None = None,
+    resume_frame: int = 0,
+    device: str | None = None,
+    clean_up: CleanUp = RAW,
     watch: Callable[[int, np.ndarray], None] | None = None,
 ) -> Generator[float, None, list[Take]]:
-    """Generate takes of one shot side by side, one for each of ``draws``; yields progress in [0, 1].
+    """Generate takes of one shot side by side, one for each of ``draws``; yields progress in [0,
+    1].
 
-    ``resume``: a take whose motion before ``resume_frame`` (a frame of the controls) is kept, and gone on from. ``device``:
-    None runs on NumPy, else on that torch device. ``clean_up``: what is done to the joints after the model; nothing by default.
-    ``watch`` is shown each frame of the first take as it is made: its index at 30 fps, and the joints (22, 3) in the world,
-    metres. Raises InputError for what cannot be used, WeightsError for weights that do not fit.
+    ``resume``: a take whose motion before ``resume_frame`` (a frame of the controls) is kept, and
+    gone on from. ``device``: None runs on NumPy, else on that torch device. ``clean_up``: what is
+    done to the joints after the model; nothing by default. ``watch`` is shown each frame of the
+    first take as it is made: its index at 30 fps, and the joints (22, 3) in the world, metres.
+    Raises InputError for what cannot be used, WeightsError for weights that do not fit.
     """
     started = perf_counter()
     yield 0.0
     shot = yield from within(shot_steps(scene, controls), 0.0, _CONDITIONED)
     conditioned = perf_counter()
     sampler = Sampler(weights, device)
-    z = np.concatenate([sampler.noise(d.seed, d.lower_seed, d.temperature, d.lower_temperature) for d in draws])
+    z = np.concatenate(
+        [sampler.noise(d.seed, d.lower_seed, d.temperature, d.lower_temperature) for d in draws]
+    )
     kept = None
     if resume is not None and resume_frame != 0:
-        kept = np.repeat(_kept(resume, resume_frame, controls, shot.path)[:, None], len(draws), axis=1)
+        kept = np.repeat(
+            _kept(resume, resume_frame, controls, shot.path)[:, None], len(draws), axis=1
+        )
 
     def shown(frame: int, pose: np.ndarray) -> None:
         if watch is not None and frame >= PREROLL:
-            at = RootPath(shot.path.position[frame - PREROLL, None], shot.path.yaw[frame - PREROLL, None])
+            at = RootPath(
+                shot.path.position[frame - PREROLL, None], shot.path.yaw[frame - PREROLL, None]
+            )
             watch(frame - PREROLL, to_world(at, pose.reshape(1, 22, 3))[0] * controls.scale)
 
     conditions, share, sampling = shot.conditions, rolled(shot.told.share), _CONDITIONED
     changes = shot.told.changes
-    if any(((each > 0.0) & (each < 1.0)).any() for each in (share, *(change.share for change in changes))):
+    if any(
+        ((each > 0.0) & (each < 1.0)).any()
+        for each in (share, *(change.share for change in changes))
+    ):
         # Where a target counts in part, the calm take tells where the joint would be without it.
         without = replace(conditions, given=(share >= 1.0).astype(float))
         sampling = (_CONDITIONED + _SAMPLED) / 2
@@ -220,65 +313,136 @@ def takes_steps(
         free = model_order(calm.poses[:, 0])
         conditions = replace(conditions, observation=_led_over(conditions.observation, share, free))
         changes = tuple(
-            replace(each, observation=_led_over(each.observation, each.share, free[PREROLL:][each.frames])) for each in changes
+            replace(
+                each,
+                observation=_led_over(each.observation, each.share, free[PREROLL:][each.frames]),
+            )
+            for each in changes
         )
-    unchanged = [Unchanged(PREROLL + each.start, each.observation, (each.share > 0.0).astype(float)) for each in changes]
+    unchanged = [
+        Unchanged(PREROLL + each.start, each.observation, (each.share > 0.0).astype(float))
+        for each in changes
+    ]
     made = yield from within(sampler.run(conditions, z, kept, shown, unchanged), sampling, _SAMPLED)
     seconds = {"conditions": conditioned - started, "sampling": perf_counter() - conditioned}
 
-    source, target = frame_times(len(shot.path), MODEL_FPS), frame_times(len(controls), controls.fps)
+    source, target = (
+        frame_times(len(shot.path), MODEL_FPS),
+        frame_times(len(controls), controls.fps),
+    )
     takes = []
     for b in range(len(draws)):
         action = resample_positions(made.actions[PREROLL:, b], source, target)
         density = float(made.log_likelihood[PREROLL:, b].mean())
         take = yield from within(
-            _finished_steps(made.poses[:, b], made.unchanged[:, b], action, shot, controls, clean_up, density),
-            _SAMPLED + (1.0 - _SAMPLED) * b / len(draws), _SAMPLED + (1.0 - _SAMPLED) * (b + 1) / len(draws),
+            _finished_steps(
+                made.poses[:, b], made.unchanged[:, b], action, shot, controls, clean_up, density
+            ),
+            _SAMPLED + (1.0 - _SAMPLED) * b / len(draws),
+            _SAMPLED + (1.0 - _SAMPLED) * (b + 1) / len(draws),
         )
         takes.append(replace(take, seconds=seconds | take.seconds))
     return takes
 
 
-def clean_again_steps(scene: Scene, controls: Controls, take: Take, clean_up: CleanUp) -> Generator[float, None, Take]:
-    """The take with another clean-up, without sampling again; ``scene`` and ``controls`` as it was generated with."""
+def clean_again_steps(
+    scene: Scene, controls: Controls, take: Take, clean_up: CleanUp
+) -> Generator[float, None, Take]:
+    """The take with another clean-up, without sampling again; ``scene`` and ``controls`` as it was
+    generated with.
+    """
     shot = yield from within(shot_steps(scene, controls), 0.0, 0.5)
-    if len(controls) != len(take) or len(shot.path) != len(take.path) or not np.isclose(controls.fps, take.fps, rtol=1e-5):
+    if (
+        len(controls) != len(take)
+        or len(shot.path) != len(take.path)
+        or not np.isclose(controls.fps, take.fps, rtol=1e-5)
+    ):
         raise InputError("The take has other frames than the controls; generate it again.")
     close = partial(np.allclose, rtol=1e-5, atol=_HAIR)
-    same_path = close(shot.path.position, take.path.position) and close(shot.path.yaw, take.path.yaw)
+    same_path = close(shot.path.position, take.path.position) and close(
+        shot.path.yaw, take.path.yaw
+    )
     if not same_path or not np.isclose(controls.scale, take.scale, rtol=_HAIR):
-        raise InputError("The take was made for another root or size than the controls'; generate it again.")
+        raise InputError(
+            "The take was made for another root or size than the controls'; generate it again."
+        )
     if len(take.unchanged) != sum(len(change.ease) for change in shot.told.changes):
-        raise InputError("The take was made for other modes or targets than the controls'; generate it again.")
-    return (yield from within(
-        _finished_steps(take.poses, take.unchanged, take.action, shot, controls, clean_up, take.log_likelihood), 0.5, 1.0,
-    ))
+        raise InputError(
+            "The take was made for other modes or targets than the controls'; generate it again."
+        )
+    return (
+        yield from within(
+            _finished_steps(
+                take.poses,
+                take.unchanged,
+                take.action,
+                shot,
+                controls,
+                clean_up,
+                take.log_likelihood,
+            ),
+            0.5,
+            1.0,
+        )
+    )
 
 
 def generate_steps(
-    scene: Scene, controls: Controls, weights: Weights, *, seed: int = 0, lower_seed: int | None = None,
-    temperature: float = 0.0, resume: Take | None = None, resume_frame: int = 0, device: str | None = None,
+    scene: Scene,
+    controls: Controls,
+    weights: Weights,
+    *,
+    seed: int = 0,
+    lower_seed: int | None = None,
+    temperature: float = 0.0,
+    resume: Take | None = None,
+    resume_frame: int = 0,
+    device: str | None = None,
     clean_up: CleanUp = RAW,
 ) -> Generator[float, None, Take]:
     """Generate one take; yields progress in [0, 1] and returns the ``Take``.
 
-    ``temperature`` scales the take's noise; 0 is the pose at z = 0, 1 the spread of captured takes. ``lower_seed``: another
-    seed for the legs. The rest is as in ``takes_steps``.
+    ``temperature`` scales the take's noise; 0 is the pose at z = 0, 1 the spread of captured takes.
+    ``lower_seed``: another seed for the legs. The rest is as in ``takes_steps``.
     """
     takes = yield from takes_steps(
-        scene, controls, weights, [Draw(seed, lower_seed, temperature)], resume=resume, resume_frame=resume_frame,
-        device=device, clean_up=clean_up,
+        scene,
+        controls,
+        weights,
+        [Draw(seed, lower_seed, temperature)],
+        resume=resume,
+        resume_frame=resume_frame,
+        device=device,
+        clean_up=clean_up,
     )
     return takes[0]
 
 
 def generate(
-    scene: Scene, controls: Controls, weights: Weights, *, seed: int = 0, lower_seed: int | None = None,
-    temperature: float = 0.0, resume: Take | None = None, resume_frame: int = 0, device: str | None = None,
+    scene: Scene,
+    controls: Controls,
+    weights: Weights,
+    *,
+    seed: int = 0,
+    lower_seed: int | None = None,
+    temperature: float = 0.0,
+    resume: Take | None = None,
+    resume_frame: int = 0,
+    device: str | None = None,
     clean_up: CleanUp = RAW,
 ) -> Take:
     """Drain ``generate_steps``, whose arguments these are, and return its take."""
-    return drained(generate_steps(
-        scene, controls, weights, seed=seed, lower_seed=lower_seed, temperature=temperature, resume=resume,
-        resume_frame=resume_frame, device=device, clean_up=clean_up,
-    ))
+    return drained(
+        generate_steps(
+            scene,
+            controls,
+            weights,
+            seed=seed,
+            lower_seed=lower_seed,
+            temperature=temperature,
+            resume=resume,
+            resume_frame=resume_frame,
+            device=device,
+            clean_up=clean_up,
+        )
+    )

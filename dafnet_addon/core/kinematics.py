@@ -1,7 +1,8 @@
-"""From bones to joints and back: forward kinematics, two-bone limbs, and rotations fitted to generated positions.
+"""From bones to joints and back: forward kinematics, two-bone limbs, and rotations fitted to
+generated positions.
 
-A joint's frame places its children: ``child = joint + frame @ OFFSETS[child] * scale``. The identity in every global
-frame is the rest pose, a T-pose that looks along +y.
+A joint's frame places its children: ``child = joint + frame @ OFFSETS[child] * scale``. The
+identity in every global frame is the rest pose, a T-pose that looks along +y.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,20 +23,32 @@ from .rotations import (
 from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, joint
 
 __all__ = [
-    "Bent", "Turn", "forward_kinematics", "global_from_local", "local_from_global", "two_bone", "fit", "on_bones", "turned",
+    "Bent",
+    "Turn",
+    "forward_kinematics",
+    "global_from_local",
+    "local_from_global",
+    "two_bone",
+    "fit",
+    "on_bones",
+    "turned",
     "come_over",
 ]
 
-# Limbs in one order: left and right arm, left and right leg. The rest pose is straight along _AXIS, and the middle
-# joint leaves that line along _BEND: elbows go backward, knees forward.
+# Limbs in one order: left and right arm, left and right leg. The rest pose is straight along _AXIS,
+# and the middle joint leaves that line along _BEND: elbows go backward, knees forward.
 _PARENT, _FIRST, _MIDDLE, _END = [13, 14, 0, 0], [16, 17, 1, 2], [18, 19, 4, 5], [20, 21, 7, 8]
 _AXIS = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 0, -1], [0, 0, -1]])
 _BEND = np.array([[0.0, -1, 0], [0, -1, 0], [0, 1, 0], [0, 1, 0]])
 
-_CLEAR_BEND = 0.25  # a limb bent by this (radians) shows its plane about as clearly as its neighbours in time tell it
-_CARRY, _PULL = 4.0, 0.05  # weights of the neighbouring frames and of the parent's reference, against 1 at a clear bend
+# a limb bent by this (radians) shows its plane about as clearly as its neighbours in time tell it
+_CLEAR_BEND = 0.25
+# weights of the neighbouring frames and of the parent's reference, against 1 at a clear bend
+_CARRY, _PULL = 4.0, 0.05
 
-_AXES_REST = {  # columns: x, where the face looks or the fingers point, crown or back of the hand; as they lie in the rest pose
+# columns: x, where the face looks or the fingers point, crown or back of the hand; as they lie in
+# the rest pose
+_AXES_REST = {
     "head": np.eye(3),
     "hand_left": np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]),
     "hand_right": np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
@@ -43,8 +56,9 @@ _AXES_REST = {  # columns: x, where the face looks or the fingers point, crown o
 
 
 class Turn(NamedTuple):
-    """How a head or hand has to be turned: world ``axes`` (T, 3, 3), y where the face looks or the fingers point, z the
-    crown or the back of the hand; ``share`` (T,): how far they count; where that is 0 they may be NaN.
+    """How a head or hand has to be turned: world ``axes`` (T, 3, 3), y where the face looks or the
+    fingers point, z the crown or the back of the hand; ``share`` (T,): how far they count; where
+    that is 0 they may be NaN.
     """
 
     axes: np.ndarray
@@ -52,16 +66,22 @@ class Turn(NamedTuple):
 
 
 def forward_kinematics(rotations: np.ndarray, pelvis: np.ndarray, scale: float = 1.0) -> np.ndarray:
-    """Joints (T, 22, 3) of global joint frames (T, 22, 3, 3) and pelvis positions (T, 3); world, metres."""
+    """Joints (T, 22, 3) of global joint frames (T, 22, 3, 3) and pelvis positions (T, 3); world,
+    metres.
+    """
     joints = np.empty((*rotations.shape[:-2], 3))
     joints[..., 0, :] = pelvis
     for j in range(1, len(PARENTS)):
-        joints[..., j, :] = joints[..., PARENTS[j], :] + rotations[..., PARENTS[j], :, :] @ (scale * OFFSETS[j])
+        joints[..., j, :] = joints[..., PARENTS[j], :] + rotations[..., PARENTS[j], :, :] @ (
+            scale * OFFSETS[j]
+        )
     return joints
 
 
 def global_from_local(local: np.ndarray) -> np.ndarray:
-    """Global joint frames (T, 22, 3, 3) of frames in their parents' frames; the pelvis' is in the world in both."""
+    """Global joint frames (T, 22, 3, 3) of frames in their parents' frames; the pelvis' is in the
+    world in both.
+    """
     frames = np.empty_like(local)
     frames[..., 0, :, :] = local[..., 0, :, :]
     for j in range(1, len(PARENTS)):
@@ -70,21 +90,29 @@ def global_from_local(local: np.ndarray) -> np.ndarray:
 
 
 def local_from_global(frames: np.ndarray) -> np.ndarray:
-    """Joint frames in their parents' frames (T, 22, 3, 3), of global ones; the pelvis' stays in the world."""
+    """Joint frames in their parents' frames (T, 22, 3, 3), of global ones; the pelvis' stays in the
+    world.
+    """
     local = frames.copy()
     local[..., 1:, :, :] = transpose(frames[..., list(PARENTS[1:]), :, :]) @ frames[..., 1:, :, :]
     return local
 
 
 def two_bone(
-    root: np.ndarray, target: np.ndarray, pole: np.ndarray, length1: np.ndarray | float, length2: np.ndarray | float,
+    root: np.ndarray,
+    target: np.ndarray,
+    pole: np.ndarray,
+    length1: np.ndarray | float,
+    length2: np.ndarray | float,
     fallback: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Middle and end joint (…, 3) of limbs from ``root`` to ``target``, bent towards the point ``pole``.
+    """Middle and end joint (…, 3) of limbs from ``root`` to ``target``, bent towards the point
+    ``pole``.
 
-    The end lies on the target wherever the bone lengths reach it, else as near as they allow. Where the pole lies on
-    the line from root to target, the limb bends along the direction ``fallback`` (…, 3) if given, else as in the last
-    frame (first axis) in which the pole was clear, else anywhere.
+    The end lies on the target wherever the bone lengths reach it, else as near as they allow. Where
+    the pole lies on the line from root to target, the limb bends along the direction ``fallback``
+    (…, 3) if given, else as in the last frame (first axis) in which the pole was clear, else
+    anywhere.
     """
     root, target, pole = np.broadcast_arrays(root, target, pole)
     length1, length2 = np.asarray(length1, float)[..., None], np.asarray(length2, float)[..., None]
@@ -95,11 +123,19 @@ def two_bone(
     bend = _across(pole - root, along)
     clear = np.linalg.norm(bend, axis=-1, keepdims=True) > 1e-6 * reach
     if not clear.all():
-        bend = np.where(clear, bend, _across(_last_clear(bend, clear) if fallback is None else fallback, along))
+        bend = np.where(
+            clear, bend, _across(_last_clear(bend, clear) if fallback is None else fallback, along)
+        )
         least = np.argmin(np.abs(along), axis=-1)
-        bend = np.where(np.linalg.norm(bend, axis=-1, keepdims=True) > 1e-8, bend, _across(np.eye(3)[least], along))
+        bend = np.where(
+            np.linalg.norm(bend, axis=-1, keepdims=True) > 1e-8,
+            bend,
+            _across(np.eye(3)[least], along),
+        )
     bend = normalised(bend)
-    cosine = np.clip((length1**2 + distance**2 - length2**2) / (2.0 * length1 * distance), -1.0, 1.0)
+    cosine = np.clip(
+        (length1**2 + distance**2 - length2**2) / (2.0 * length1 * distance), -1.0, 1.0
+    )
     middle = root + length1 * (cosine * along + np.sqrt(1.0 - cosine**2) * bend)
     return middle, root + distance * along
 
@@ -110,7 +146,9 @@ def _across(v: np.ndarray, axis: np.ndarray) -> np.ndarray:
 
 
 def _last_clear(values: np.ndarray, clear: np.ndarray) -> np.ndarray:
-    """Values (T, …, 3) held from the last frame that is clear (before the first clear one: from that one)."""
+    """Values (T, …, 3) held from the last frame that is clear (before the first clear one: from
+    that one).
+    """
     if values.ndim < 2:
         return values
     frames = np.arange(len(values)).reshape((-1,) + (1,) * (values.ndim - 1))
@@ -120,13 +158,15 @@ def _last_clear(values: np.ndarray, clear: np.ndarray) -> np.ndarray:
 
 
 def fit(joints: np.ndarray, scale: float = 1.0, fps: float = 30.0) -> tuple[np.ndarray, np.ndarray]:
-    """Pelvis (T, 3) and global joint frames (T, 22, 3, 3) of the body whose bones fit world joints (T, 22, 3) best.
+    """Pelvis (T, 3) and global joint frames (T, 22, 3, 3) of the body whose bones fit world joints
+    (T, 22, 3) best.
 
-    Bone lengths are those of the canonical body times ``scale``. The pelvis is exact, and so are ankles and wrists
-    wherever the limbs reach them. Pelvis from hips and spine1, chest from collars and neck, limbs twisted by the planes
-    of elbows and knees; a limb too straight to show its plane takes it from its neighbours in time and from its parent.
-    Elbows and knees are hinges. Frames follow one another without a pop as long as the joints do; ``fps``: how many of them
-    there are a second. Head and hands follow their parents (else: ``turned``), toes the foot.
+    Bone lengths are those of the canonical body times ``scale``. The pelvis is exact, and so are
+    ankles and wrists wherever the limbs reach them. Pelvis from hips and spine1, chest from collars
+    and neck, limbs twisted by the planes of elbows and knees; a limb too straight to show its plane
+    takes it from its neighbours in time and from its parent. Elbows and knees are hinges. Frames
+    follow one another without a pop as long as the joints do; ``fps``: how many of them there are a
+    second. Head and hands follow their parents (else: ``turned``), toes the foot.
     """
     joints = np.asarray(joints, float)
     position = joints.copy()
@@ -137,8 +177,12 @@ def fit(joints: np.ndarray, scale: float = 1.0, fps: float = 30.0) -> tuple[np.n
         position[:, child] = position[:, parent] + frame[:, parent] @ (scale * OFFSETS[child])
 
     def aim(at: int, child: int, base: np.ndarray) -> None:
-        """Frame of joint ``at``, nearest to ``base``, whose bone points at the child's generated position."""
-        frame[:, at] = rotation_between(base @ OFFSETS[child], joints[:, child] - position[:, at]) @ base
+        """Frame of joint ``at``, nearest to ``base``, whose bone points at the child's generated
+        position.
+        """
+        frame[:, at] = (
+            rotation_between(base @ OFFSETS[child], joints[:, child] - position[:, at]) @ base
+        )
         place(child)
 
     frame[:, 0] = _aligned(joints, 0, [1, 2, 3])
@@ -150,13 +194,15 @@ def fit(joints: np.ndarray, scale: float = 1.0, fps: float = 30.0) -> tuple[np.n
     frame[:, 9] = chest
     for child in (12, 13, 14):
         place(child)
-    aim(12, 15, _between(chest, chest, 1 / 2))  # the chest's, rounded as when the head is turned: figures hold to the last bit
+    # the chest's, rounded as when the head is turned: figures hold to the last bit
+    aim(12, 15, _between(chest, chest, 1 / 2))
     frame[:, 15] = frame[:, 12]
     aim(13, 16, chest)
     aim(14, 17, chest)
 
     frame[:, _FIRST], frame[:, _MIDDLE], position[:, _END] = _limbs(
-        frame[:, _PARENT], position[:, _FIRST], joints[:, _MIDDLE], joints[:, _END], scale, fps)
+        frame[:, _PARENT], position[:, _FIRST], joints[:, _MIDDLE], joints[:, _END], scale, fps
+    )
     for wrist in (20, 21):
         frame[:, wrist] = frame[:, PARENTS[wrist]]
     for ankle, toe in ((7, 10), (8, 11)):
@@ -172,19 +218,26 @@ def on_bones(joints: np.ndarray) -> np.ndarray:
 
 
 def _aligned(joints: np.ndarray, center: int, children: list[int]) -> np.ndarray:
-    """Rotation (T, 3, 3) that carries the children's rest offsets nearest to where they lie (Kabsch 1976)."""
-    u, _, vt = np.linalg.svd(np.swapaxes(joints[:, children] - joints[:, center, None], 1, 2) @ OFFSETS[children])
+    """Rotation (T, 3, 3) that carries the children's rest offsets nearest to where they lie (Kabsch
+    1976).
+    """
+    u, _, vt = np.linalg.svd(
+        np.swapaxes(joints[:, children] - joints[:, center, None], 1, 2) @ OFFSETS[children]
+    )
     u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
     return u @ vt
 
 
 def _between(a: np.ndarray, b: np.ndarray, t: float | np.ndarray) -> np.ndarray:
     """Rotation matrices on the shortest way from ``a`` to ``b``."""
-    return matrix_from_quaternion(slerp(quaternion_from_matrix(a), quaternion_from_matrix(b), np.asarray(t)))
+    return matrix_from_quaternion(
+        slerp(quaternion_from_matrix(a), quaternion_from_matrix(b), np.asarray(t))
+    )
 
 
 def turned(frames: np.ndarray, turns: Mapping[str, Turn]) -> np.ndarray:
-    """Global joint frames (T, 22, 3, 3) with head and hands turned as ``turns`` ask, by the names of ``END_EFFECTORS``.
+    """Global joint frames (T, 22, 3, 3) with head and hands turned as ``turns`` ask, by the names
+    of ``END_EFFECTORS``.
 
     The neck takes its half of the head's twist. No joint moves.
     """
@@ -205,27 +258,46 @@ def turned(frames: np.ndarray, turns: Mapping[str, Turn]) -> np.ndarray:
 
 
 def _limbs(
-    parent: np.ndarray, first: np.ndarray, middle: np.ndarray, end: np.ndarray, scale: float, fps: float,
+    parent: np.ndarray,
+    first: np.ndarray,
+    middle: np.ndarray,
+    end: np.ndarray,
+    scale: float,
+    fps: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Frames of the first and of the middle joint (T, 4, 3, 3) of the limbs, and their reached ends (T, 4, 3)."""
+    """Frames of the first and of the middle joint (T, 4, 3, 3) of the limbs, and their reached ends
+    (T, 4, 3).
+    """
     length1 = scale * np.linalg.norm(OFFSETS[_MIDDLE], axis=-1)
     length2 = scale * np.linalg.norm(OFFSETS[_END], axis=-1)
     along = normalised(end - first, rotate(parent, _AXIS))
     reference = rotate(rotation_between(rotate(parent, _AXIS), along) @ parent, _BEND)
-    bend = _bend_direction(_across(middle - first, along) / np.minimum(length1, length2)[:, None], along, reference, fps)
+    bend = _bend_direction(
+        _across(middle - first, along) / np.minimum(length1, length2)[:, None],
+        along,
+        reference,
+        fps,
+    )
     middle, end = two_bone(first, end, first + bend, length1, length2)
     hinge = np.cross(bend, along)
     rest = transpose(frame_from(_AXIS, np.cross(_BEND, _AXIS), "xy"))
-    return frame_from(middle - first, hinge, "xy") @ rest, frame_from(end - middle, hinge, "xy") @ rest, end
+    return (
+        frame_from(middle - first, hinge, "xy") @ rest,
+        frame_from(end - middle, hinge, "xy") @ rest,
+        end,
+    )
 
 
-def _bend_direction(offset: np.ndarray, along: np.ndarray, reference: np.ndarray, fps: float) -> np.ndarray:
-    """Unit directions (T, L, 3) in which the middle joints leave their limbs' lines, steady in time.
+def _bend_direction(
+    offset: np.ndarray, along: np.ndarray, reference: np.ndarray, fps: float
+) -> np.ndarray:
+    """Unit directions (T, L, 3) in which the middle joints leave their limbs' lines, steady in
+    time.
 
-    ``offset`` (T, L, 3): the middle joint off the line, over the bone length. Its direction, as a point on the unit
-    circle around ``along``, is smoothed by least squares: every frame holds to its own with a weight that grows steeply
-    with the bend and fades where it opposes the reference (a knee or elbow bent the wrong way by noise), to its
-    neighbours, and faintly to ``reference``.
+    ``offset`` (T, L, 3): the middle joint off the line, over the bone length. Its direction, as a
+    point on the unit circle around ``along``, is smoothed by least squares: every frame holds to
+    its own with a weight that grows steeply with the bend and fades where it opposes the reference
+    (a knee or elbow bent the wrong way by noise), to its neighbours, and faintly to ``reference``.
     """
     size = np.linalg.norm(offset, axis=-1)
     seen = (offset * reference).sum(-1) + 1j * (offset * np.cross(along, reference)).sum(-1)
@@ -236,7 +308,9 @@ def _bend_direction(offset: np.ndarray, along: np.ndarray, reference: np.ndarray
 
 
 def _smoothed_circle(seen: np.ndarray, weight: np.ndarray, carry: float) -> np.ndarray:
-    """Solve for z (T, L): weight |z - seen|^2 + carry |z - neighbours|^2 + pull |z - 1|^2 least (Thomas algorithm)."""
+    """Solve for z (T, L): weight |z - seen|^2 + carry |z - neighbours|^2 + pull |z - 1|^2 least
+    (Thomas algorithm).
+    """
     n = len(seen)
     neighbours = np.full((n, 1), 2.0)
     neighbours[0] -= 1.0
@@ -254,7 +328,9 @@ def _smoothed_circle(seen: np.ndarray, weight: np.ndarray, carry: float) -> np.n
 
 
 class Bent(NamedTuple):
-    """A body's motion: ``local`` quaternions (T, 22, 4), the pelvis' in the world, and the pelvis' positions (T, 3), world."""
+    """A body's motion: ``local`` quaternions (T, 22, 4), the pelvis' in the world, and the pelvis'
+    positions (T, 3), world.
+    """
 
     local: np.ndarray
     pelvis: np.ndarray
@@ -263,10 +339,10 @@ class Bent(NamedTuple):
 def come_over(motion: Bent, changes: Sequence[tuple[int, np.ndarray, Bent]]) -> Bent:
     """A motion that comes over where something changes, from what would have been to what is.
 
-    ``changes``, in order: the first frame; how far the ``motion`` counts at it and those after it (M,); how the body would
-    move in these frames (M, …) if nothing had changed there. Bones turn from one to the other by slerp, so nothing is added
-    where both agree: a planted foot stands, a stride goes on. What would have been after an earlier change comes over by
-    that first.
+    ``changes``, in order: the first frame; how far the ``motion`` counts at it and those after it
+    (M,); how the body would move in these frames (M, …) if nothing had changed there. Bones turn
+    from one to the other by slerp, so nothing is added where both agree: a planted foot stands, a
+    stride goes on. What would have been after an earlier change comes over by that first.
     """
     local, pelvis = motion.local.copy(), motion.pelvis.copy()
     before: tuple[int, np.ndarray, Bent] | None = None
@@ -276,7 +352,9 @@ def come_over(motion: Bent, changes: Sequence[tuple[int, np.ndarray, Bent]]) -> 
             tail = Bent(before[2].local[-rest:], before[2].pelvis[-rest:])
             led = _mixed(tail, Bent(other.local[:rest], other.pelvis[:rest]), before[1][-rest:])
             other = Bent(*(np.concatenate([a, b[rest:]]) for a, b in zip(led, other, strict=True)))
-        local[frames], pelvis[frames] = _mixed(other, Bent(motion.local[frames], motion.pelvis[frames]), ease)
+        local[frames], pelvis[frames] = _mixed(
+            other, Bent(motion.local[frames], motion.pelvis[frames]), ease
+        )
         before = start, ease, other
     return Bent(local, pelvis)
 
@@ -284,4 +362,6 @@ def come_over(motion: Bent, changes: Sequence[tuple[int, np.ndarray, Bent]]) -> 
 def _mixed(first: Bent, second: Bent, share: np.ndarray) -> Bent:
     """From the first motion to the second, by ``share`` (T,)."""
     way = share[:, None]
-    return Bent(slerp(first.local, second.local, way), (1.0 - way) * first.pelvis + way * second.pelvis)
+    return Bent(
+        slerp(first.local, second.local, way), (1.0 - way) * first.pelvis + way * second.pelvis
+    )

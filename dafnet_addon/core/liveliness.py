@@ -1,7 +1,8 @@
-"""Whether a motion lives: how much it moves and how fast, how it sways, leans, and lets itself down onto a seat.
+"""Whether a motion lives: how much it moves and how fast, how it sways, leans, and lets itself down
+onto a seat.
 
-Each measure means little alone; it stands beside the same measure of captured motion. Joints are (T, 22, 3), world, metres,
-z up, at ``fps`` frames a second.
+Each measure means little alone; it stands beside the same measure of captured motion. Joints are
+(T, 22, 3), world, metres, z up, at ``fps`` frames a second.
 """
 
 import numpy as np
@@ -11,7 +12,11 @@ from .skeleton import joint
 
 __all__ = ["BANDS", "LIVELY", "band_speeds", "descent", "lean", "speed", "sway"]
 
-LIVELY = {"head": (joint("head"),), "chest": (joint("spine3"),), "wrists": (joint("left_wrist"), joint("right_wrist"))}
+LIVELY = {
+    "head": (joint("head"),),
+    "chest": (joint("spine3"),),
+    "wrists": (joint("left_wrist"), joint("right_wrist")),
+}
 """The joints that show life."""
 BANDS = {"slow": (0.2, 1.0), "middle": (1.0, 3.0), "quick": (3.0, 8.0)}
 """Hertz: shifting one's weight; gestures, breath and steps; trembling."""
@@ -32,25 +37,34 @@ def speed(joints: np.ndarray, fps: float, which: tuple[int, ...]) -> float:
 
 
 def band_speeds(joints: np.ndarray, fps: float, which: tuple[int, ...]) -> dict[str, float]:
-    """Root mean square speed of some joints in each of ``BANDS``, metres a second; NaN where the motion is too short for it."""
+    """Root mean square speed of some joints in each of ``BANDS``, metres a second; NaN where the
+    motion is too short for it.
+    """
     frames = len(joints)
     frequency = np.fft.rfftfreq(max(frames, 1), 1.0 / fps)
     places = joints[:, list(which)] - joints[:, list(which)].mean(0)
     # The ends of a motion do not meet: a window keeps the step between them out of the spectrum.
     window = np.hanning(frames)[:, None, None] if frames > 2 else np.ones((frames, 1, 1))
     weight = float((window**2).sum()) or 1.0
-    power = (np.abs(np.fft.rfft(places * window, axis=0)) ** 2).sum(-1).mean(-1) * (2.0 * np.pi * frequency) ** 2
+    power = (np.abs(np.fft.rfft(places * window, axis=0)) ** 2).sum(-1).mean(-1) * (
+        2.0 * np.pi * frequency
+    ) ** 2
     found = {}
     for name, (low, high) in BANDS.items():
         inside = (frequency >= low) & (frequency < high)
         long_enough = frames / fps >= 2.0 / low
-        found[name] = float(np.sqrt(2.0 * power[inside].sum() / (weight * max(frames, 1)))) if long_enough else float("nan")
+        found[name] = (
+            float(np.sqrt(2.0 * power[inside].sum() / (weight * max(frames, 1))))
+            if long_enough
+            else float("nan")
+        )
     return found
 
 
 def sway(joints: np.ndarray, fps: float) -> float:
-    """How far the pelvis goes to and fro across its own smooth path where it walks straight on: peak to peak within a second,
-    metres, the median over such seconds; NaN where it does not walk straight for a second.
+    """How far the pelvis goes to and fro across its own smooth path where it walks straight on:
+    peak to peak within a second, metres, the median over such seconds; NaN where it does not walk
+    straight for a second.
     """
     place = joints[:, _PELVIS, :2]
     second = round(fps)
@@ -60,7 +74,9 @@ def sway(joints: np.ndarray, fps: float) -> float:
     along = np.gradient(path, axis=0) * fps
     pace = np.linalg.norm(along, axis=-1)
     heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
-    straight = (pace > _WALKS[0]) & (pace < _WALKS[1]) & (np.abs(np.gradient(heading)) * fps < _TURNS)
+    straight = (
+        (pace > _WALKS[0]) & (pace < _WALKS[1]) & (np.abs(np.gradient(heading)) * fps < _TURNS)
+    )
     across = np.stack([-along[:, 1], along[:, 0]], axis=-1) / np.maximum(pace, 1e-6)[:, None]
     aside = ((place - path) * across).sum(-1)
     views = np.lib.stride_tricks.sliding_window_view
@@ -71,8 +87,8 @@ def sway(joints: np.ndarray, fps: float) -> float:
 
 
 def descent(joints: np.ndarray, fps: float, seated: int) -> float:
-    """Seconds from 10 to 90 % of the pelvis' way down to where it rests from frame ``seated`` on; NaN where it came from no
-    higher.
+    """Seconds from 10 to 90 % of the pelvis' way down to where it rests from frame ``seated`` on;
+    NaN where it came from no higher.
     """
     start = max(0, seated - round(_BEFORE * fps))
     height = joints[start : seated + 1, _PELVIS, 2]
@@ -86,6 +102,8 @@ def descent(joints: np.ndarray, fps: float, seated: int) -> float:
 
 
 def lean(joints: np.ndarray, forward: np.ndarray) -> np.ndarray:
-    """How far the trunk leans forward (T,), radians, negative backward; ``forward`` (T, 2): where the root faces."""
+    """How far the trunk leans forward (T,), radians, negative backward; ``forward`` (T, 2): where
+    the root faces.
+    """
     trunk = joints[:, _NECK] - joints[:, _PELVIS]
     return np.arctan2((trunk[:, :2] * forward).sum(-1), trunk[:, 2])

@@ -1,7 +1,8 @@
-"""What the sensor's spheres see of the furniture along a root path, and the distance of any points to it.
+"""What the sensor's spheres see of the furniture along a root path, and the distance of any points
+to it.
 
-Paper, section 4.1: a sphere's occupancy is 0 where nothing is within it, 1 where its centre is inside a solid, and in
-between it falls with the distance from its centre to the solid.
+Paper, section 4.1: a sphere's occupancy is 0 where nothing is within it, 1 where its centre is
+inside a solid, and in between it falls with the distance from its centre to the solid.
 """
 
 from collections.abc import Callable, Generator, Iterator
@@ -21,16 +22,18 @@ from .solids import Box, Scene, box_distance
 __all__ = ["occupancy", "occupancy_steps", "distance", "tops_under"]
 
 _FRAMES_AT_ONCE = 32
-_LOWEST, _HIGHEST, _APART = 0.15, 0.925, 0.025  # metres over the floor between which tops are looked for, and how finely
-_FOOTPRINT, _CARRYING = 0.07, 3  # metres round a place; of the five spots there, how many must have a top
+# metres over the floor between which tops are looked for, and how finely
+_LOWEST, _HIGHEST, _APART = 0.15, 0.925, 0.025
+# metres round a place; of the five spots there, how many must have a top
+_FOOTPRINT, _CARRYING = 0.07, 3
 
 
 @dataclass(frozen=True)
 class _Field:
     """One solid over T frames, in whose own frame ``measure`` gives the distance of points (N, 3).
 
-    ``rotation`` (T, 3, 3), ``position`` (T, 3): its rigid frames. ``present`` (T,): where it is more than floor.
-    ``low``, ``high`` (3,): outside this box every distance is beyond the reach.
+    ``rotation`` (T, 3, 3), ``position`` (T, 3): its rigid frames. ``present`` (T,): where it is
+    more than floor. ``low``, ``high`` (3,): outside this box every distance is beyond the reach.
     """
 
     rotation: np.ndarray
@@ -67,11 +70,13 @@ def occupancy(scene: Scene, path: RootPath) -> np.ndarray:
 
 
 def occupancy_steps(scene: Scene, path: RootPath) -> Generator[float, None, np.ndarray]:
-    """Occupancy (T, 2640) float32 of the sensor on every frame of ``path``, the largest over all solids.
+    """Occupancy (T, 2640) float32 of the sensor on every frame of ``path``, the largest over all
+    solids.
 
-    Solids are static or have one matrix for each frame of the path. The sensor has the canonical body's size: for
-    another body, scale scene (``distance.scaled``) and path first. Surfaces within 5 cm of the floor are not seen
-    (``distance.build_grid``). Yields progress. Raises InputError where a solid's frames are not the path's.
+    Solids are static or have one matrix for each frame of the path. The sensor has the canonical
+    body's size: for another body, scale scene (``distance.scaled``) and path first. Surfaces within
+    5 cm of the floor are not seen (``distance.build_grid``). Yields progress. Raises InputError
+    where a solid's frames are not the path's.
     """
     out = np.zeros((len(path), len(SPHERES)), np.float32)
     centres = SPHERES.T.astype(np.float32)
@@ -87,7 +92,9 @@ def occupancy_steps(scene: Scene, path: RootPath) -> Generator[float, None, np.n
             local = [turn[frames, axis] @ centres + shift[frames, axis, None] for axis in range(3)]
             sides = zip(local, field.low, field.high, strict=True)
             near = np.logical_and.reduce([(x > low) & (x < high) for x, low, high in sides])
-            found = occupancy_of_distance(field.measure(np.stack([x[near] for x in local], axis=-1)))
+            found = occupancy_of_distance(
+                field.measure(np.stack([x[near] for x in local], axis=-1))
+            )
             row, sphere = np.nonzero(near)
             at = frames[row], sphere
             out[at] = np.maximum(out[at], found)
@@ -96,7 +103,8 @@ def occupancy_steps(scene: Scene, path: RootPath) -> Generator[float, None, np.n
 
 
 def distance(scene: Scene, points: np.ndarray, floor: np.ndarray | float) -> np.ndarray:
-    """Signed distance (T, N) of world ``points`` (T, N, 3) to the nearest solid, negative inside, at most ``BAND``.
+    """Signed distance (T, N) of world ``points`` (T, N, 3) to the nearest solid, negative inside,
+    at most ``BAND``.
 
     ``floor``: height of the root's plane, one number or (T,). Solids as for ``occupancy``, metres.
     """
@@ -109,19 +117,25 @@ def distance(scene: Scene, points: np.ndarray, floor: np.ndarray | float) -> np.
 
 
 def tops_under(scene: Scene, path: RootPath) -> np.ndarray:
-    """Height (T,) in the world of what could carry a body that sits where the root is: the highest surface between 15 and 90 cm
-    over the floor, under the root and around it; NaN where there is none. Canonical metres, solids as for ``occupancy``.
+    """Height (T,) in the world of what could carry a body that sits where the root is: the highest
+    surface between 15 and 90 cm over the floor, under the root and around it; NaN where there is
+    none. Canonical metres, solids as for ``occupancy``.
     """
     if not scene.solids:
         return np.full(len(path), np.nan)
     spots = np.array([(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)]) * _FOOTPRINT
     heights = np.arange(_LOWEST, _HIGHEST, _APART)
     columns = np.concatenate([np.c_[np.tile(spot, (len(heights), 1)), heights] for spot in spots])
-    found = distance(scene, path.position[:, None] + columns, path.position[:, 2]).reshape(len(path), len(spots), -1)
+    found = distance(scene, path.position[:, None] + columns, path.position[:, 2]).reshape(
+        len(path), len(spots), -1
+    )
     touches = found[..., :-1] < _APART / 2
     highest = touches.shape[-1] - 1 - touches[..., ::-1].argmax(-1)
-    # Of a point over a level surface the distance is its height over it; of one inside a thin slab it may be another side's.
-    at, above = (np.take_along_axis(found, k[..., None], -1)[..., 0] for k in (highest, highest + 1))
+    # Of a point over a level surface the distance is its height over it; of one inside a thin slab
+    # it may be another side's.
+    at, above = (
+        np.take_along_axis(found, k[..., None], -1)[..., 0] for k in (highest, highest + 1)
+    )
     top = np.where(at > 0, heights[highest] - at, heights[highest + 1] - above)
     top[~touches.any(-1)] = np.nan
     carried = np.isfinite(top).sum(-1) >= _CARRYING

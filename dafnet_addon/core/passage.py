@@ -1,7 +1,8 @@
 """Where a root path leads a body through furniture, and which furniture that is.
 
-The body is told by its upright axis from the thighs to the chest. What it sits on, comes to sit on or gets up from is no
-hindrance, and neither is what its legs are under while it sits: near a seat only what stands higher than it is met.
+The body is told by its upright axis from the thighs to the chest. What it sits on, comes to sit on
+or gets up from is no hindrance, and neither is what its legs are under while it sits: near a seat
+only what stands higher than it is met.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,23 +20,31 @@ from .solids import Box, Mesh, Scene
 __all__ = ["Passage", "SatOn", "listed", "met_along", "passages", "seats_along"]
 
 _BESIDE = 0.2  # metres from the axis within which furniture is looked at
-_HEIGHTS = np.arange(0.50, 1.36, 0.025)  # metres over the floor, from a standing body's thighs to its chest
-_MEETS = 0.03  # metres between the axis and what is in the body, so that no board slips between two heights
-_ASIDE = 0.06  # metres to the left and right of the axis, where what it only passes along is on one side
+# metres over the floor, from a standing body's thighs to its chest
+_HEIGHTS = np.arange(0.50, 1.36, 0.025)
+# metres between the axis and what is in the body, so that no board slips between two heights
+_MEETS = 0.03
+# metres to the left and right of the axis, where what it only passes along is on one side
+_ASIDE = 0.06
 _PAUSE = 0.5  # seconds between two passages through one piece
 
-_COLUMN = np.arange(0.22, 1.125, 0.025)  # metres over the floor between which seats and the room over them are looked for
+# metres over the floor between which seats and the room over them are looked for
+_COLUMN = np.arange(0.22, 1.125, 0.025)
 _HIGHEST = 0.95
-_TOUCHES, _ROOM = 0.03, 5  # metres from the axis; steps of the column that are free over a seat, unlike inside one
+# metres from the axis; steps of the column that are free over a seat, unlike inside one
+_TOUCHES, _ROOM = 0.03, 5
 _STILL = 0.1  # metres a second, over what carries the body
 _OVER_SEAT = 0.12  # metres over a seat's top that belong to it
-_COMES, _RESTS = 0.6, 0.15  # metres from the place on a seat within which a body is on its way, or there
+# metres from the place on a seat within which a body is on its way, or there
+_COMES, _RESTS = 0.6, 0.15
 _NAMED = 3  # passages that a sentence names
 
 
 @dataclass(frozen=True)
 class SatOn:
-    """A body sits at ``place`` (2,) on ``pieces``, names of furniture, whose ``top`` is at this height; world, metres."""
+    """A body sits at ``place`` (2,) on ``pieces``, names of furniture, whose ``top`` is at this
+    height; world, metres.
+    """
 
     place: np.ndarray
     top: float
@@ -44,7 +53,9 @@ class SatOn:
 
 @dataclass(frozen=True)
 class Passage:
-    """The body's axis is in the furniture ``name`` from frame ``first`` to ``last`` of the path (both included)."""
+    """The body's axis is in the furniture ``name`` from frame ``first`` to ``last`` of the path
+    (both included).
+    """
 
     name: str
     first: int
@@ -74,9 +85,11 @@ def _still_over(solid: Box | Mesh, path: RootPath, fps: float) -> np.ndarray:
 
 
 def seats_along(scene: Scene, path: RootPath, fps: float) -> tuple[SatOn, ...]:
-    """What a root sits on: the lowest piece that is under it while it stands still, where there is room above.
+    """What a root sits on: the lowest piece that is under it while it stands still, where there is
+    room above.
 
-    ``scene``: canonical metres, static or with a matrix for each frame of ``path``, ``fps`` of them a second.
+    ``scene``: canonical metres, static or with a matrix for each frame of ``path``, ``fps`` of them
+    a second.
     """
     pieces = _pieces(scene, path)
     if not pieces:
@@ -86,13 +99,15 @@ def seats_along(scene: Scene, path: RootPath, fps: float) -> tuple[SatOn, ...]:
     still = np.stack([_still_over(piece.solids[0], path, fps) for piece in pieces.values()])
     carries = touched & still[..., None] & (_COLUMN < _HIGHEST)
 
-    # The lowest piece's own parts may be apart, a chair's cross-bar and its seat; over its highest one there has to be room.
+    # The lowest piece's own parts may be apart, a chair's cross-bar and its seat; over its highest
+    # one there has to be room.
     steps = np.arange(len(_COLUMN))
     first = np.where(carries, steps, len(steps)).min(axis=2)
     lowest = np.take_along_axis(carries, np.argmin(first, axis=0)[None, :, None], axis=0)[0]
     highest = np.where(lowest, steps, 0).max(axis=1)
     free = np.lib.stride_tricks.sliding_window_view(~touched.any(axis=0), _ROOM, axis=1).all(axis=2)
-    ends = np.argmax(free & (steps[: free.shape[1]] > highest[:, None]), axis=1)  # 0 where there is no room
+    # 0 where there is no room
+    ends = np.argmax(free & (steps[: free.shape[1]] > highest[:, None]), axis=1)
     resting = lowest.any(axis=1) & (ends > 0) & (_COLUMN[ends] < _HIGHEST)
 
     found = []
@@ -107,14 +122,18 @@ def seats_along(scene: Scene, path: RootPath, fps: float) -> tuple[SatOn, ...]:
 
 
 def _runs(flags: np.ndarray, pause: float) -> list[tuple[int, int]]:
-    """First and last frames of the runs of flags (T,) that are set; runs no more than ``pause`` frames apart are one."""
+    """First and last frames of the runs of flags (T,) that are set; runs no more than ``pause``
+    frames apart are one.
+    """
     frames = np.flatnonzero(flags)
     parts = np.split(frames, np.flatnonzero(np.diff(frames) > max(pause, 1)) + 1)
     return [(int(part[0]), int(part[-1])) for part in parts if len(part)]
 
 
 def _inside(piece: Scene, path: RootPath, fps: float) -> np.ndarray:
-    """Whether (T, H) the axis is in a piece of furniture, not just at an edge of it that the body passes along."""
+    """Whether (T, H) the axis is in a piece of furniture, not just at an edge of it that the body
+    passes along.
+    """
     axis = _upright(path, _HEIGHTS)
     forward = path.rotation[:, :2, 1]
     if len(path) > 1:
@@ -127,8 +146,12 @@ def _inside(piece: Scene, path: RootPath, fps: float) -> np.ndarray:
     return np.asarray(middle & (left == right))
 
 
-def passages(scene: Scene, path: RootPath, fps: float, seats: Sequence[SatOn]) -> tuple[Passage, ...]:
-    """Where the body is in furniture, in order of time; ``seats``: see ``seats_along``, whose arguments the others are."""
+def passages(
+    scene: Scene, path: RootPath, fps: float, seats: Sequence[SatOn]
+) -> tuple[Passage, ...]:
+    """Where the body is in furniture, in order of time; ``seats``: see ``seats_along``, whose
+    arguments the others are.
+    """
     floor = path.position[:, 2]
     away = [np.linalg.norm(path.position[:, :2] - seat.place, axis=1) for seat in seats]
     lowest = np.full(len(path), _HEIGHTS[0] - 1e-6)
@@ -144,18 +167,28 @@ def passages(scene: Scene, path: RootPath, fps: float, seats: Sequence[SatOn]) -
                 continue
             for first, last in _runs(inside.any(axis=1), _PAUSE * fps):
                 # A bed or a deep sofa is under the body for longer than where it sits.
-                if (gap[max(first - round(_PAUSE * fps), 0) : last + round(_PAUSE * fps) + 1] < _COMES).any():
-                    limit[first : last + 1] = np.maximum(limit, seat.top + _OVER_SEAT - floor)[first : last + 1]
+                if (
+                    gap[max(first - round(_PAUSE * fps), 0) : last + round(_PAUSE * fps) + 1]
+                    < _COMES
+                ).any():
+                    limit[first : last + 1] = np.maximum(limit, seat.top + _OVER_SEAT - floor)[
+                        first : last + 1
+                    ]
             limit[gap < _RESTS] = np.inf
         met[name] = (inside & (limit[:, None] <= _HEIGHTS)).any(axis=1)
-    found = [Passage(name, *run) for name, frames in met.items() for run in _runs(frames, _PAUSE * fps)]
+    found = [
+        Passage(name, *run) for name, frames in met.items() for run in _runs(frames, _PAUSE * fps)
+    ]
     return tuple(sorted(found, key=lambda each: each.first))
 
 
-def met_along(scene: Scene, path: RootPath, fps: float, end: Sequence[SatOn] | None = None) -> tuple[Passage, ...]:
+def met_along(
+    scene: Scene, path: RootPath, fps: float, end: Sequence[SatOn] | None = None
+) -> tuple[Passage, ...]:
     """``passages`` of a path that is about to be keyed, through a ``scene`` not yet measured.
 
-    ``end``: what the body sits on at the path's end, nothing where it stands there; None for what it seems to sit on.
+    ``end``: what the body sits on at the path's end, nothing where it stands there; None for what
+    it seems to sit on.
     """
     near = prepared(beside(scene, path.position, _BESIDE), float(np.median(path.position[:, 2])))[0]
     seats = seats_along(near, path, fps)

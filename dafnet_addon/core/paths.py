@@ -1,9 +1,10 @@
-"""Root paths of people who walk, sit down, rest and get up again, made from a few points on the floor.
+"""Root paths of people who walk, sit down, rest and get up again, made from a few points on the
+floor.
 
-The profiles are those measured on captured sit-downs and stand-ups: people do not stop before a seat, they turn round
-while they go the last metre, slow down evenly (0.7 m/s²) until they sit, and their heading has settled a quarter of a
-metre before that; they rise with 0.9 m/s² along the direction they sat in and turn away after 0.2 m. Yaw is as in
-``core.root``.
+The profiles are those measured on captured sit-downs and stand-ups: people do not stop before a
+seat, they turn round while they go the last metre, slow down evenly (0.7 m/s²) until they sit, and
+their heading has settled a quarter of a metre before that; they rise with 0.9 m/s² along the
+direction they sat in and turn away after 0.2 m. Yaw is as in ``core.root``.
 """
 
 from collections.abc import Sequence
@@ -23,15 +24,20 @@ Point = tuple[float, float]
 
 _STEP = 0.005  # metres between samples along a leg
 _START, _HALT, _SIT, _RISE = 1.4, 1.2, 0.7, 0.9  # accelerations, m/s²
-_CORNER_RATE = np.radians(90.0)  # turning rate, a second, that slows a walker who looks along the path in a corner
+# turning rate, a second, that slows a walker who looks along the path in a corner
+_CORNER_RATE = np.radians(90.0)
 _SIDEWAYS = 2.0  # acceleration to the side that slows a walker who does not, m/s²
-_CORNER_CUT, _CORNER_SPEED = 0.45, 0.3  # metres of a straight that a rounded corner may use; slowest speed in a corner
-_SETTLED, _TURN_AWAY = 0.25, 0.20  # metres before a seat where the heading has settled, after it where it lets go
+# metres of a straight that a rounded corner may use; slowest speed in a corner
+_CORNER_CUT, _CORNER_SPEED = 0.45, 0.3
+# metres before a seat where the heading has settled, after it where it lets go
+_SETTLED, _TURN_AWAY = 0.25, 0.20
 
 
 @dataclass(frozen=True)
 class Stop:
-    """A place to rest: ``position`` (x, y) of the pelvis, ``yaw`` it faces, ``seconds`` of rest, seated or standing."""
+    """A place to rest: ``position`` (x, y) of the pelvis, ``yaw`` it faces, ``seconds`` of rest,
+    seated or standing.
+    """
 
     position: Point
     yaw: float
@@ -71,7 +77,9 @@ def _wrapped(angle: float) -> float:
 
 
 def _turn_seconds(turn: float) -> float:
-    """How long people take to turn by ``turn`` radians: measured 0.8 s for 30 degrees, 1.2 s for 90, 1.7 s for 180."""
+    """How long people take to turn by ``turn`` radians: measured 0.8 s for 30 degrees, 1.2 s for
+    90, 1.7 s for 180.
+    """
     return 0.6 + 1.1 * abs(turn) / np.pi
 
 
@@ -81,13 +89,17 @@ def _blend(u: np.ndarray) -> np.ndarray:
 
 
 def _rounded(points: np.ndarray) -> tuple[np.ndarray, float, list[tuple[float, float]]]:
-    """Polyline (N, 2) with rounded corners, evenly sampled; its length; where each corner starts and ends along it."""
+    """Polyline (N, 2) with rounded corners, evenly sampled; its length; where each corner starts
+    and ends along it.
+    """
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     pieces, corners, travelled = [points[:1]], [], 0.0
 
     def append(piece: np.ndarray) -> None:
         nonlocal travelled
-        travelled += float(np.linalg.norm(np.diff(np.concatenate([pieces[-1][-1:], piece]), axis=0), axis=1).sum())
+        travelled += float(
+            np.linalg.norm(np.diff(np.concatenate([pieces[-1][-1:], piece]), axis=0), axis=1).sum()
+        )
         pieces.append(piece)
 
     for i in range(1, len(points) - 1):
@@ -104,16 +116,32 @@ def _rounded(points: np.ndarray) -> tuple[np.ndarray, float, list[tuple[float, f
     dense = np.concatenate(pieces)
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(dense, axis=0), axis=1))])
     grid = np.linspace(0.0, arc[-1], max(2, int(np.ceil(arc[-1] / _STEP)) + 1))
-    return np.stack([np.interp(grid, arc, dense[:, k]) for k in range(2)], axis=1), float(arc[-1]), corners
+    return (
+        np.stack([np.interp(grid, arc, dense[:, k]) for k in range(2)], axis=1),
+        float(arc[-1]),
+        corners,
+    )
 
 
 def _speeds(
-    arc: np.ndarray, tangent: np.ndarray, heading: np.ndarray, cruise: float, start: float, end: float
+    arc: np.ndarray,
+    tangent: np.ndarray,
+    heading: np.ndarray,
+    cruise: float,
+    start: float,
+    end: float,
 ) -> np.ndarray:
-    """Fastest speeds along a curve within ``cruise``, what its corners allow and the accelerations at both ends."""
+    """Fastest speeds along a curve within ``cruise``, what its corners allow and the accelerations
+    at both ends.
+    """
     step = float(arc[1])
-    bend, turn = (np.maximum(np.abs(np.gradient(angle, step)), 1e-6) for angle in (tangent, heading))
-    limit = np.minimum(cruise, np.maximum(_CORNER_SPEED, np.minimum(_CORNER_RATE / turn, np.sqrt(_SIDEWAYS / bend))))
+    bend, turn = (
+        np.maximum(np.abs(np.gradient(angle, step)), 1e-6) for angle in (tangent, heading)
+    )
+    limit = np.minimum(
+        cruise,
+        np.maximum(_CORNER_SPEED, np.minimum(_CORNER_RATE / turn, np.sqrt(_SIDEWAYS / bend))),
+    )
     squared = limit**2
     squared[0] = squared[-1] = 0.0
     for i in range(1, len(arc)):
@@ -124,7 +152,9 @@ def _speeds(
 
 
 def _leg(origin: Stop, via: Sequence[Point], goal: Stop, cruise: float, fps: float) -> RootPath:
-    """From rest at ``origin`` to rest at ``goal``: from one frame after the one to the first frame at the other."""
+    """From rest at ``origin`` to rest at ``goal``: from one frame after the one to the first frame
+    at the other.
+    """
     points: list[np.ndarray] = [np.asarray(origin.position, float)]
     if origin.seated:
         points.append(points[0] + AFTER_SEAT * _forward(origin.yaw))
@@ -134,28 +164,42 @@ def _leg(origin: Stop, via: Sequence[Point], goal: Stop, cruise: float, fps: flo
     points.append(np.asarray(goal.position, float))
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if not np.isfinite(gaps).all() or (gaps < 0.05).any():
-        raise InputError("Two neighbouring points of the root's path are less than 5 cm apart; move or remove one.")
+        raise InputError(
+            "Two neighbouring points of the root's path are less than 5 cm apart; move or remove "
+            "one."
+        )
 
     curve, length, corners = _rounded(np.array(points))
-    # The short straights at a seat are taken forwards and backwards: they say nothing about where the walker looks.
+    # The short straights at a seat are taken forwards and backwards: they say nothing about where
+    # the walker looks.
     told = (corners[0][1] if origin.seated else 0.0), (corners[-1][0] if goal.seated else length)
     return walked_along(curve, length, origin, goal, told, cruise, fps)
 
 
 def walked_along(
-    curve: np.ndarray, length: float, origin: Stop, goal: Stop, told: Point, cruise: float, fps: float,
+    curve: np.ndarray,
+    length: float,
+    origin: Stop,
+    goal: Stop,
+    told: Point,
+    cruise: float,
+    fps: float,
     yaw: float | None = None,
 ) -> RootPath:
-    """A smooth ``curve`` (N, 2), evenly sampled and ``length`` metres long, walked from rest at ``origin`` to rest at ``goal``.
+    """A smooth ``curve`` (N, 2), evenly sampled and ``length`` metres long, walked from rest at
+    ``origin`` to rest at ``goal``.
 
-    The walker looks along it between ``told`` metres of the way, or keeps the heading ``yaw``, and turns away from
-    ``origin.yaw`` and to ``goal.yaw`` as people do. From one frame after the rest to the first frame of the other; z is 0.
+    The walker looks along it between ``told`` metres of the way, or keeps the heading ``yaw``, and
+    turns away from ``origin.yaw`` and to ``goal.yaw`` as people do. From one frame after the rest
+    to the first frame of the other; z is 0.
     """
     step = np.diff(curve, axis=0)
     arc = np.linspace(0.0, length, len(curve))
     tangent = np.unwrap(np.arctan2(-step[:, 0], step[:, 1]))
     tangent = np.concatenate([tangent, tangent[-1:]])
-    heading = np.interp(np.clip(arc, *told), arc, tangent) if yaw is None else np.full(len(arc), yaw)
+    heading = (
+        np.interp(np.clip(arc, *told), arc, tangent) if yaw is None else np.full(len(arc), yaw)
+    )
     start, end = (_RISE if origin.seated else _START), (_SIT if goal.seated else _HALT)
     speed = _speeds(arc, tangent, heading, cruise, start, end)
     clock = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(arc) / (speed[1:] + speed[:-1]))])
@@ -182,26 +226,36 @@ def walked_along(
     frames = int(np.ceil((clock[-1] + wait + linger) * fps))
     time = np.arange(1, frames + 1) / fps - wait
     distance = np.interp(time, clock, arc)
-    position = np.stack([np.interp(distance, arc, curve[:, k]) for k in range(2)] + [np.zeros(frames)], axis=1)
+    position = np.stack(
+        [np.interp(distance, arc, curve[:, k]) for k in range(2)] + [np.zeros(frames)], axis=1
+    )
     walking = np.interp(time, clock, heading)
-    # Both turns are offsets from the walker's heading that fade out and in, so they may overlap on a short leg.
+    # Both turns are offsets from the walker's heading that fade out and in, so they may overlap on
+    # a short leg.
     leaving = 1.0 - _blend((time - leave) / (leave_end - leave))
     arriving = _blend((time - arrive) / (arrive_end - arrive))
     from_origin = _wrapped(origin.yaw - walked(leave_end)) + walked(leave_end)
     to_goal = walked(arrive) + arrive_turn
-    return RootPath(position, walking + leaving * (from_origin - walking) + arriving * (to_goal - walking))
+    return RootPath(
+        position, walking + leaving * (from_origin - walking) + arriving * (to_goal - walking)
+    )
 
 
-def route(start: Stop, *places: Point | Stop, speed: float = 1.1, fps: float = 30.0, floor: float = 0.0) -> Route:
-    """Root path that rests at ``start``, passes the points and rests at every ``Stop``; it must end at a stop.
+def route(
+    start: Stop, *places: Point | Stop, speed: float = 1.1, fps: float = 30.0, floor: float = 0.0
+) -> Route:
+    """Root path that rests at ``start``, passes the points and rests at every ``Stop``; it must end
+    at a stop.
 
-    ``speed``: of walking, metres a second. ``floor``: height of the floor (metres). Raises InputError where points
-    coincide or the path does not end at a stop.
+    ``speed``: of walking, metres a second. ``floor``: height of the floor (metres). Raises
+    InputError where points coincide or the path does not end at a stop.
     """
     if not places or not isinstance(places[-1], Stop):
         raise InputError("A root path has to end at a stop; add one as its last place.")
     if speed <= _CORNER_SPEED or fps <= 0:
-        raise InputError(f"Walking needs a speed above {_CORNER_SPEED} m/s and a positive frame rate.")
+        raise InputError(
+            f"Walking needs a speed above {_CORNER_SPEED} m/s and a positive frame rate."
+        )
     positions: list[np.ndarray] = []
     yaws: list[np.ndarray] = []
     rests: list[Rest] = []

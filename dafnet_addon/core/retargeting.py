@@ -1,9 +1,11 @@
-"""A motion of the 22 joints onto another body: what is carried is how each limb lies in the world, and where its end lands.
+"""A motion of the 22 joints onto another body: what is carried is how each limb lies in the world,
+and where its end lands.
 
-Rigs rest in all kinds of poses, so nothing is told as a rotation from rest. Every body is first laid into the canonical T-pose
-(x right, y forward, z up; ``laid``), and joints that it lacks are filled in. Two kinds of global joint frames occur. *Frames*
-are the identity in that T-pose, so the same frames are the same pose in the world on every body; *turns* are the identity in
-the rig's own rest pose. A body's ``alignment`` leads from one to the other: turns = frames @ alignment.
+Rigs rest in all kinds of poses, so nothing is told as a rotation from rest. Every body is first
+laid into the canonical T-pose (x right, y forward, z up; ``laid``), and joints that it lacks are
+filled in. Two kinds of global joint frames occur. *Frames* are the identity in that T-pose, so the
+same frames are the same pose in the world on every body; *turns* are the identity in the rig's own
+rest pose. A body's ``alignment`` leads from one to the other: turns = frames @ alignment.
 """
 
 from collections.abc import Callable
@@ -26,29 +28,60 @@ from .rotations import (
 )
 from .skeleton import PARENTS, REST
 
-__all__ = ["LIMBS", "Body", "Landed", "Motion", "canonical_body", "laid", "limb_errors", "onto", "size_ratio"]
+__all__ = [
+    "LIMBS",
+    "Body",
+    "Landed",
+    "Motion",
+    "canonical_body",
+    "laid",
+    "limb_errors",
+    "onto",
+    "size_ratio",
+]
 
 LIMBS = {
-    "left_arm": (16, 18, 20), "right_arm": (17, 19, 21), "left_leg": (1, 4, 7), "right_leg": (2, 5, 8),
+    "left_arm": (16, 18, 20),
+    "right_arm": (17, 19, 21),
+    "left_leg": (1, 4, 7),
+    "right_leg": (2, 5, 8),
 }
 """First, middle and end joint of the limbs."""
 
-_AXIS = {"left_arm": (-1.0, 0, 0), "right_arm": (1.0, 0, 0), "left_leg": (0, 0, -1.0), "right_leg": (0, 0, -1.0)}
-_BEND = {"left_arm": (0, -1.0, 0), "right_arm": (0, -1.0, 0), "left_leg": (0, 1.0, 0), "right_leg": (0, 1.0, 0)}
+_AXIS = {
+    "left_arm": (-1.0, 0, 0),
+    "right_arm": (1.0, 0, 0),
+    "left_leg": (0, 0, -1.0),
+    "right_leg": (0, 0, -1.0),
+}
+_BEND = {
+    "left_arm": (0, -1.0, 0),
+    "right_arm": (0, -1.0, 0),
+    "left_leg": (0, 1.0, 0),
+    "right_leg": (0, 1.0, 0),
+}
 _TRUNK = (3, 6, 9, 12)  # the joints that bring the head to its place
-_SAME_SIZE = 0.03  # bodies whose legs differ by less count as of one size, so that hands stay on what they touch
-_SAME_ARMS, _SAME_CHEST = 1.25, 1.2  # arms, and shoulders over the hips, of the same build, over the body's size
-_SAME_ANKLES = 0.01  # ankles that are higher by less than this (of the leg's length) do not lift the body
+# bodies whose legs differ by less count as of one size, so that hands stay on what they touch
+_SAME_SIZE = 0.03
+# arms, and shoulders over the hips, of the same build, over the body's size
+_SAME_ARMS, _SAME_CHEST = 1.25, 1.2
+# ankles that are higher by less than this (of the leg's length) do not lift the body
+_SAME_ANKLES = 0.01
 _REACH = 1.0 - 1e-5
 _SINK = 0.3  # of a leg's length: the most by which the pelvis is lowered to let the feet reach
-_TRUNK_TURN, _SHRUG = 0.35, 0.35  # the most that trunk and collars turn out of the source's pose to reach, radians
+# the most that trunk and collars turn out of the source's pose to reach, radians
+_TRUNK_TURN, _SHRUG = 0.35, 0.35
 _EASE = 0.2  # the most that collars turn to leave elbows as bent as they were, radians
 _ROUNDS, _LEANS, _SHRUGS = 24, 8, 4
-_SEATED, _STANDS = 0.75, 0.95  # hip to ankle over the leg's length: bent as in sitting, and as in standing
-_STRAIGHT = 0.03  # a limb bent by less than this (of its length) also takes its plane from its first joint's frame
+# hip to ankle over the leg's length: bent as in sitting, and as in standing
+_SEATED, _STANDS = 0.75, 0.95
+# a limb bent by less than this (of its length) also takes its plane from its first joint's frame
+_STRAIGHT = 0.03
 _UP = np.array([0.0, 0.0, 1.0])
-_BENT = np.radians(40.0)  # rest poses whose chest leans by more against the pelvis do not have a straight trunk
-_UPRIGHT = np.radians(30.0)  # a trunk that leans by less at rest has a face that looks level and soles that are flat
+# rest poses whose chest leans by more against the pelvis do not have a straight trunk
+_BENT = np.radians(40.0)
+# a trunk that leans by less at rest has a face that looks level and soles that are flat
+_UPRIGHT = np.radians(30.0)
 _CLEAR = np.sin(np.radians(30.0))  # limbs bent by more at rest show which way they bend
 _AHEAD = np.sin(np.radians(10.0))
 
@@ -57,9 +90,10 @@ _AHEAD = np.sin(np.radians(10.0))
 class Body:
     """A body laid into the canonical T-pose, whatever pose its rig rests in (``laid``).
 
-    ``rest`` (22, 3): its joints in that pose, canonical frame, any unit of length. ``present`` (22,): which of them a bone
-    turns; the others are rigid on their parents. ``alignment`` (22, 3, 3): the rotations that laid it so, out of the rig's own
-    rest pose; from the frames of a pose they lead to its turns.
+    ``rest`` (22, 3): its joints in that pose, canonical frame, any unit of length. ``present``
+    (22,): which of them a bone turns; the others are rigid on their parents. ``alignment`` (22, 3,
+    3): the rotations that laid it so, out of the rig's own rest pose; from the frames of a pose
+    they lead to its turns.
     """
 
     rest: np.ndarray
@@ -80,7 +114,9 @@ class Body:
 
     def chest(self) -> float:
         """From the middle of the hip joints to the middle of the shoulders."""
-        return float(np.linalg.norm(self.rest[[16, 17]].mean(axis=0) - self.rest[[1, 2]].mean(axis=0)))
+        return float(
+            np.linalg.norm(self.rest[[16, 17]].mean(axis=0) - self.rest[[1, 2]].mean(axis=0))
+        )
 
     def trunk(self) -> float:
         """From the middle of the hip joints to the head joint."""
@@ -89,7 +125,9 @@ class Body:
 
 @dataclass(frozen=True)
 class Motion:
-    """``joints`` (T, 22, 3), world; ``frames`` (T, 22, 3, 3): global, the identity in a T-pose that looks along +y."""
+    """``joints`` (T, 22, 3), world; ``frames`` (T, 22, 3, 3): global, the identity in a T-pose that
+    looks along +y.
+    """
 
     joints: np.ndarray
     frames: np.ndarray
@@ -99,9 +137,9 @@ class Motion:
 class Landed:
     """``motion`` on the body; ``turns`` (T, 22, 3, 3): global, the identity in its rest pose.
 
-    ``targets`` (T, 22, 3): where its joints were to lie; of these wrists, ankles, head and the middle of the hip joints
-    are aimed at. ``bends`` (T, 4, 3): unit directions in which the limbs of ``LIMBS`` bend. ``ratio``: the body's size over
-    the source's.
+    ``targets`` (T, 22, 3): where its joints were to lie; of these wrists, ankles, head and the
+    middle of the hip joints are aimed at. ``bends`` (T, 4, 3): unit directions in which the limbs
+    of ``LIMBS`` bend. ``ratio``: the body's size over the source's.
     """
 
     motion: Motion
@@ -112,28 +150,36 @@ class Landed:
 
 
 def canonical_body(scale: float) -> Body:
-    """The DAFNet character's own body; ``scale``: its size over the canonical one, times the unit of length wanted."""
+    """The DAFNet character's own body; ``scale``: its size over the canonical one, times the unit
+    of length wanted.
+    """
     return Body(scale * REST, np.ones(22, bool), np.tile(np.eye(3), (22, 1, 1)))
 
 
-def laid(rest: np.ndarray, present: np.ndarray | None = None, hands: np.ndarray | None = None) -> Body:
+def laid(
+    rest: np.ndarray, present: np.ndarray | None = None, hands: np.ndarray | None = None
+) -> Body:
     """The body of a rig that rests in any pose: standing, arms anywhere, sitting, bent or twisted.
 
-    ``rest`` (22, 3): its joints at rest, z up and y about ahead, any unit; NaN where it has none, which only collars, feet,
-    neck and spine may. ``present`` (22,): the joints that a bone turns; those that are not NaN if not given. ``hands``
-    (2, 2, 3): where the fingers of the left and of the right hand point at rest, and the direction across them, from the
-    little finger's side to the thumb's; NaN where that is not known.
+    ``rest`` (22, 3): its joints at rest, z up and y about ahead, any unit; NaN where it has none,
+    which only collars, feet, neck and spine may. ``present`` (22,): the joints that a bone turns;
+    those that are not NaN if not given. ``hands`` (2, 2, 3): where the fingers of the left and of
+    the right hand point at rest, and the direction across them, from the little finger's side to
+    the thumb's; NaN where that is not known.
 
-    Each part is laid by what can be seen of it. The trunk lies along the line from the hips to the neck, pelvis and chest
-    turned as hips and shoulders are; where the trunk is bent, pelvis and chest lie each along its own end of the spine. Arms
-    and legs lie along their bones, turned as they would come there from a T-pose by the shortest way, or so that elbows and
-    knees bend as they do where the rest pose bends them clearly. Faces look level and soles are flat where chest and pelvis are
-    about upright at rest; else faces look ahead of the chest, and soles are flat under the pelvis, or at right angles to shins
-    where toes do not lie ahead of the ankles.
+    Each part is laid by what can be seen of it. The trunk lies along the line from the hips to the
+    neck, pelvis and chest turned as hips and shoulders are; where the trunk is bent, pelvis and
+    chest lie each along its own end of the spine. Arms and legs lie along their bones, turned as
+    they would come there from a T-pose by the shortest way, or so that elbows and knees bend as
+    they do where the rest pose bends them clearly. Faces look level and soles are flat where chest
+    and pelvis are about upright at rest; else faces look ahead of the chest, and soles are flat
+    under the pelvis, or at right angles to shins where toes do not lie ahead of the ankles.
     """
     rest = _with_column(np.array(rest, float))
     present = np.isfinite(rest).all(axis=1) if present is None else present
-    size = np.linalg.norm(rest[[4, 5, 7, 8]] - rest[[1, 2, 4, 5]]) / np.linalg.norm(REST[[4, 5, 7, 8]] - REST[[1, 2, 4, 5]])
+    size = np.linalg.norm(rest[[4, 5, 7, 8]] - rest[[1, 2, 4, 5]]) / np.linalg.norm(
+        REST[[4, 5, 7, 8]] - REST[[1, 2, 4, 5]]
+    )
     turn = np.tile(np.eye(3), (22, 1, 1))
     pelvis, chest = _trunk_laid(rest)
     spine = [j for j in (3, 6, 9) if present[j]]
@@ -147,7 +193,10 @@ def laid(rest: np.ndarray, present: np.ndarray | None = None, hands: np.ndarray 
     if _angle(chest @ pelvis.T) > _BENT:
         for j, child in pairwise([0, *spine]):
             if j:
-                turn[j] = rotation_between(turn[j] @ (rest[child] - rest[j]), REST[child] - REST[j]) @ turn[j]
+                turn[j] = (
+                    rotation_between(turn[j] @ (rest[child] - rest[j]), REST[child] - REST[j])
+                    @ turn[j]
+                )
     turn[[9, 12, 13, 14]] = chest
     turn[15], ground = _level(chest), _level(pelvis)
     for j, base, up in ((13, chest, 16), (14, chest, 17), (10, ground, 7), (11, ground, 8)):
@@ -166,9 +215,16 @@ def laid(rest: np.ndarray, present: np.ndarray | None = None, hands: np.ndarray 
             turn[first] = rotation_between(aside, -bend) @ turn[first]
         turn[middle] = rotation_between(turn[first] @ lower, axis) @ turn[first]
         if arm:
-            turn[end] = _hand_laid(turn[middle], lower, axis, hands[k] if hands is not None else np.full((2, 3), np.nan))
+            turn[end] = _hand_laid(
+                turn[middle],
+                lower,
+                axis,
+                hands[k] if hands is not None else np.full((2, 3), np.nan),
+            )
         else:
-            turn[end] = turn[end + 3] = _foot_laid(turn[middle], ground, rest[end + 3] - rest[end], end)
+            turn[end] = turn[end + 3] = _foot_laid(
+                turn[middle], ground, rest[end + 3] - rest[end], end
+            )
     for j in range(1, 22):
         if not present[j]:
             turn[j] = turn[PARENTS[j]]
@@ -182,7 +238,9 @@ def _with_column(rest: np.ndarray) -> np.ndarray:
     """Spine and neck where they are missing, on the way from pelvis to head."""
     column = [0, 3, 6, 9, 12, 15]
     known = [j for j in column if np.isfinite(rest[j]).all()]
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(REST[column], axis=0), axis=1))])
+    along = np.concatenate(
+        [[0.0], np.cumsum(np.linalg.norm(np.diff(REST[column], axis=0), axis=1))]
+    )
     place = dict(zip(column, along, strict=True))
     for k in range(3):
         rest[column, k] = np.interp(along, [place[j] for j in known], rest[known, k])
@@ -201,7 +259,11 @@ def _trunk_laid(rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     size = np.linalg.norm(along)
     low = next((j for j in (3, 6, 9) if np.linalg.norm(rest[j] - hips) > 0.1 * size), 12)
     high, top = next(
-        (j, end) for j in (9, 6, 3, 0) for end in (12, 15) if np.linalg.norm(rest[end] - rest[j]) > 0.15 * size)
+        (j, end)
+        for j in (9, 6, 3, 0)
+        for end in (12, 15)
+        if np.linalg.norm(rest[end] - rest[j]) > 0.15 * size
+    )
     pelvis = upright(across_hips, rest[low] - hips, REST[low] - canonical_hips)
     chest = upright(across_chest, rest[top] - rest[high], REST[top] - REST[high])
     up = np.array([pelvis.T[:, 2], chest.T[:, 2]])
@@ -211,14 +273,21 @@ def _trunk_laid(rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _level(part: np.ndarray) -> np.ndarray:
-    """Rotation that lays what is level at rest above or below a part of the trunk that ``part`` lays: face and soles."""
+    """Rotation that lays what is level at rest above or below a part of the trunk that ``part``
+    lays: face and soles.
+    """
     return frame_from(part[0], _UP, "xz").T if part[2, 2] > np.cos(_UPRIGHT) else part
 
 
-def _hand_laid(forearm: np.ndarray, lower: np.ndarray, axis: np.ndarray, hand: np.ndarray) -> np.ndarray:
+def _hand_laid(
+    forearm: np.ndarray, lower: np.ndarray, axis: np.ndarray, hand: np.ndarray
+) -> np.ndarray:
     """Rotation that lays a hand: straight on, palm down, as far as its fingers are known."""
     fingers, across = hand
-    turn = rotation_between(forearm @ (fingers if np.isfinite(fingers).all() else lower), axis) @ forearm
+    turn = (
+        rotation_between(forearm @ (fingers if np.isfinite(fingers).all() else lower), axis)
+        @ forearm
+    )
     if not np.isfinite(across).all():
         return turn
     seen = turn @ across
@@ -226,7 +295,9 @@ def _hand_laid(forearm: np.ndarray, lower: np.ndarray, axis: np.ndarray, hand: n
 
 
 def _foot_laid(shin: np.ndarray, ground: np.ndarray, foot: np.ndarray, ankle: int) -> np.ndarray:
-    """Rotation that lays a foot: its sole counts as flat at rest where toes lie ahead of the ankle and lower."""
+    """Rotation that lays a foot: its sole counts as flat at rest where toes lie ahead of the ankle
+    and lower.
+    """
     ahead, seen = REST[ankle + 3] - REST[ankle], ground @ normalised(foot)
     if seen[1] > _AHEAD and seen[2] < _AHEAD:
         flat = np.array([1.0, 1.0, 0.0])
@@ -245,22 +316,28 @@ def size_ratio(source: Body, body: Body) -> float:
     return 1.0 if abs(ratio - 1.0) < _SAME_SIZE else ratio
 
 
-def onto(source: Motion, source_body: Body, body: Body, root: np.ndarray, landing: bool = True) -> Landed:
-    """The motion on another body. ``root`` (T, 3): the place on the floor under the source, about which it is scaled.
+def onto(
+    source: Motion, source_body: Body, body: Body, root: np.ndarray, landing: bool = True
+) -> Landed:
+    """The motion on another body. ``root`` (T, 3): the place on the floor under the source, about
+    which it is scaled.
 
-    Trunk, limbs, hands, feet and head lie in the world as the source's do. ``landing``: besides, hands, feet and head come
-    where the source's came, at the price of its limbs' directions where the proportions differ; but arms keep their directions
-    on a body of another size and build, which touches nothing any more (``_arms_land``). Without it all limbs keep their
-    directions, and head and shoulders lie as the source's do from the hips.
+    Trunk, limbs, hands, feet and head lie in the world as the source's do. ``landing``: besides,
+    hands, feet and head come where the source's came, at the price of its limbs' directions where
+    the proportions differ; but arms keep their directions on a body of another size and build,
+    which touches nothing any more (``_arms_land``). Without it all limbs keep their directions, and
+    head and shoulders lie as the source's do from the hips.
 
-    Where the sizes differ (``size_ratio``), the source's joints are scaled about the root, except that steps keep their
-    length, since the root's path keeps its own and feet would slide otherwise. The head is put over the hips by the size of the
-    trunk where that differs, since it would be stretched or bent all the time otherwise. The middle of the hip joints comes to
-    lie where the source's lies, lower where legs would not reach, and feet stand as far apart as hips do; the trunk turns as
-    the source's and bends by some degrees more to bring the head to its place; limbs reach wrists and ankles in the planes of
-    the source's; collars turn a little to leave elbows as bent as they were, more where an arm is short. An ankle that lies
-    higher over its toes than the source's is held higher by that, so that soles stay on the floor, and lifts the body that
-    stands on it.
+    Where the sizes differ (``size_ratio``), the source's joints are scaled about the root, except
+    that steps keep their length, since the root's path keeps its own and feet would slide
+    otherwise. The head is put over the hips by the size of the trunk where that differs, since it
+    would be stretched or bent all the time otherwise. The middle of the hip joints comes to lie
+    where the source's lies, lower where legs would not reach, and feet stand as far apart as hips
+    do; the trunk turns as the source's and bends by some degrees more to bring the head to its
+    place; limbs reach wrists and ankles in the planes of the source's; collars turn a little to
+    leave elbows as bent as they were, more where an arm is short. An ankle that lies higher over
+    its toes than the source's is held higher by that, so that soles stay on the floor, and lifts
+    the body that stands on it.
     """
     ratio = size_ratio(source_body, body)
     targets = _targets(source, source_body, body, root, landing)
@@ -276,7 +353,9 @@ def onto(source: Motion, source_body: Body, body: Body, root: np.ndarray, landin
             parent = PARENTS[j]
             if not body.present[parent] and parent != 0:
                 frames[:, parent] = frames[:, PARENTS[parent]]
-            joints[:, j] = joints[:, parent] + rotate(frames[:, parent], body.rest[j] - body.rest[parent])
+            joints[:, j] = joints[:, parent] + rotate(
+                frames[:, parent], body.rest[j] - body.rest[parent]
+            )
 
     middle = 0.5 * (body.rest[1] + body.rest[2])
     joints[:, 0] = targets[:, [1, 2]].mean(axis=1) + rotate(frames[:, 0], body.rest[0] - middle)
@@ -293,15 +372,23 @@ def onto(source: Motion, source_body: Body, body: Body, root: np.ndarray, landin
         _bring_head(joints, frames, targets[:, 15], [j for j in trunk if j != spine[-1]], place)
         place(13, 14, 16, 17)
     for collar, shoulder, elbow, wrist in ((13, 16, 18, 20), (14, 17, 19, 21)):
-        arm = sum(body.length(j) * normalised(source.joints[:, j] - source.joints[:, PARENTS[j]]) for j in (elbow, wrist))
+        arm = sum(
+            body.length(j) * normalised(source.joints[:, j] - source.joints[:, PARENTS[j]])
+            for j in (elbow, wrist)
+        )
         if body.present[collar] and arms_land:
             reach = _REACH * (body.length(elbow) + body.length(wrist))
             kept = np.minimum(np.linalg.norm(arm, axis=-1, keepdims=True), reach)
             _shrug(joints, frames, targets[:, wrist], collar, shoulder, kept, reach)
         elif body.present[collar] and not landing:
             # The shoulder to its place, then a little to where the wrist would come to its own.
-            for place_of, most in ((targets[:, shoulder], _SHRUG), (targets[:, wrist] - arm, 0.5 * _EASE)):
-                turn = rotation_between(joints[:, shoulder] - joints[:, collar], place_of - joints[:, collar])
+            for place_of, most in (
+                (targets[:, shoulder], _SHRUG),
+                (targets[:, wrist] - arm, 0.5 * _EASE),
+            ):
+                turn = rotation_between(
+                    joints[:, shoulder] - joints[:, collar], place_of - joints[:, collar]
+                )
                 frames[:, collar] = _limited(turn, most) @ frames[:, collar]
                 place(shoulder)
         place(shoulder)
@@ -317,20 +404,32 @@ def onto(source: Motion, source_body: Body, body: Body, root: np.ndarray, landin
         bend = _bend(source, name, joints[:, first], targets[:, end])
         if lands[name]:
             joints[:, mid], joints[:, end] = two_bone(
-                joints[:, first], targets[:, end], joints[:, first] + bend, body.length(mid), body.length(end), bend)
+                joints[:, first],
+                targets[:, end],
+                joints[:, first] + bend,
+                body.length(mid),
+                body.length(end),
+                bend,
+            )
         for at, child in ((first, mid), (mid, end)):
-            straight = rotation_between(rotate(source.frames[:, at], axis), joints[:, child] - joints[:, at])
+            straight = rotation_between(
+                rotate(source.frames[:, at], axis), joints[:, child] - joints[:, at]
+            )
             frames[:, at] = straight @ source.frames[:, at]
         bends.append(bend)
     place(10, 11)
     for j in range(1, 22):
         if not body.present[j]:
             frames[:, j] = frames[:, PARENTS[j]]
-    return Landed(Motion(joints, frames), frames @ body.alignment, targets, np.stack(bends, axis=1), ratio)
+    return Landed(
+        Motion(joints, frames), frames @ body.alignment, targets, np.stack(bends, axis=1), ratio
+    )
 
 
 def _arms_land(source: Body, body: Body) -> bool:
-    """Whether hands come where the source's came: on a body of its size, or of its build at another size."""
+    """Whether hands come where the source's came: on a body of its size, or of its build at another
+    size.
+    """
     ratio = size_ratio(source, body)
     if ratio == 1.0:
         return True
@@ -338,18 +437,24 @@ def _arms_land(source: Body, body: Body) -> bool:
     def alike(ours: float, theirs: float, most: float) -> bool:
         return 1.0 / most < ours / (ratio * theirs) < most
 
-    return alike(body.arm(), source.arm(), _SAME_ARMS) and alike(body.chest(), source.chest(), _SAME_CHEST)
+    return alike(body.arm(), source.arm(), _SAME_ARMS) and alike(
+        body.chest(), source.chest(), _SAME_CHEST
+    )
 
 
 def limb_errors(joints: np.ndarray, source: np.ndarray) -> dict[str, np.ndarray]:
-    """By how many degrees (T,) each limb and the trunk lie otherwise than the source's; both (T, 22, 3), any size.
+    """By how many degrees (T,) each limb and the trunk lie otherwise than the source's; both (T,
+    22, 3), any size.
 
-    Of a limb the most that either bone's direction, or the bend of elbow or knee, is off; of the trunk, the way from the hips
-    to the head or from shoulder to shoulder.
+    Of a limb the most that either bone's direction, or the bend of elbow or knee, is off; of the
+    trunk, the way from the hips to the head or from shoulder to shoulder.
     """
+
     def ways(at: np.ndarray) -> dict[str, list[np.ndarray]]:
         hips = at[:, [1, 2]].mean(axis=1)
-        limbs = {name: [at[:, b] - at[:, a], at[:, c] - at[:, b]] for name, (a, b, c) in LIMBS.items()}
+        limbs = {
+            name: [at[:, b] - at[:, a], at[:, c] - at[:, b]] for name, (a, b, c) in LIMBS.items()
+        }
         return limbs | {"trunk": [at[:, 15] - hips, at[:, 17] - at[:, 16]]}
 
     ours, theirs, found = ways(joints), ways(source), {}
@@ -365,12 +470,15 @@ def _degrees(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.degrees(np.arccos(np.clip((normalised(a) * normalised(b)).sum(-1), -1.0, 1.0)))
 
 
-def _targets(source: Motion, source_body: Body, body: Body, root: np.ndarray, landing: bool) -> np.ndarray:
+def _targets(
+    source: Motion, source_body: Body, body: Body, root: np.ndarray, landing: bool
+) -> np.ndarray:
     """Where the joints (T, 22, 3) are to lie on the body, as for ``onto``."""
     ratio, feet = size_ratio(source_body, body), [7, 8, 10, 11]
     targets = root[:, None] + ratio * (source.joints - root[:, None])
     targets[:, feet, :2] = source.joints[:, feet, :2]
-    # Feet stand apart as the hips do; sideways of the foot itself, since a planted one does not turn.
+    # Feet stand apart as the hips do; sideways of the foot itself, since a planted one does not
+    # turn.
     wider = 0.5 * (np.ptp(body.rest[[1, 2], 0]) - np.ptp(source_body.rest[[1, 2], 0]))
     for ankle, side in ((7, -1.0), (8, 1.0)):
         out = source.frames[:, ankle, :, 0] * (1.0, 1.0, 0.0)
@@ -382,11 +490,14 @@ def _targets(source: Motion, source_body: Body, body: Body, root: np.ndarray, la
         targets[:, upper] = targets[:, [1, 2]].mean(axis=1, keepdims=True) + trunk * upright
     if body.present[[10, 11]].all():
         rise = (body.rest[[7, 8], 2] - body.rest[[10, 11], 2]) - ratio * (
-            source_body.rest[[7, 8], 2] - source_body.rest[[10, 11], 2])
+            source_body.rest[[7, 8], 2] - source_body.rest[[10, 11], 2]
+        )
         targets[:, [7, 8]] += source.frames[:, [7, 8]][..., 2] * rise[:, None]
         if abs(rise.mean()) > _SAME_ANKLES * body.leg():
             # Hands of a body of the same size stay on what they touch.
-            carried = [j for j in range(22) if j not in feet and (ratio != 1.0 or j not in (20, 21))]
+            carried = [
+                j for j in range(22) if j not in feet and (ratio != 1.0 or j not in (20, 21))
+            ]
             targets[:, carried, 2] += (rise.mean() * _standing(source.joints))[:, None]
     return targets
 
@@ -404,16 +515,30 @@ def _sunk(joints: np.ndarray, targets: np.ndarray, body: Body) -> np.ndarray:
 
 def _limited(turn: np.ndarray, most: float) -> np.ndarray:
     """Rotations (T, 3, 3), none by more than ``most`` radians (which is under half a circle)."""
-    vector = 0.5 * np.stack([
-        turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]], axis=-1)
-    angle = np.arctan2(np.linalg.norm(vector, axis=-1), 0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0))
+    vector = 0.5 * np.stack(
+        [
+            turn[:, 2, 1] - turn[:, 1, 2],
+            turn[:, 0, 2] - turn[:, 2, 0],
+            turn[:, 1, 0] - turn[:, 0, 1],
+        ],
+        axis=-1,
+    )
+    angle = np.arctan2(
+        np.linalg.norm(vector, axis=-1), 0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0)
+    )
     return matrix_from_vector(normalised(vector) * np.minimum(angle, most)[:, None])
 
 
 def _bring_head(
-    joints: np.ndarray, frames: np.ndarray, head: np.ndarray, trunk: list[int], place: Callable[..., None],
+    joints: np.ndarray,
+    frames: np.ndarray,
+    head: np.ndarray,
+    trunk: list[int],
+    place: Callable[..., None],
 ) -> None:
-    """Turn the trunk's joints, each a little, until the head joint lies at ``head`` (T, 3): cyclic coordinate descent."""
+    """Turn the trunk's joints, each a little, until the head joint lies at ``head`` (T, 3): cyclic
+    coordinate descent.
+    """
     meant = frames[:, trunk].copy()
     place(3, 6, 9, 12, 15)
     for _ in range(_ROUNDS if trunk else 0):
@@ -421,11 +546,15 @@ def _bring_head(
             turn = rotation_between(joints[:, 15] - joints[:, j], head - joints[:, j])
             for i, above in enumerate(trunk[k:], k):
                 asked = turn @ frames[:, above]
-                frames[:, above] = _limited(asked @ transpose(meant[:, i]), _TRUNK_TURN) @ meant[:, i]
+                frames[:, above] = (
+                    _limited(asked @ transpose(meant[:, i]), _TRUNK_TURN) @ meant[:, i]
+                )
             place(3, 6, 9, 12, 15)
 
 
-def _lean(joints: np.ndarray, frames: np.ndarray, targets: np.ndarray, chest: int, body: Body) -> None:
+def _lean(
+    joints: np.ndarray, frames: np.ndarray, targets: np.ndarray, chest: int, body: Body
+) -> None:
     """Without collars: turn the chest towards the wrists that the arms are too short for."""
     meant, center = frames[:, chest].copy(), joints[:, chest]
     turn = np.broadcast_to(np.eye(3), meant.shape)
@@ -434,17 +563,29 @@ def _lean(joints: np.ndarray, frames: np.ndarray, targets: np.ndarray, chest: in
         for shoulder, elbow, wrist in ((16, 18, 20), (17, 19, 21)):
             arm = rotate(turn, joints[:, shoulder] - center)
             away = targets[:, wrist] - center - arm
-            short = np.linalg.norm(away, axis=-1, keepdims=True) - _REACH * (body.length(elbow) + body.length(wrist))
-            # A rotation vector that moves the shoulder by what is missing, as far as a turn about the chest can.
-            pull += np.cross(arm, np.maximum(short, 0.0) * normalised(away)) / (arm**2).sum(-1, keepdims=True)
+            short = np.linalg.norm(away, axis=-1, keepdims=True) - _REACH * (
+                body.length(elbow) + body.length(wrist)
+            )
+            # A rotation vector that moves the shoulder by what is missing, as far as a turn about
+            # the chest can.
+            pull += np.cross(arm, np.maximum(short, 0.0) * normalised(away)) / (arm**2).sum(
+                -1, keepdims=True
+            )
         turn = _limited(matrix_from_vector(pull) @ turn, _TRUNK_TURN)
     frames[:, chest] = turn @ meant
 
 
 def _shrug(
-    joints: np.ndarray, frames: np.ndarray, wrist: np.ndarray, collar: int, shoulder: int, kept: np.ndarray, reach: float,
+    joints: np.ndarray,
+    frames: np.ndarray,
+    wrist: np.ndarray,
+    collar: int,
+    shoulder: int,
+    kept: np.ndarray,
+    reach: float,
 ) -> None:
-    """Turn the collar until the wrist (T, 3) is ``kept`` (T, 1) away from the shoulder, which leaves the elbow as it is meant.
+    """Turn the collar until the wrist (T, 3) is ``kept`` (T, 1) away from the shoulder, which
+    leaves the elbow as it is meant.
 
     By a little only; by more where the arm, of length ``reach``, is too short.
     """
@@ -457,13 +598,21 @@ def _shrug(
             missing = np.maximum(away - reach, 0.0) if short else away - kept
             aim = at + missing * normalised(wrist - at) - joints[:, collar]
             asked = rotation_between(arm, aim)
-            turn = np.where(missing[..., None] > 0.0, _limited(asked, most), turn) if short else _limited(asked, most)
+            turn = (
+                np.where(missing[..., None] > 0.0, _limited(asked, most), turn)
+                if short
+                else _limited(asked, most)
+            )
     frames[:, collar] = turn @ meant
 
 
 def _standing(joints: np.ndarray) -> np.ndarray:
-    """How far (T,) a body stands on its straighter leg: 1 where that is straight, 0 where both are bent as in sitting."""
-    hips, knees, ankles = (joints[:, list(pair)] for pair in zip(LIMBS["left_leg"], LIMBS["right_leg"], strict=True))
+    """How far (T,) a body stands on its straighter leg: 1 where that is straight, 0 where both are
+    bent as in sitting.
+    """
+    hips, knees, ankles = (
+        joints[:, list(pair)] for pair in zip(LIMBS["left_leg"], LIMBS["right_leg"], strict=True)
+    )
     length = np.linalg.norm(knees - hips, axis=-1) + np.linalg.norm(ankles - knees, axis=-1)
     extended = (np.linalg.norm(ankles - hips, axis=-1) / length).max(axis=1)
     x = np.clip((extended - _SEATED) / (_STANDS - _SEATED), 0.0, 1.0)
@@ -471,12 +620,17 @@ def _standing(joints: np.ndarray) -> np.ndarray:
 
 
 def _bend(source: Motion, limb: str, first: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Unit directions (T, 3) in which a limb from ``first`` to ``target`` bends as the source's does."""
+    """Unit directions (T, 3) in which a limb from ``first`` to ``target`` bends as the source's
+    does.
+    """
     a, b, c = (source.joints[:, j] for j in LIMBS[limb])
     along, onward = normalised(c - a), normalised(target - first)
     offset = (b - a) - ((b - a) * along).sum(-1, keepdims=True) * along
     offset = offset / np.linalg.norm(b - a, axis=-1, keepdims=True)
     axis = rotate(source.frames[:, LIMBS[limb][0]], np.array(_AXIS[limb]))
-    hinge = rotate(rotation_between(axis, along), rotate(source.frames[:, LIMBS[limb][0]], np.array(_BEND[limb])))
+    hinge = rotate(
+        rotation_between(axis, along),
+        rotate(source.frames[:, LIMBS[limb][0]], np.array(_BEND[limb])),
+    )
     bend = rotate(rotation_between(along, onward), offset + _STRAIGHT * hinge)
     return normalised(bend - (bend * onward).sum(-1, keepdims=True) * onward, hinge)

@@ -1,7 +1,8 @@
 """The root: a frame on the ground under the pelvis that follows the body's heading.
 
-Root frame: x right, y forward, z up; yaw is counter-clockwise seen from above, 0 when forward is world +y. A path is
-``position`` (T, 3) with ``yaw`` (T,). The one smoothing of a path happens here, for training and for animators alike.
+Root frame: x right, y forward, z up; yaw is counter-clockwise seen from above, 0 when forward is
+world +y. A path is ``position`` (T, 3) with ``yaw`` (T,). The one smoothing of a path happens here,
+for training and for animators alike.
 """
 
 from dataclasses import dataclass
@@ -12,8 +13,18 @@ from .rotations import normalised, rotate, transpose, yaw_matrix
 from .skeleton import joint
 
 __all__ = [
-    "RootPath", "gaussian", "raw_root_from_joints", "root_from_joints", "root_from_matrices", "smoothed", "velocities",
-    "integrate", "to_root", "to_world", "AHEAD", "ahead",
+    "RootPath",
+    "gaussian",
+    "raw_root_from_joints",
+    "root_from_joints",
+    "root_from_matrices",
+    "smoothed",
+    "velocities",
+    "integrate",
+    "to_root",
+    "to_world",
+    "AHEAD",
+    "ahead",
 ]
 
 POSITION_SIGMA, YAW_SIGMA = 3.0, 6.0
@@ -24,7 +35,9 @@ AHEAD = (5, 10, 15, 20, 25, 30)
 
 @dataclass(frozen=True)
 class RootPath:
-    """``position`` (T, 3) metres in the world, z the height of the local floor; ``yaw`` (T,) radians, unwrapped."""
+    """``position`` (T, 3) metres in the world, z the height of the local floor; ``yaw`` (T,)
+    radians, unwrapped.
+    """
 
     position: np.ndarray
     yaw: np.ndarray
@@ -45,7 +58,9 @@ class RootPath:
 
 
 def gaussian(values: np.ndarray, sigma: float) -> np.ndarray:
-    """Gaussian smoothing along time; beyond its ends the path goes on as a point reflection, so straight lines stay."""
+    """Gaussian smoothing along time; beyond its ends the path goes on as a point reflection, so
+    straight lines stay.
+    """
     n = len(values)
     if n < 2:
         return values.copy()
@@ -61,13 +76,17 @@ def gaussian(values: np.ndarray, sigma: float) -> np.ndarray:
     return out.reshape(values.shape)
 
 
-def smoothed(path: RootPath, position_sigma: float = POSITION_SIGMA, yaw_sigma: float = YAW_SIGMA) -> RootPath:
+def smoothed(
+    path: RootPath, position_sigma: float = POSITION_SIGMA, yaw_sigma: float = YAW_SIGMA
+) -> RootPath:
     """The path smoothed once by Gaussians (standard deviations in 30-fps frames)."""
     return RootPath(gaussian(path.position, position_sigma), gaussian(path.yaw, yaw_sigma))
 
 
 def _held_yaw(forward: np.ndarray, certainty: np.ndarray) -> np.ndarray:
-    """Yaw of horizontal vectors; held where ``certainty`` is under 0.35, and limited to 15 degrees a frame."""
+    """Yaw of horizontal vectors; held where ``certainty`` is under 0.35, and limited to 15 degrees
+    a frame.
+    """
     yaw = np.arctan2(-forward[:, 0], forward[:, 1])
     good = certainty > 0.35
     if not good.any():
@@ -82,17 +101,25 @@ def _held_yaw(forward: np.ndarray, certainty: np.ndarray) -> np.ndarray:
 
 
 def raw_root_from_joints(joints: np.ndarray, floor: float = 0.0) -> RootPath:
-    """Root path of world joints (T, 22, 3), not smoothed: pelvis on the ground, heading from shoulders and hips.
+    """Root path of world joints (T, 22, 3), not smoothed: pelvis on the ground, heading from
+    shoulders and hips.
 
     Paper, section 4.1; the heading is held where shoulders and hips give none, as in lying.
     """
-    left_shoulder, right_shoulder = joints[:, joint("left_shoulder")], joints[:, joint("right_shoulder")]
+    left_shoulder, right_shoulder = (
+        joints[:, joint("left_shoulder")],
+        joints[:, joint("right_shoulder")],
+    )
     left_hip, right_hip = joints[:, joint("left_hip")], joints[:, joint("right_hip")]
-    across = normalised(normalised(left_shoulder - right_shoulder) + normalised(left_hip - right_hip))
+    across = normalised(
+        normalised(left_shoulder - right_shoulder) + normalised(left_hip - right_hip)
+    )
     forward = np.cross(across, [0.0, 0.0, 1.0])
     position = joints[:, 0].copy()
     position[:, 2] = floor
-    return RootPath(position.astype(float), _held_yaw(forward, np.linalg.norm(forward[:, :2], axis=-1)))
+    return RootPath(
+        position.astype(float), _held_yaw(forward, np.linalg.norm(forward[:, :2], axis=-1))
+    )
 
 
 def root_from_joints(joints: np.ndarray, floor: float = 0.0) -> RootPath:
@@ -101,7 +128,9 @@ def root_from_joints(joints: np.ndarray, floor: float = 0.0) -> RootPath:
 
 
 def root_from_matrices(matrices: np.ndarray) -> tuple[RootPath, float]:
-    """Path of an animator's root frames (T, 4, 4), flattened, not smoothed; and its largest tilt from upright (radians)."""
+    """Path of an animator's root frames (T, 4, 4), flattened, not smoothed; and its largest tilt
+    from upright (radians).
+    """
     up = normalised(matrices[:, :3, 2])
     forward = matrices[:, :3, 1]
     certainty = np.linalg.norm(normalised(forward)[:, :2], axis=-1)
@@ -114,7 +143,8 @@ def root_from_matrices(matrices: np.ndarray) -> tuple[RootPath, float]:
 
 
 def velocities(path: RootPath) -> np.ndarray:
-    """c_vel (T, 3): (right, forward) displacement in the previous root's frame, metres per frame, and the turn, radians.
+    """c_vel (T, 3): (right, forward) displacement in the previous root's frame, metres per frame,
+    and the turn, radians.
 
     The first frame, which has no previous one, is given no motion.
     """
@@ -126,9 +156,11 @@ def velocities(path: RootPath) -> np.ndarray:
 
 
 def ahead(path: RootPath) -> np.ndarray:
-    """Where the root will be (T, 18): right, forward (metres) and turn (radians) from R^τ to each of ``AHEAD`` frames later.
+    """Where the root will be (T, 18): right, forward (metres) and turn (radians) from R^τ to each
+    of ``AHEAD`` frames later.
 
-    Beyond its end the path goes on as it last moved. Not in the paper; in Blender the whole path is known.
+    Beyond its end the path goes on as it last moved. Not in the paper; in Blender the whole path is
+    known.
     """
     last, rest = len(path) - 1, max(AHEAD)
     step = path.position[-1:] - path.position[max(last - 1, 0)]
@@ -145,7 +177,9 @@ def ahead(path: RootPath) -> np.ndarray:
 
 
 def integrate(velocity: np.ndarray, position: np.ndarray, yaw: float) -> RootPath:
-    """The path that starts at ``position`` (3,), ``yaw`` and moves by ``velocity`` (T, 3); inverse of ``velocities``."""
+    """The path that starts at ``position`` (3,), ``yaw`` and moves by ``velocity`` (T, 3); inverse
+    of ``velocities``.
+    """
     angles = yaw + np.cumsum(velocity[:, 2])
     before = np.concatenate([[yaw], angles[:-1]])
     local = np.concatenate([velocity[:, :2], np.zeros((len(velocity), 1))], axis=1)

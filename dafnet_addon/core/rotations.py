@@ -1,23 +1,38 @@
-"""Rotation matrices and quaternions (w, x, y, z) as vectorised array functions; leading axes are free."""
+"""Rotation matrices and quaternions (w, x, y, z) as vectorised array functions; leading axes are
+free.
+"""
 
 import numpy as np
 
 __all__ = [
-    "normalised", "frame_from", "rotation_between", "rotate", "transpose", "yaw_matrix", "quaternion_from_matrix",
-    "matrix_from_quaternion", "matrix_from_vector", "continuous_signs", "slerp",
+    "normalised",
+    "frame_from",
+    "rotation_between",
+    "rotate",
+    "transpose",
+    "yaw_matrix",
+    "quaternion_from_matrix",
+    "matrix_from_quaternion",
+    "matrix_from_vector",
+    "continuous_signs",
+    "slerp",
     "smoothstep",
 ]
 
 
 def normalised(v: np.ndarray, fallback: np.ndarray | None = None) -> np.ndarray:
-    """Unit vectors along the last axis; where the length is under 1e-8, ``fallback`` (or zero) is given instead."""
+    """Unit vectors along the last axis; where the length is under 1e-8, ``fallback`` (or zero) is
+    given instead.
+    """
     length = np.linalg.norm(v, axis=-1, keepdims=True)
     unit = v / np.maximum(length, 1e-8)
     return unit if fallback is None else np.where(length > 1e-8, unit, fallback)
 
 
 def frame_from(primary: np.ndarray, secondary: np.ndarray, axes: str) -> np.ndarray:
-    """Right-handed frame (…, 3, 3), columns are axes: ``axes[0]`` exactly along ``primary``, ``axes[1]`` near ``secondary``."""
+    """Right-handed frame (…, 3, 3), columns are axes: ``axes[0]`` exactly along ``primary``,
+    ``axes[1]`` near ``secondary``.
+    """
     a, b = "xyz".index(axes[0]), "xyz".index(axes[1])
     c = 3 - a - b
     first = normalised(primary)
@@ -66,12 +81,15 @@ def quaternion_from_matrix(m: np.ndarray) -> np.ndarray:
     """Unit quaternions (…, 4), w x y z, of rotation matrices."""
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = (np.moveaxis(m[..., i, :], -1, 0) for i in range(3))
     # Four forms, one from each component; the longest is the one that does not divide by little.
-    candidates = np.stack([
-        np.stack([1 + xx + yy + zz, zy - yz, xz - zx, yx - xy], -1),
-        np.stack([zy - yz, 1 + xx - yy - zz, yx + xy, xz + zx], -1),
-        np.stack([xz - zx, yx + xy, 1 - xx + yy - zz, zy + yz], -1),
-        np.stack([yx - xy, xz + zx, zy + yz, 1 - xx - yy + zz], -1),
-    ], axis=-2)
+    candidates = np.stack(
+        [
+            np.stack([1 + xx + yy + zz, zy - yz, xz - zx, yx - xy], -1),
+            np.stack([zy - yz, 1 + xx - yy - zz, yx + xy, xz + zx], -1),
+            np.stack([xz - zx, yx + xy, 1 - xx + yy - zz, zy + yz], -1),
+            np.stack([yx - xy, xz + zx, zy + yz, 1 - xx - yy + zz], -1),
+        ],
+        axis=-2,
+    )
     best = np.argmax(np.linalg.norm(candidates, axis=-1), axis=-1)
     return normalised(np.take_along_axis(candidates, best[..., None, None], axis=-2)[..., 0, :])
 
@@ -79,11 +97,14 @@ def quaternion_from_matrix(m: np.ndarray) -> np.ndarray:
 def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
     """Rotation matrices (…, 3, 3) of quaternions, which need not be of unit length."""
     w, x, y, z = np.moveaxis(normalised(q), -1, 0)
-    return np.stack([
-        np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
-        np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
-        np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
-    ], axis=-2)
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
+            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
+            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
+        ],
+        axis=-2,
+    )
 
 
 def matrix_from_vector(vectors: np.ndarray) -> np.ndarray:
@@ -96,14 +117,18 @@ def matrix_from_vector(vectors: np.ndarray) -> np.ndarray:
 
 
 def continuous_signs(q: np.ndarray) -> np.ndarray:
-    """Flip signs along the first axis (time) so that neighbours lie on the same half of the sphere."""
+    """Flip signs along the first axis (time) so that neighbours lie on the same half of the
+    sphere.
+    """
     dots = (q[1:] * q[:-1]).sum(-1, keepdims=True)
     flips = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0)
     return np.concatenate([q[:1], q[1:] * flips])
 
 
 def slerp(a: np.ndarray, b: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Shortest spherical interpolation between quaternions; ``t`` in [0, 1] broadcasts against their leading axes."""
+    """Shortest spherical interpolation between quaternions; ``t`` in [0, 1] broadcasts against
+    their leading axes.
+    """
     t = np.asarray(t, dtype=float)[..., None]
     dot = (a * b).sum(-1, keepdims=True)
     b = np.where(dot < 0, -b, b)

@@ -1,7 +1,8 @@
 """Runs the two-part flow frame by frame, over NumPy or torch arrays alike.
 
-Everything that is known in advance (occupancy, velocity, observation) goes through its share of the first layers for all
-frames at once; only the recurrent part and the action predictor, which looks at the poses just made, are left per frame.
+Everything that is known in advance (occupancy, velocity, observation) goes through its share of the
+first layers for all frames at once; only the recurrent part and the action predictor, which looks
+at the poses just made, are left per frame.
 """
 
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
@@ -21,7 +22,16 @@ from .text import printable
 from .threads import one_thread
 from .weights import Weights
 
-__all__ = ["MOST_ACTIONS", "Conditions", "Made", "Sampler", "Unchanged", "model_order", "smpl_order", "velocities_up_to"]
+__all__ = [
+    "MOST_ACTIONS",
+    "Conditions",
+    "Made",
+    "Sampler",
+    "Unchanged",
+    "model_order",
+    "smpl_order",
+    "velocities_up_to",
+]
 
 Array = Any  # numpy.ndarray or torch.Tensor
 
@@ -32,7 +42,12 @@ _INVERSE = np.argsort(_ORDER)
 MOST_ACTIONS = 256
 """That a predictor may tell apart; the paper's has 10."""
 _SIZES = {
-    "actions": MOST_ACTIONS, "history": 120, "predictor_code": 4096, "predictor_width": 4096, "width": 4096, "layers": 8,
+    "actions": MOST_ACTIONS,
+    "history": 120,
+    "predictor_code": 4096,
+    "predictor_width": 4096,
+    "width": 4096,
+    "layers": 8,
     "code": 4096,
 }
 """The sizes of a model, and the largest that is run of each: several times those of the paper."""
@@ -55,18 +70,22 @@ def smpl_order(poses: np.ndarray) -> np.ndarray:
 
 
 def velocities_up_to(velocity: np.ndarray, history: int) -> np.ndarray:
-    """The last ``history`` velocities and the present one (T, 3 history + 3) of each frame; the first was so before."""
+    """The last ``history`` velocities and the present one (T, 3 history + 3) of each frame; the
+    first was so before.
+    """
     padded = np.concatenate([np.repeat(velocity[:1], history, axis=0), velocity])
     return np.concatenate([padded[k : k + len(velocity)] for k in range(history + 1)], axis=1)
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """What the model is told at each of T frames, 30 a second, in the target root's frame R^τ (paper, section 4.1).
+    """What the model is told at each of T frames, 30 a second, in the target root's frame R^τ
+    (paper, section 4.1).
 
-    ``velocity`` (T, 3): c_vel, metres and radians per frame. ``ahead`` (T, 18): where the root will be (``root.ahead``), for
-    models that are told. ``occupancy`` (T, 2640): c_env. ``observation`` (T, 66): c_ob, positions in metres in the model's
-    order; what is not ``given`` (T, 22) is ignored.
+    ``velocity`` (T, 3): c_vel, metres and radians per frame. ``ahead`` (T, 18): where the root will
+    be (``root.ahead``), for models that are told. ``occupancy`` (T, 2640): c_env. ``observation``
+    (T, 66): c_ob, positions in metres in the model's order; what is not ``given`` (T, 22) is
+    ignored.
     """
 
     velocity: np.ndarray
@@ -84,8 +103,8 @@ class Conditions:
 
 
 class Unchanged(NamedTuple):
-    """How a shot's conditions would go on at a few frames from ``start`` on if the mode had not changed there: ``observation``
-    (M, 66) and what of it is ``given`` (M, 22).
+    """How a shot's conditions would go on at a few frames from ``start`` on if the mode had not
+    changed there: ``observation`` (M, 66) and what of it is ``given`` (M, 22).
     """
 
     start: int
@@ -94,9 +113,10 @@ class Unchanged(NamedTuple):
 
 
 class Made(NamedTuple):
-    """What a run makes of B takes: ``poses`` (T, B, 66) in SMPL order, metres; ``actions`` (T, B, K): probabilities;
-    ``log_likelihood`` (T, B): log p of each standardised pose after those before it, nats; ``unchanged`` (M, B, 66): the poses
-    of the frames of each ``Unchanged``, one after another.
+    """What a run makes of B takes: ``poses`` (T, B, 66) in SMPL order, metres; ``actions`` (T, B,
+    K): probabilities; ``log_likelihood`` (T, B): log p of each standardised pose after those before
+    it, nats; ``unchanged`` (M, B, 66): the poses of the frames of each ``Unchanged``, one after
+    another.
     """
 
     poses: np.ndarray
@@ -106,44 +126,69 @@ class Made(NamedTuple):
 
 
 def _unusable(weights: Weights, what: str) -> WeightsError:
-    return WeightsError(f"The weights '{weights.path}' cannot be used: {what}; choose another file.")
+    return WeightsError(
+        f"The weights '{weights.path}' cannot be used: {what}; choose another file."
+    )
 
 
 def _sizes(weights: Weights, systems: tuple[str, ...], parts: Iterable[str]) -> dict[str, int]:
-    """The sizes of a model of these parts by name, checked: of these systems, this skeleton and frame rate, none too large."""
+    """The sizes of a model of these parts by name, checked: of these systems, this skeleton and
+    frame rate, none too large.
+    """
     config: dict[str, Any] = weights.config
     model = config.get("model")
     if not isinstance(model, dict):
         raise _unusable(weights, "they do not say how their model is built ('model')")
     system = model.get("system", "dafnet")
     if system not in systems:
-        raise _unusable(weights, f"they are of the system '{printable(system, 40)}', which only 'dafnet evaluate' runs")
+        raise _unusable(
+            weights,
+            f"they are of the system '{printable(system, 40)}', which only 'dafnet evaluate' runs",
+        )
 
     def said(name: str, accepts: Callable[[Any], bool], wanted: str, default: Any = None) -> Any:
         value = model.get(name, default)
         if not accepts(value):
-            raise _unusable(weights, f"'{name}' of their model is {printable(value, 40)}, not {wanted}")
+            raise _unusable(
+                weights, f"'{name}' of their model is {printable(value, 40)}, not {wanted}"
+            )
         return value
 
     def size(name: str, most: int) -> int:
-        return said(name, lambda value: type(value) is int and 0 < value <= most, f"a whole number from 1 to {most}")
+        return said(
+            name,
+            lambda value: type(value) is int and 0 < value <= most,
+            f"a whole number from 1 to {most}",
+        )
 
     largest = _SIZES | {f"steps_{part}": _MOST_STEPS for part in parts}
     sizes = {name: size(name, most) for name, most in largest.items()}
     foresight = 3 * len(AHEAD)
-    sizes["ahead"] = said("ahead", lambda value: type(value) is int and value in (0, foresight), f"0 or {foresight}", 0)
+    sizes["ahead"] = said(
+        "ahead",
+        lambda value: type(value) is int and value in (0, foresight),
+        f"0 or {foresight}",
+        0,
+    )
     for name in ("mask", "shared_encoder"):
         said(name, lambda value: isinstance(value, bool), "true or false")
     said(
-        "action_temperature", lambda value: type(value) in (int, float) and 1e-3 < value < 1e3, "a number from 0.001 to 1000",
+        "action_temperature",
+        lambda value: type(value) in (int, float) and 1e-3 < value < 1e3,
+        "a number from 0.001 to 1000",
     )
     try:
         offsets = shaped(config.get("offsets"), "offsets", OFFSETS.shape)
     except InputError:
         offsets = np.zeros(OFFSETS.shape)
-    for name, fits in (("fps", config.get("fps") == 30), ("offsets", np.allclose(offsets, OFFSETS))):
+    for name, fits in (
+        ("fps", config.get("fps") == 30),
+        ("offsets", np.allclose(offsets, OFFSETS)),
+    ):
         if not fits:
-            raise _unusable(weights, f"they were made for another skeleton or frame rate ('{name}')")
+            raise _unusable(
+                weights, f"they were made for another skeleton or frame rate ('{name}')"
+            )
     return sizes
 
 
@@ -153,26 +198,49 @@ def _sigmoid(xp: ModuleType, x: Array) -> Array:
 
 @dataclass
 class _Layer:
-    """One LSTM layer: ``matrix`` (inputs + width, 4 · width) for [input, hidden]; ``bias`` (4 · width,)."""
+    """One LSTM layer: ``matrix`` (inputs + width, 4 · width) for [input, hidden]; ``bias`` (4 ·
+    width,).
+    """
 
     matrix: Array
     bias: Array
 
 
 class _Coupling:
-    """The recurrent net of one affine coupling, its first layer split into what is known in advance and what is not."""
+    """The recurrent net of one affine coupling, its first layer split into what is known in advance
+    and what is not.
+    """
 
-    def __init__(self, xp: ModuleType, static: Array, layers: list[_Layer], out: Array, out_bias: Array, width: int) -> None:
-        self.xp, self.static, self.layers, self.out, self.out_bias, self.width = xp, static, layers, out, out_bias, width
+    def __init__(
+        self,
+        xp: ModuleType,
+        static: Array,
+        layers: list[_Layer],
+        out: Array,
+        out_bias: Array,
+        width: int,
+    ) -> None:
+        self.xp, self.static, self.layers, self.out, self.out_bias, self.width = (
+            xp,
+            static,
+            layers,
+            out,
+            out_bias,
+            width,
+        )
         self.state: list[tuple[Array, Array]] = []
         self.known: Array = None
 
     def __call__(self, frame: int, fresh: Array) -> tuple[Array, Array]:
-        """Shift and scale (B, n) from the frame's known share and its ``fresh`` inputs (B, m); advances the state."""
+        """Shift and scale (B, n) from the frame's known share and its ``fresh`` inputs (B, m);
+        advances the state.
+        """
         xp, x = self.xp, fresh
         for i, layer in enumerate(self.layers):
             hidden, cell = self.state[i]
-            gates = xp.concatenate([x, hidden], axis=-1) @ layer.matrix + (self.known[frame] if i == 0 else layer.bias)
+            gates = xp.concatenate([x, hidden], axis=-1) @ layer.matrix + (
+                self.known[frame] if i == 0 else layer.bias
+            )
             w = self.width
             opened = _sigmoid(xp, gates[:, : 2 * w])
             cell = opened[:, w:] * cell + opened[:, :w] * xp.tanh(gates[:, 2 * w : 3 * w])
@@ -185,7 +253,9 @@ class _Coupling:
 
 @dataclass
 class _Step:
-    """A flow step; its activation norm and invertible linear are one affine map: y = x · matrix + offset."""
+    """A flow step; its activation norm and invertible linear are one affine map: y = x · matrix +
+    offset.
+    """
 
     coupling: _Coupling
     matrix: Array
@@ -198,8 +268,8 @@ class _Step:
 
 @dataclass
 class _Part:
-    """One part's place in a pose and those of the parts made before it, its flow steps, and its environment encoders: one for
-    all steps, or one each.
+    """One part's place in a pose and those of the parts made before it, its flow steps, and its
+    environment encoders: one for all steps, or one each.
     """
 
     columns: slice
@@ -211,9 +281,10 @@ class _Part:
 class Sampler:
     """The model of one weights file, ready to run on one array library.
 
-    ``device`` is None for NumPy, else a torch device ('cpu', 'cuda', …). ``dtype``: 'float32' or 'float64'. Raises
-    WeightsError where the file does not describe a model of this skeleton and frame rate, lacks a tensor or has one of the
-    wrong shape, or has a matrix that cannot be inverted.
+    ``device`` is None for NumPy, else a torch device ('cpu', 'cuda', …). ``dtype``: 'float32' or
+    'float64'. Raises WeightsError where the file does not describe a model of this skeleton and
+    frame rate, lacks a tensor or has one of the wrong shape, or has a matrix that cannot be
+    inverted.
     """
 
     systems: tuple[str, ...] = ("dafnet",)
@@ -237,14 +308,21 @@ class Sampler:
         def array(name: str, *shape: int) -> np.ndarray:
             found = weights.require(name, shape).astype(np.float64)
             if found.size and np.abs(found).max() > _LARGEST:
-                raise _unusable(weights, f"'{name}' holds {np.abs(found).max():.0e}, which no training gives")
+                raise _unusable(
+                    weights, f"'{name}' holds {np.abs(found).max():.0e}, which no training gives"
+                )
             return found
 
-        self.pose_mean, self.pose_std = array("pose_mean", _POSE_SIZE), array("pose_std", _POSE_SIZE)
+        self.pose_mean, self.pose_std = (
+            array("pose_mean", _POSE_SIZE),
+            array("pose_std", _POSE_SIZE),
+        )
         self.velocity_mean, self.velocity_std = array("velocity_mean", 3), array("velocity_std", 3)
         self.ahead = c["ahead"]
         told = ("ahead_mean", "ahead_std")
-        self.ahead_mean, self.ahead_std = (array(name, self.ahead) if self.ahead else np.zeros(0) for name in told)
+        self.ahead_mean, self.ahead_std = (
+            array(name, self.ahead) if self.ahead else np.zeros(0) for name in told
+        )
         for name in ("pose_std", "velocity_std", "ahead_std"):
             if getattr(self, name).min(initial=1.0) < 1e-6:
                 raise _unusable(weights, f"'{name}' is not positive")
@@ -256,23 +334,32 @@ class Sampler:
                 self._spread[columns, columns] = array(f"{name}.spread", size, size)
         self._read_told(array, c)
         places = list(self.parts.values())
-        self._parts = [self._part(array, name, places[: i + 1], shared, c) for i, name in enumerate(self.parts)]
+        self._parts = [
+            self._part(array, name, places[: i + 1], shared, c) for i, name in enumerate(self.parts)
+        ]
         self._as_pose = sorted(range(len(places)), key=lambda i: places[i].start)
         """Which part, counted in the order of sampling, stands where in a pose."""
 
     def _read_told(self, array: Any, c: dict[str, int]) -> None:
-        """What turns the scene feature s into what each coupling's net is told of it: here, the action predictor."""
+        """What turns the scene feature s into what each coupling's net is told of it: here, the
+        action predictor.
+        """
         poses = self.history * _POSE_SIZE
         scene = poses + 3 * (self.history + 1)
         width, code = c["predictor_width"], c["predictor_code"]
         self._predictor_environment = self._linear(array, "predictor.environment", 2640, code)
         first = array("predictor.layers.0.weight", width, scene + code)
         self._predictor_past = self._to(first[:, :poses].T)
-        self._predictor_known = self._to(first[:, poses:].T), self._to(array("predictor.layers.0.bias", width))
+        self._predictor_known = (
+            self._to(first[:, poses:].T),
+            self._to(array("predictor.layers.0.bias", width)),
+        )
         self._predictor_second = self._linear(array, "predictor.layers.2", width, width)
         self._predictor_out = self._linear(array, "predictor.layers.4", width, self.actions)
         self.fresh, self.moving = self.actions, 3 + self.ahead
-        """Numbers that the nets are told at each frame anew, and that they are told of the root's way."""
+        """Numbers that the nets are told at each frame anew, and that they are told of the root's
+        way.
+        """
 
     def _to(self, a: np.ndarray) -> Array:
         if self.device is None:
@@ -283,20 +370,28 @@ class Sampler:
         return a if self.device is None else a.cpu().numpy()
 
     def _linear(self, array: Any, name: str, inputs: int, outputs: int) -> tuple[Array, Array]:
-        return self._to(array(f"{name}.weight", outputs, inputs).T), self._to(array(f"{name}.bias", outputs))
+        return self._to(array(f"{name}.weight", outputs, inputs).T), self._to(
+            array(f"{name}.bias", outputs)
+        )
 
-    def _part(self, array: Any, part: str, places: list[slice], shared: bool, c: dict[str, int]) -> _Part:
+    def _part(
+        self, array: Any, part: str, places: list[slice], shared: bool, c: dict[str, int]
+    ) -> _Part:
         *before, columns = places
         steps = c[f"steps_{part}"]
         encoders = [
-            (self._linear(array, f"{part}.encoders.{e}.first", 2640, c["code"]),
-             self._linear(array, f"{part}.encoders.{e}.second", c["code"], c["code"]))
+            (
+                self._linear(array, f"{part}.encoders.{e}.first", 2640, c["code"]),
+                self._linear(array, f"{part}.encoders.{e}.second", c["code"], c["code"]),
+            )
             for e in range(1 if shared else steps)
         ]
         made = [self._step(array, f"{part}.{k}", columns, before, c) for k in range(steps)]
         return _Part(columns, before, encoders, made)
 
-    def _step(self, array: Any, name: str, columns: slice, before: list[slice], c: dict[str, int]) -> _Step:
+    def _step(
+        self, array: Any, name: str, columns: slice, before: list[slice], c: dict[str, int]
+    ) -> _Step:
         size = columns.stop - columns.start
         half, width = size // 2, c["width"]
         observed = _POSE_SIZE + (22 if self.mask else 0)
@@ -314,30 +409,50 @@ class Sampler:
             inputs = half + condition if i == 0 else width
             into = array(f"{name}.lstm.weight_ih_l{i}", 4 * width, inputs).T
             back = array(f"{name}.lstm.weight_hh_l{i}", 4 * width, width).T
-            total = array(f"{name}.lstm.bias_ih_l{i}", 4 * width) + array(f"{name}.lstm.bias_hh_l{i}", 4 * width)
+            total = array(f"{name}.lstm.bias_ih_l{i}", 4 * width) + array(
+                f"{name}.lstm.bias_hh_l{i}", 4 * width
+            )
             if i == 0:
-                # Rows of the input: half a pose, actions, velocity and way ahead, observation (upper part first), mask, code.
+                # Rows of the input: half a pose, actions, velocity and way ahead, observation
+                # (upper part first), mask, code.
                 slots = half + self.fresh + self.moving + np.arange(_POSE_SIZE)
                 # The observation's slots of the parts made before are those parts: known only now.
-                rows = np.concatenate([np.arange(half + self.fresh), *(slots[made] for made in before)])
+                rows = np.concatenate(
+                    [np.arange(half + self.fresh), *(slots[made] for made in before)]
+                )
                 known = np.setdiff1d(np.arange(inputs), rows)
                 static = self._to(np.concatenate([into[known], total[None]]))
                 into = into[rows]
             layers.append(_Layer(self._to(np.concatenate([into, back])), self._to(total)))
         out = self._to(array(f"{name}.out.weight", 2 * (size - half), width).T)
-        coupling = _Coupling(self.xp, static, layers, out, self._to(array(f"{name}.out.bias", 2 * (size - half))), width)
+        coupling = _Coupling(
+            self.xp,
+            static,
+            layers,
+            out,
+            self._to(array(f"{name}.out.bias", 2 * (size - half))),
+            width,
+        )
         return _Step(
             coupling,
-            self._to((weight * exponent).T), self._to((bias * exponent) @ weight.T),
-            self._to(inverse.T / exponent), self._to(-bias), float(log_scale.sum() + np.linalg.slogdet(weight)[1]), half,
+            self._to((weight * exponent).T),
+            self._to((bias * exponent) @ weight.T),
+            self._to(inverse.T / exponent),
+            self._to(-bias),
+            float(log_scale.sum() + np.linalg.slogdet(weight)[1]),
+            half,
         )
 
     def noise(
-        self, seed: int, lower_seed: int | None = None, temperature: float = 1.0, lower_temperature: float | None = None,
+        self,
+        seed: int,
+        lower_seed: int | None = None,
+        temperature: float = 1.0,
+        lower_temperature: float | None = None,
     ) -> np.ndarray:
-        """A take's noise vector (1, 66), upper part first, held constant; each part has a seed (0 or more) and, if wished, a
-        temperature of its own, so legs vary under one trunk. At temperature 1 takes differ as captured ones do, where the
-        weights say how far those do.
+        """A take's noise vector (1, 66), upper part first, held constant; each part has a seed (0
+        or more) and, if wished, a temperature of its own, so legs vary under one trunk. At
+        temperature 1 takes differ as captured ones do, where the weights say how far those do.
         """
         seeds = (seed, 0, _UPPER_SIZE), (seed if lower_seed is None else lower_seed, 1, _LOWER_SIZE)
         drawn = [np.random.default_rng([s, part]).standard_normal(size) for s, part, size in seeds]
@@ -354,7 +469,9 @@ class Sampler:
         drained(self.start_steps(conditions, takes))
 
     def start_steps(self, conditions: Conditions, takes: int = 1) -> Generator[float, None, None]:
-        """Bring in the conditions of a whole shot and forget all memory; the past is the mean pose. Yields progress."""
+        """Bring in the conditions of a whole shot and forget all memory; the past is the mean pose.
+        Yields progress.
+        """
         xp, frames = self.xp, len(conditions)
         velocity = (conditions.velocity - self.velocity_mean) / self.velocity_std
         window = velocities_up_to(velocity, self.history)
@@ -364,11 +481,14 @@ class Sampler:
         yield 0.0
 
         given = np.repeat(conditions.given, 3, axis=-1)
-        observation = np.where(given > 0, (conditions.observation - self.pose_mean) / self.pose_std, 0.0)
+        observation = np.where(
+            given > 0, (conditions.observation - self.pose_mean) / self.pose_std, 0.0
+        )
         one = self._to(np.ones((frames, 1)))
         empty = self._to(np.zeros((takes, self.width)))
         for part in self._parts:
-            made = np.zeros(_POSE_SIZE, bool)  # of the pose, by the parts before: given, and told at each frame
+            # of the pose, by the parts before: given, and told at each frame
+            made = np.zeros(_POSE_SIZE, bool)
             for columns in part.before:
                 made[columns] = True
             mask = [np.where(made[::3], 1.0, conditions.given)] if self.mask else []
@@ -386,9 +506,11 @@ class Sampler:
         self._past = self._to(np.zeros((takes, self.history * _POSE_SIZE)))
 
     def _told_ahead(self, window: np.ndarray, moving: np.ndarray, occupancy: Array) -> Array:
-        """What the nets are told of the root's way (T, n), all frames at once; brings in what ``_told`` needs.
+        """What the nets are told of the root's way (T, n), all frames at once; brings in what
+        ``_told`` needs.
 
-        ``window`` (T, 33): velocities up to now; ``moving`` (T, 3 [+ 18]): the last of them, and the way ahead.
+        ``window`` (T, 33): velocities up to now; ``moving`` (T, 3 [+ 18]): the last of them, and
+        the way ahead.
         """
         matrix, bias = self._predictor_environment
         known, known_bias = self._predictor_known
@@ -397,11 +519,15 @@ class Sampler:
         return self._to(moving)
 
     def _told(self, frame: int) -> Array:
-        """Action probabilities π (B, K) of a frame from the poses just made (paper, section 4.2)."""
+        """Action probabilities π (B, K) of a frame from the poses just made (paper, section
+        4.2).
+        """
         xp = self.xp
         x = self._past @ self._predictor_past + self._predictor_ahead[frame]
         x = (x * (x > 0)) @ self._predictor_second[0] + self._predictor_second[1]
-        x = ((x * (x > 0)) @ self._predictor_out[0] + self._predictor_out[1]) / self.action_temperature
+        x = (
+            (x * (x > 0)) @ self._predictor_out[0] + self._predictor_out[1]
+        ) / self.action_temperature
         x = xp.exp(x - xp.amax(x, -1)[:, None])
         return x / x.sum(-1)[:, None]
 
@@ -409,8 +535,9 @@ class Sampler:
         self._past = self.xp.concatenate([self._past[:, _POSE_SIZE:], pose], axis=-1)
 
     def frame(self, index: int, noise: Array) -> tuple[Array, Array, Array]:
-        """Standardised pose (B, 66) of the next frame, part after part, from ``noise`` (B, 66); what the nets were told,
-        action probabilities (B, K); and the log-determinant (B,) of the way from pose to noise.
+        """Standardised pose (B, 66) of the next frame, part after part, from ``noise`` (B, 66);
+        what the nets were told, action probabilities (B, K); and the log-determinant (B,) of the
+        way from pose to noise.
         """
         xp = self.xp
         told = self._told(index)
@@ -429,8 +556,11 @@ class Sampler:
         self._remember(pose)
         return pose, told, log_det
 
-    def absorb(self, index: int, pose: Array, told: Array | None = None) -> tuple[Array, Array, Array]:
-        """Noise (B, 66), action probabilities (B, K) and log-determinant (B,) of a kept frame: pose to noise.
+    def absorb(
+        self, index: int, pose: Array, told: Array | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Noise (B, 66), action probabilities (B, K) and log-determinant (B,) of a kept frame: pose
+        to noise.
 
         This rebuilds the memory to go on from. ``told`` stand in for the predictor's probabilities.
         """
@@ -442,7 +572,9 @@ class Sampler:
             for step in part.steps:
                 x = x @ step.matrix + step.offset
                 passed = x[:, : step.half]
-                shift, scale = step.coupling(index, xp.concatenate([passed, told, *before], axis=-1))
+                shift, scale = step.coupling(
+                    index, xp.concatenate([passed, told, *before], axis=-1)
+                )
                 x = xp.concatenate([passed, (x[:, step.half :] + shift) * scale], axis=-1)
                 log_det = log_det + xp.log(scale).sum(-1) + step.log_det
             noise.append(x)
@@ -450,16 +582,21 @@ class Sampler:
         return xp.concatenate([noise[i] for i in self._as_pose], axis=-1), told, log_det
 
     def run(
-        self, conditions: Conditions, z: np.ndarray, kept: np.ndarray | None = None,
-        watch: Callable[[int, np.ndarray], None] | None = None, unchanged: Sequence[Unchanged] = (),
+        self,
+        conditions: Conditions,
+        z: np.ndarray,
+        kept: np.ndarray | None = None,
+        watch: Callable[[int, np.ndarray], None] | None = None,
+        unchanged: Sequence[Unchanged] = (),
     ) -> Generator[float, None, Made]:
         """Make every frame of B takes; yields progress in [0, 1].
 
-        ``z`` (B, 66): one noise vector a take, upper part first, held constant. ``kept`` (N, B, 66), SMPL order, metres: the
-        first N frames as they are to stay; the model goes on from them, its noise passing over ten frames from the one that
-        the last kept pose is made of to ``z``, so that nothing jumps. ``watch`` is shown each frame of the first take as it
-        is made: its index and pose (66,) as above. ``unchanged``: stretches to be made besides, as the run would go on. Raises
-        WeightsError where the poses are no body's.
+        ``z`` (B, 66): one noise vector a take, upper part first, held constant. ``kept`` (N, B,
+        66), SMPL order, metres: the first N frames as they are to stay; the model goes on from
+        them, its noise passing over ten frames from the one that the last kept pose is made of to
+        ``z``, so that nothing jumps. ``watch`` is shown each frame of the first take as it is made:
+        its index and pose (66,) as above. ``unchanged``: stretches to be made besides, as the run
+        would go on. Raises WeightsError where the poses are no body's.
         """
         noise = self._to(z)
         yield from within(self.start_steps(conditions, takes=len(z)), 0.0, 0.0)
@@ -474,7 +611,8 @@ class Sampler:
                     for pose in self._aside(conditions, stretch, now):
                         aside.append(pose)
                         yield t / len(conditions)
-            # Frame by frame: whoever drains this generator has the threads back in between. Poses are judged below.
+            # Frame by frame: whoever drains this generator has the threads back in between. Poses
+            # are judged below.
             with one_thread(), np.errstate(over="ignore", invalid="ignore"):
                 if t < first:
                     pose = known[t]
@@ -488,19 +626,36 @@ class Sampler:
             if watch is not None:
                 watch(t, self._judged(self._metres(self._from(pose[:1])))[0])
             yield (t + 1) / len(conditions)
-        stacked, told, density = (self._from(self.xp.stack(each)).astype(np.float64) for each in (poses, actions, densities))
-        others = self._from(self.xp.stack(aside)).astype(np.float64) if aside else np.zeros((0, *z.shape))
-        return Made(self._judged(self._metres(stacked)), told, density, self._judged(self._metres(others)))
+        stacked, told, density = (
+            self._from(self.xp.stack(each)).astype(np.float64)
+            for each in (poses, actions, densities)
+        )
+        others = (
+            self._from(self.xp.stack(aside)).astype(np.float64)
+            if aside
+            else np.zeros((0, *z.shape))
+        )
+        return Made(
+            self._judged(self._metres(stacked)), told, density, self._judged(self._metres(others))
+        )
 
     def _aside(self, conditions: Conditions, stretch: Unchanged, noise: Array) -> Iterator[Array]:
-        """Standardised poses (B, 66) of the stretch, from the memory as it is now, which stays so."""
+        """Standardised poses (B, 66) of the stretch, from the memory as it is now, which stays
+        so.
+        """
         other = copy(self)
         other._parts = [
-            replace(part, steps=[replace(step, coupling=copy(step.coupling)) for step in part.steps]) for part in self._parts
+            replace(
+                part, steps=[replace(step, coupling=copy(step.coupling)) for step in part.steps]
+            )
+            for part in self._parts
         ]
         begin, stop = max(0, stretch.start - self.history), stretch.start + len(stretch.given)
         there = conditions.between(begin, stop)
-        there.observation[stretch.start - begin :], there.given[stretch.start - begin :] = stretch.observation, stretch.given
+        there.observation[stretch.start - begin :], there.given[stretch.start - begin :] = (
+            stretch.observation,
+            stretch.given,
+        )
         other.start(there, takes=len(noise))
         other._past = self._past
         for part, own in zip(self._parts, other._parts, strict=True):
@@ -514,7 +669,9 @@ class Sampler:
     def _judged(self, poses: np.ndarray) -> np.ndarray:
         """Poses in metres. Raises WeightsError where they are no body's."""
         if not (np.abs(poses) < _FARTHEST).all():
-            raise _unusable(self.weights, "their poses are no numbers, or farther than 100 metres from the root")
+            raise _unusable(
+                self.weights, "their poses are no numbers, or farther than 100 metres from the root"
+            )
         return poses
 
     def _metres(self, poses: np.ndarray) -> np.ndarray:

@@ -1,20 +1,52 @@
 """The canonical body: 22 joints in SMPL order, its bone lengths, and its upper and lower parts.
 
-Frame of the rest pose: x right, y forward, z up, metres, the pelvis above the origin. The proportions are this project's
-own, rounded from the medians of the training sources; other statures are made by scaling.
+Frame of the rest pose: x right, y forward, z up, metres, the pelvis above the origin. The
+proportions are this project's own, rounded from the medians of the training sources; other statures
+are made by scaling.
 """
 
 import numpy as np
 
 __all__ = [
-    "JOINTS", "PARENTS", "UPPER", "LOWER", "MODEL_ORDER", "MIRROR", "END_EFFECTORS", "OFFSETS", "REST", "STANDING_PELVIS",
-    "TOE_HEIGHT", "STATURE", "SEAT_TO_PELVIS", "joint",
+    "JOINTS",
+    "PARENTS",
+    "UPPER",
+    "LOWER",
+    "MODEL_ORDER",
+    "MIRROR",
+    "END_EFFECTORS",
+    "OFFSETS",
+    "REST",
+    "STANDING_PELVIS",
+    "TOE_HEIGHT",
+    "STATURE",
+    "SEAT_TO_PELVIS",
+    "joint",
 ]
 
 JOINTS = (
-    "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle", "spine3",
-    "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder", "right_shoulder",
-    "left_elbow", "right_elbow", "left_wrist", "right_wrist",
+    "pelvis",
+    "left_hip",
+    "right_hip",
+    "spine1",
+    "left_knee",
+    "right_knee",
+    "spine2",
+    "left_ankle",
+    "right_ankle",
+    "spine3",
+    "left_foot",
+    "right_foot",
+    "neck",
+    "left_collar",
+    "right_collar",
+    "head",
+    "left_shoulder",
+    "right_shoulder",
+    "left_elbow",
+    "right_elbow",
+    "left_wrist",
+    "right_wrist",
 )
 PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19)
 UPPER = (0, 3, 6, 9, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21)
@@ -43,10 +75,19 @@ MIRROR = tuple(joint(_swap(name)) for name in JOINTS)
 """Joint order of the body seen in a mirror."""
 
 _HALF = {  # parent to joint, left side written once; the rest pose is a T-pose
-    "spine1": (0, -0.02, 0.11), "spine2": (0, 0.0, 0.13), "spine3": (0, 0.01, 0.09), "neck": (0, -0.02, 0.20),
-    "head": (0, 0.03, 0.09), "left_collar": (-0.06, -0.01, 0.12), "left_shoulder": (-0.12, -0.01, 0.03),
-    "left_elbow": (-0.26, 0, 0), "left_wrist": (-0.25, 0, 0), "left_hip": (-0.09, 0, -0.07), "left_knee": (0, 0, -0.41),
-    "left_ankle": (0, 0, -0.41), "left_foot": (-0.02, 0.13, -0.06),
+    "spine1": (0, -0.02, 0.11),
+    "spine2": (0, 0.0, 0.13),
+    "spine3": (0, 0.01, 0.09),
+    "neck": (0, -0.02, 0.20),
+    "head": (0, 0.03, 0.09),
+    "left_collar": (-0.06, -0.01, 0.12),
+    "left_shoulder": (-0.12, -0.01, 0.03),
+    "left_elbow": (-0.26, 0, 0),
+    "left_wrist": (-0.25, 0, 0),
+    "left_hip": (-0.09, 0, -0.07),
+    "left_knee": (0, 0, -0.41),
+    "left_ankle": (0, 0, -0.41),
+    "left_foot": (-0.02, 0.13, -0.06),
 }
 
 
@@ -54,7 +95,9 @@ def _offsets() -> np.ndarray:
     table = np.zeros((22, 3))
     for name, offset in _HALF.items():
         table[joint(name)] = offset
-        table[joint(_swap(name))] = np.where([name.startswith("left_"), False, False], -1.0, 1.0) * offset
+        table[joint(_swap(name))] = (
+            np.where([name.startswith("left_"), False, False], -1.0, 1.0) * offset
+        )
     return table
 
 

@@ -1,6 +1,7 @@
 """Furniture as the core sees it: boxes, triangle meshes, and the scene that holds them.
 
-Each checks what it is made of (``InputError``), takes lists for arrays, and holds arrays from then on.
+Each checks what it is made of (``InputError``), takes lists for arrays, and holds arrays from then
+on.
 """
 
 from dataclasses import dataclass, field
@@ -20,11 +21,14 @@ __all__ = ["Box", "Mesh", "Scene", "box_distance"]
 
 _UNTRUE = 1e-3  # of an affine matrix: how far its last row may be from 0 0 0 1
 
+
 @dataclass(frozen=True)
 class Box:
-    """A solid box: ``center`` (3,), ``half_size`` (3,), ``rotation`` (3, 3) whose columns are the box's axes; world, metres.
+    """A solid box: ``center`` (3,), ``half_size`` (3,), ``rotation`` (3, 3) whose columns are the
+    box's axes; world, metres.
 
-    A moving box has ``center`` (T, 3) and ``rotation`` (T, 3, 3), one for each frame of the controls.
+    A moving box has ``center`` (T, 3) and ``rotation`` (T, 3, 3), one for each frame of the
+    controls.
     """
 
     center: np.ndarray
@@ -41,13 +45,23 @@ class Box:
         rotation = shaped(self.rotation, f"The rotation {whose}", (3, 3), (-1, 3, 3))
         hold("center", inside(center, f"The center {whose}", FARTHEST))
         hold("half_size", inside(half_size, f"The half_size {whose}", FARTHEST))
-        hold("rotation", rotations(inside(rotation, f"The rotation {whose}", FARTHEST), f"The rotation {whose}"))
+        hold(
+            "rotation",
+            rotations(inside(rotation, f"The rotation {whose}", FARTHEST), f"The rotation {whose}"),
+        )
         if (half_size < 0).any():
-            raise InputError(f"The half_size {whose} is negative; give half its length, width and height in metres.")
-        frames = [len(center) if center.ndim == 2 else 1, len(rotation) if rotation.ndim == 3 else 1]
+            raise InputError(
+                f"The half_size {whose} is negative; give half its length, width and height in "
+                "metres."
+            )
+        frames = [
+            len(center) if center.ndim == 2 else 1,
+            len(rotation) if rotation.ndim == 3 else 1,
+        ]
         if 0 in frames or len({*frames} - {1}) > 1:
             raise InputError(
-                f"The center and rotation {whose} have {frames[0]} and {frames[1]} frames; give one of each, or one a frame."
+                f"The center and rotation {whose} have {frames[0]} and {frames[1]} frames; give "
+                "one of each, or one a frame."
             )
 
     def matrices(self) -> np.ndarray:
@@ -61,10 +75,12 @@ class Box:
 
 @dataclass(frozen=True)
 class Mesh:
-    """A triangle mesh: ``vertices`` (V, 3), ``triangles`` (F, 3), ``matrix`` (4, 4) or (T, 4, 4) from its space to the world.
+    """A triangle mesh: ``vertices`` (V, 3), ``triangles`` (F, 3), ``matrix`` (4, 4) or (T, 4, 4)
+    from its space to the world.
 
-    The mesh may be open, thin, in several parts, mirrored or scaled without uniformity. ``grid`` is its distance field where
-    the caller has one already, in the space that ``distance.rigid_split`` describes; else it is built when first needed.
+    The mesh may be open, thin, in several parts, mirrored or scaled without uniformity. ``grid`` is
+    its distance field where the caller has one already, in the space that ``distance.rigid_split``
+    describes; else it is built when first needed.
     """
 
     vertices: np.ndarray
@@ -78,18 +94,31 @@ class Mesh:
         hold("name", printable(self.name))
         whose = f"of the mesh '{self.name}'"
         vertices = array(self.vertices, f"The vertices {whose}")
-        vertices = vertices.reshape(0, 3) if vertices.size == 0 else shaped(vertices, f"The vertices {whose}", (-1, 3))
+        vertices = (
+            vertices.reshape(0, 3)
+            if vertices.size == 0
+            else shaped(vertices, f"The vertices {whose}", (-1, 3))
+        )
         matrix = shaped(self.matrix, f"The matrix {whose}", (4, 4), (-1, 4, 4))
         if 0 in matrix.shape:
             raise InputError(f"The matrix {whose} has no frames; give one matrix, or one a frame.")
         if not np.isfinite(vertices).all() or not np.isfinite(matrix).all():
             part = "vertices" if not np.isfinite(vertices).all() else "matrix"
-            raise InputError(f"The {part} {whose} have a coordinate that is not a number; fix its geometry or transform.")
+            raise InputError(
+                f"The {part} {whose} have a coordinate that is not a number; fix its geometry or "
+                "transform."
+            )
         if np.abs(matrix[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max() > _UNTRUE:
-            raise InputError(f"The matrix {whose} is of no scale, rotation and place; its last row has to be 0 0 0 1.")
+            raise InputError(
+                f"The matrix {whose} is of no scale, rotation and place; its last row has to be 0 "
+                "0 0 1."
+            )
         far = float(np.abs(vertices).max(initial=0.0)), float(np.abs(matrix[..., :3, :3]).max())
         if max(*far, far[0] * far[1], float(np.abs(matrix[..., :3, 3]).max())) > FARTHEST:
-            raise InputError(f"The mesh '{self.name}' reaches out millions of metres; fix its vertices or its matrix.")
+            raise InputError(
+                f"The mesh '{self.name}' reaches out millions of metres; fix its vertices or its "
+                "matrix."
+            )
         hold("vertices", vertices)
         hold("triangles", corners(self.triangles, f"The triangles {whose}", len(vertices)))
         hold("matrix", matrix)
@@ -102,13 +131,20 @@ class Scene:
     solids: "tuple[Box | Mesh, ...] | list[Box | Mesh]" = ()
 
     def __post_init__(self) -> None:
-        if not isinstance(self.solids, tuple | list) or not all(isinstance(each, Box | Mesh) for each in self.solids):
-            raise InputError("The solids of a scene are something other than boxes and meshes; give a list of Box and Mesh.")
+        if not isinstance(self.solids, tuple | list) or not all(
+            isinstance(each, Box | Mesh) for each in self.solids
+        ):
+            raise InputError(
+                "The solids of a scene are something other than boxes and meshes; give a list of "
+                "Box and Mesh."
+            )
         object.__setattr__(self, "solids", tuple(self.solids))
 
 
 def box_distance(points: np.ndarray, half_size: np.ndarray) -> np.ndarray:
-    """Exact signed distance (negative inside) of local ``points`` (…, 3) to the box of ``half_size`` (3,) at the origin."""
+    """Exact signed distance (negative inside) of local ``points`` (…, 3) to the box of
+    ``half_size`` (3,) at the origin.
+    """
     q = np.abs(points) - half_size
     outside = np.sqrt((np.maximum(q, 0.0) ** 2).sum(-1))
     return outside + np.minimum(q.max(-1), 0.0)

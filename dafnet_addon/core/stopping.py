@@ -12,14 +12,18 @@ from types import FrameType, TracebackType
 
 __all__ = ["Stop"]
 
-_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name)]
+_SIGNALS = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name)
+]
 
 
 class Stop:
-    """Within the block a signal is remembered; then ``now`` raises KeyboardInterrupt with its number.
+    """Within the block a signal is remembered; then ``now`` raises KeyboardInterrupt with its
+    number.
 
-    A second signal does what it would without the block. Signals that the process was started to ignore
-    stay ignored. In other threads than the main one Python cannot catch any: the block does nothing.
+    A second signal does what it would without the block. Signals that the process was started to
+    ignore stay ignored. In other threads than the main one Python cannot catch any: the block does
+    nothing.
     """
 
     def __init__(self) -> None:
@@ -33,7 +37,12 @@ class Stop:
                     self._before[each] = signal.signal(each, self._remember)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         for each in list(self._before):
             self._give_back(each)
 

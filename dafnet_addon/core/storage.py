@@ -1,7 +1,9 @@
-"""A take and what was asked for, as bytes: for a file to keep, so that it can be cleaned up again or gone on from later.
+"""A take and what was asked for, as bytes: for a file to keep, so that it can be cleaned up again
+or gone on from later.
 
-The bytes are a compressed NPZ. Files come from strangers, so none of it is believed: an array's header is read before the
-array, and no more is unpacked than the take's own number of frames asks for.
+The bytes are a compressed NPZ. Files come from strangers, so none of it is believed: an array's
+header is read before the array, and no more is unpacked than the take's own number of frames asks
+for.
 """
 
 import io
@@ -31,11 +33,14 @@ _VERSION = 1
 """Of the packing. What was packed before there were versions is packed so, too."""
 _MOST_WORDS, _MOST = 1 << 20, 1e30  # bytes of all that is no array; figures
 _ROWS: dict[str, tuple[int, ...]] = {
-    "controls.root": (4, 4), "controls.upper_body": (len(UPPER), 3),
+    "controls.root": (4, 4),
+    "controls.upper_body": (len(UPPER), 3),
     **{f"controls.{name}": (3,) for name in END_EFFECTORS},
     **{f"controls.{name}_rotation": (3, 3) for name in END_EFFECTORS},
     **{f"controls.{name}_influence": () for name in END_EFFECTORS},
-    "take.joints": (22, 3), "take.rotations": (22, 4), "take.root": (4, 4),
+    "take.joints": (22, 3),
+    "take.rotations": (22, 4),
+    "take.root": (4, 4),
 }
 """The arrays that have a row for each frame of the controls, and the shape of a row."""
 _FREE = {name for name in _ROWS if name.startswith("controls.") and name != "controls.root"}
@@ -43,12 +48,21 @@ _LATER = {"take.unchanged"}
 """What takes that were packed before it was needed lack."""
 _MOST_HEADER = 256  # bytes
 _HEADER = re.compile(
-    rb"\x93NUMPY\x01\0..\{'descr': '([^']{1,20})', 'fortran_order': (True|False), 'shape': \(([\d, ]{0,80})\), \} *\n",
+    rb"\x93NUMPY\x01\0..\{'descr': '([^']{1,20})', 'fortran_order': (True|False), 'shape': "
+    rb"\(([\d, ]{0,80})\), \} *\n",
     re.DOTALL,
 )
 """Of an array in a file, as NumPy writes it: type, whether the first axis runs fastest, sizes."""
 _DAMAGED = (
-    ValueError, KeyError, EOFError, OSError, OverflowError, NotImplementedError, RuntimeError, zlib.error, zipfile.BadZipFile,
+    ValueError,
+    KeyError,
+    EOFError,
+    OSError,
+    OverflowError,
+    NotImplementedError,
+    RuntimeError,
+    zlib.error,
+    zipfile.BadZipFile,
 )
 """What Python's reader of ZIP files raises for bytes that are none."""
 
@@ -68,7 +82,9 @@ def packed(take: Take, controls: Controls) -> bytes:
                 plain[name] = _sayable(value)
     out = io.BytesIO()
     text = np.frombuffer(json.dumps(plain).encode(), np.uint8)
-    np.savez_compressed(out, plain=text, **{name: a.astype(np.float32) for name, a in arrays.items()})
+    np.savez_compressed(
+        out, plain=text, **{name: a.astype(np.float32) for name, a in arrays.items()}
+    )
     return out.getvalue()
 
 
@@ -80,7 +96,9 @@ def _sayable(value: Any) -> Any:
 
 
 def unpacked(data: bytes) -> tuple[Take, Controls]:
-    """Inverse of ``packed``. Raises InputError, which names the field, where the bytes are no take that can be used."""
+    """Inverse of ``packed``. Raises InputError, which names the field, where the bytes are no take
+    that can be used.
+    """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as file:
             said = _words(file)
@@ -89,9 +107,14 @@ def unpacked(data: bytes) -> tuple[Take, Controls]:
         return _take(said, arrays, fps), _controls(said, arrays)
     except InputError as error:
         why = str(error).partition(";")[0].rstrip(".")
-        raise InputError(f"The motion that the take was made of cannot be read ({why}); generate it again.") from error
+        raise InputError(
+            f"The motion that the take was made of cannot be read ({why}); generate it again."
+        ) from error
     except _DAMAGED as error:
-        raise InputError("The motion that the take was made of cannot be read (it is damaged); generate it again.") from error
+        raise InputError(
+            "The motion that the take was made of cannot be read (it is damaged); generate it "
+            "again."
+        ) from error
 
 
 def _words(file: zipfile.ZipFile) -> dict[str, Any]:
@@ -100,7 +123,9 @@ def _words(file: zipfile.ZipFile) -> dict[str, Any]:
     try:
         said = read_json(text.decode())
     except ValueError as error:
-        raise InputError(f"'plain' {'is not text' if isinstance(error, UnicodeDecodeError) else error}") from error
+        raise InputError(
+            f"'plain' {'is not text' if isinstance(error, UnicodeDecodeError) else error}"
+        ) from error
     if not isinstance(said, dict):
         raise InputError("'plain' is not an object")
     whole(said.get("version", 1), "'version'", 1, _VERSION)
@@ -108,12 +133,15 @@ def _words(file: zipfile.ZipFile) -> dict[str, Any]:
 
 
 def _array(file: zipfile.ZipFile, name: str, dtype: str, most: int) -> np.ndarray:
-    """An array of this type, of not more than ``most`` numbers: what claims to be larger is not unpacked."""
+    """An array of this type, of not more than ``most`` numbers: what claims to be larger is not
+    unpacked.
+    """
     try:
         info = file.getinfo(f"{name}.npy")
     except KeyError as error:
         raise InputError(f"'{name}' is missing") from error
-    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):  # others may claim gigabytes to begin with
+    # others may claim gigabytes to begin with
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise InputError(f"'{name}' is compressed in another way")
     if info.file_size > most * np.dtype(dtype).itemsize + _MOST_HEADER:
         raise InputError(f"'{name}' is larger than the take's frames ask for")
@@ -132,13 +160,20 @@ def _array(file: zipfile.ZipFile, name: str, dtype: str, most: int) -> np.ndarra
 
 
 def _arrays(file: zipfile.ZipFile, fps: float) -> dict[str, np.ndarray]:
-    """All arrays by name, finite, each of the shape that the number of frames, ``fps`` a second, asks for."""
+    """All arrays by name, finite, each of the shape that the number of frames, ``fps`` a second,
+    asks for.
+    """
     root, there = _array(file, "controls.root", "<f4", 16 * MOST_FRAMES), set(file.namelist())
     frames = whole(root.size // 16, "the number of frames in 'controls.root'", 1, MOST_FRAMES)
-    made = whole(covering_frames(frames, fps), "the number of frames in 'take.poses'", 1, MOST_FRAMES)
+    made = whole(
+        covering_frames(frames, fps), "the number of frames in 'take.poses'", 1, MOST_FRAMES
+    )
     wanted: dict[str, tuple[int, ...]] = {name: (frames, *row) for name, row in _ROWS.items()} | {
-        "take.action": (frames, -1), "take.poses": (PREROLL + made, 66),
-        "take.path.position": (made, 3), "take.path.yaw": (made,), "take.unchanged": (-1, 66),
+        "take.action": (frames, -1),
+        "take.poses": (PREROLL + made, 66),
+        "take.path.position": (made, 3),
+        "take.path.yaw": (made,),
+        "take.unchanged": (-1, 66),
     }
     longest = {"take.action": MOST_ACTIONS, "take.unchanged": 2 * made}
     arrays = {}
@@ -161,7 +196,10 @@ def _take(said: dict[str, Any], arrays: dict[str, np.ndarray], fps: float) -> Ta
         found = said.get(name)
         if not isinstance(found, dict):
             raise InputError(f"'{name}' is {printable(found, 40)}")
-        return {key: None if value is None else number(value, f"'{name}'", -_MOST, _MOST) for key, value in found.items()}
+        return {
+            key: None if value is None else number(value, f"'{name}'", -_MOST, _MOST)
+            for key, value in found.items()
+        }
 
     for name in ("fps", "scale"):
         if said.get(f"take.{name}") != said.get(f"controls.{name}"):
@@ -171,12 +209,20 @@ def _take(said: dict[str, Any], arrays: dict[str, np.ndarray], fps: float) -> Ta
         raise InputError("'take.warnings' is something other than sentences")
     seconds = {key: value for key, value in figures("take.seconds").items() if value is not None}
     return Take(
-        fps=fps, joints=arrays["take.joints"], rotations=arrays["take.rotations"], root=arrays["take.root"],
-        action=arrays["take.action"], scale=number(said.get("take.scale"), "'take.scale'", 1e-3, 1e3),
+        fps=fps,
+        joints=arrays["take.joints"],
+        rotations=arrays["take.rotations"],
+        root=arrays["take.root"],
+        action=arrays["take.action"],
+        scale=number(said.get("take.scale"), "'take.scale'", 1e-3, 1e3),
         poses=arrays["take.poses"],
         path=RootPath(arrays["take.path.position"], arrays["take.path.yaw"]),
         unchanged=arrays.get("take.unchanged", np.zeros((0, 66))),
-        log_likelihood=math.nan if likelihood is None else number(likelihood, "'take.log_likelihood'", -_MOST, _MOST),
-        raw_metrics=figures("take.raw_metrics"), metrics=figures("take.metrics"), seconds=seconds,
+        log_likelihood=math.nan
+        if likelihood is None
+        else number(likelihood, "'take.log_likelihood'", -_MOST, _MOST),
+        raw_metrics=figures("take.raw_metrics"),
+        metrics=figures("take.metrics"),
+        seconds=seconds,
         warnings=tuple(printable(each, 1000) for each in warnings),
     )

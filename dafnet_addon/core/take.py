@@ -1,4 +1,6 @@
-"""What goes into a generation besides the scene (``Controls``) and what comes out of it (``Take``)."""
+"""What goes into a generation besides the scene (``Controls``) and what comes out of it
+(``Take``).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -26,16 +28,19 @@ _LONGEST_BLEND = 600.0  # seconds
 class Controls:
     """What the animator asks of the character, frame by frame. World: z up, metres.
 
-    ``fps``: frames a second of every array here. ``root`` (T, 4, 4): x right, y forward, z up, on the ground under the pelvis.
-    ``mode``: FREE, EE or FULL, one word or one for each frame. ``head``, ``hand_left``, ``hand_right`` (T, 3): targets of the
-    head and wrist joints, NaN where free; the matching ``…_rotation`` (T, 3, 3) turn head and hands (y where the face looks
-    or the fingers point, z the crown or the back of the hand), NaN where free. ``upper_body`` (T, 14, 3): the joints
-    ``skeleton.UPPER`` for FULL; ``pelvis_given``: whether its pelvis counts, or only the rest of it. ``…_influence`` (T,): how
-    far a target counts, from 0, where it is free, to 1; all of it where None. ``blend``: seconds in which the body comes over
-    where the mode changes. ``scale``: the character's size over the canonical body of 1.75 m.
+    ``fps``: frames a second of every array here. ``root`` (T, 4, 4): x right, y forward, z up, on
+    the ground under the pelvis. ``mode``: FREE, EE or FULL, one word or one for each frame.
+    ``head``, ``hand_left``, ``hand_right`` (T, 3): targets of the head and wrist joints, NaN where
+    free; the matching ``…_rotation`` (T, 3, 3) turn head and hands (y where the face looks or the
+    fingers point, z the crown or the back of the hand), NaN where free. ``upper_body`` (T, 14, 3):
+    the joints ``skeleton.UPPER`` for FULL; ``pelvis_given``: whether its pelvis counts, or only the
+    rest of it. ``…_influence`` (T,): how far a target counts, from 0, where it is free, to 1; all
+    of it where None. ``blend``: seconds in which the body comes over where the mode changes.
+    ``scale``: the character's size over the canonical body of 1.75 m.
 
-    Lists will do for arrays. Raises InputError, which names the field, for what cannot be used: another shape, what is not a
-    number, a rotation that is none, a mode that is unknown, more than ``MOST_FRAMES`` frames.
+    Lists will do for arrays. Raises InputError, which names the field, for what cannot be used:
+    another shape, what is not a number, a rotation that is none, a mode that is unknown, more than
+    ``MOST_FRAMES`` frames.
     """
 
     fps: float
@@ -63,21 +68,36 @@ class Controls:
         hold("root", _checked_root(self.root))
         frames = len(self)
         if max(frames, covering_frames(frames, self.fps)) > MOST_FRAMES:
-            raise InputError(f"The root has {frames} frames at {self.fps:g} a second, more than a shot may have; split it.")
+            raise InputError(
+                f"The root has {frames} frames at {self.fps:g} a second, more than a shot may "
+                "have; split it."
+            )
         hold("mode", _checked_mode(self.mode, frames))
         if not isinstance(self.pelvis_given, bool | np.bool_):
-            raise InputError(f"'pelvis_given' is {printable(self.pelvis_given, 40)}; give True or False.")
+            raise InputError(
+                f"'pelvis_given' is {printable(self.pelvis_given, 40)}; give True or False."
+            )
 
         like, free = ", like the root's frames", "give metres, or NaN where it is free"
         shapes: dict[str, tuple[int, ...]] = {"upper_body": (frames, len(UPPER), 3)}
         for name in END_EFFECTORS:
-            shapes |= {name: (frames, 3), f"{name}_rotation": (frames, 3, 3), f"{name}_influence": (frames,)}
+            shapes |= {
+                name: (frames, 3),
+                f"{name}_rotation": (frames, 3, 3),
+                f"{name}_influence": (frames,),
+            }
         for name, shape in shapes.items():
             if getattr(self, name) is not None:
                 what = f"'{name}'"
                 found = shaped(getattr(self, name), what, shape, like=like)
                 is_share = name.endswith("_influence")
-                inside(found, what, FARTHEST, free=not is_share, fix="give numbers from 0 to 1" if is_share else free)
+                inside(
+                    found,
+                    what,
+                    FARTHEST,
+                    free=not is_share,
+                    fix="give numbers from 0 to 1" if is_share else free,
+                )
                 hold(name, rotations(found, what) if name.endswith("_rotation") else found)
 
     def __len__(self) -> int:
@@ -90,19 +110,34 @@ def _checked_root(root: object) -> np.ndarray:
         raise InputError("The root has no frames; give at least one frame, a 4 × 4 matrix.")
     broken = np.flatnonzero(~np.isfinite(found).all(axis=(1, 2)))
     if len(broken):
-        raise InputError(f"The root's transform is not a number at frame {broken[0]}; fix its keys, drivers or constraints.")
+        raise InputError(
+            f"The root's transform is not a number at frame {broken[0]}; fix its keys, drivers or "
+            "constraints."
+        )
     return inside(found, "The root", FARTHEST)
 
 
 def _checked_mode(mode: object, frames: int) -> str | tuple[str, ...]:
-    modes = (mode,) if isinstance(mode, str) else mode.tolist() if isinstance(mode, np.ndarray) else mode
+    modes = (
+        (mode,)
+        if isinstance(mode, str)
+        else mode.tolist()
+        if isinstance(mode, np.ndarray)
+        else mode
+    )
     if not isinstance(modes, tuple | list):
-        raise InputError(f"The mode is {printable(mode, 40)}; use FREE, EE or FULL, one word or one for each frame.")
+        raise InputError(
+            f"The mode is {printable(mode, 40)}; use FREE, EE or FULL, one word or one for each "
+            "frame."
+        )
     wrong = [each for each in modes if not isinstance(each, str) or each not in MODES]
     if wrong:
         raise InputError(f"The mode '{printable(wrong[0], 40)}' is unknown; use FREE, EE or FULL.")
     if not isinstance(mode, str) and len(modes) != frames:
-        raise InputError(f"There are {len(modes)} modes for {frames} frames; give one word, or one for each frame.")
+        raise InputError(
+            f"There are {len(modes)} modes for {frames} frames; give one word, or one for each "
+            "frame."
+        )
     return mode if isinstance(mode, str) else tuple(modes)
 
 
@@ -110,15 +145,18 @@ def _checked_mode(mode: object, frames: int) -> str | tuple[str, ...]:
 class Take:
     """One generated motion at the controls' frame rate.
 
-    ``joints`` (T, 22, 3): world, metres, constant bone lengths. ``rotations`` (T, 22, 4): quaternions w x y z of each joint's
-    frame in its parent's, the pelvis' in the world; the identity everywhere is the rest pose (a T-pose that looks along +y);
-    signs are continuous in time. ``root`` (T, 4, 4): the smoothed root. ``action`` (T, 10): action probabilities.
-    ``scale``: the character's size. ``poses`` (70 + N, 66) and ``path`` (N): the model's own poses at 30 fps, canonical size,
-    in the frames of ``path``, after 70 of standing in its first one; ``unchanged`` (M, 66): those that it would have gone on
-    with over each change of mode, one after another, if there had been none: what resuming and cleaning again need.
-    ``log_likelihood``: of a standardised pose after those before it, mean over the frames, nats. ``raw_metrics``, ``metrics``:
-    ``metrics.summary`` of the model's own motion and of this one after the clean-up, at these frames and canonical size.
-    ``seconds``: time spent by stage. ``warnings``: sentences for the user.
+    ``joints`` (T, 22, 3): world, metres, constant bone lengths. ``rotations`` (T, 22, 4):
+    quaternions w x y z of each joint's frame in its parent's, the pelvis' in the world; the
+    identity everywhere is the rest pose (a T-pose that looks along +y); signs are continuous in
+    time. ``root`` (T, 4, 4): the smoothed root. ``action`` (T, 10): action probabilities.
+    ``scale``: the character's size. ``poses`` (70 + N, 66) and ``path`` (N): the model's own poses
+    at 30 fps, canonical size, in the frames of ``path``, after 70 of standing in its first one;
+    ``unchanged`` (M, 66): those that it would have gone on with over each change of mode, one after
+    another, if there had been none: what resuming and cleaning again need. ``log_likelihood``: of a
+    standardised pose after those before it, mean over the frames, nats. ``raw_metrics``,
+    ``metrics``: ``metrics.summary`` of the model's own motion and of this one after the clean-up,
+    at these frames and canonical size. ``seconds``: time spent by stage. ``warnings``: sentences
+    for the user.
     """
 
     fps: float

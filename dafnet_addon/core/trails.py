@@ -1,7 +1,9 @@
-"""Root paths along lines that are there already: one drawn on the floor, or the way that something else moved.
+"""Root paths along lines that are there already: one drawn on the floor, or the way that something
+else moved.
 
-A drawn line has no times, so it is walked as people walk (``core.paths``), corners rounded; of what moved the times are
-kept, and only the shake and the too quick turns taken out. Yaw is as in ``core.root``.
+A drawn line has no times, so it is walked as people walk (``core.paths``), corners rounded; of what
+moved the times are kept, and only the shake and the too quick turns taken out. Yaw is as in
+``core.root``.
 """
 
 import numpy as np
@@ -18,9 +20,12 @@ SHORTEST = 0.5
 """Length that a line needs to be walked along, metres."""
 
 _STEP = 0.005  # metres between samples along a line
-_ROUNDING = 0.2  # metres, the smoothing's standard deviation: a right angle becomes an arc of about 0.3 m
-_MOVES, _STANDS = 0.15, 0.5  # metres a second under which something stands, where it does so for half a second
-_SHAKE, _SWAY = 0.15, 0.2  # seconds, standard deviations: smoothing of a recorded position, and of its heading
+# metres, the smoothing's standard deviation: a right angle becomes an arc of about 0.3 m
+_ROUNDING = 0.2
+# metres a second under which something stands, where it does so for half a second
+_MOVES, _STANDS = 0.15, 0.5
+# seconds, standard deviations: smoothing of a recorded position, and of its heading
+_SHAKE, _SWAY = 0.15, 0.2
 _TURN_RATE = np.radians(160.0)  # a second: nobody walks and turns faster
 _TURN_SECONDS = 1.7  # of half a turn
 
@@ -33,15 +38,22 @@ def _even(points: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def trail(
-    points: np.ndarray, start: Stop | None = None, *, speed: float = 1.1, fps: float = 30.0, floor: float = 0.0,
-    yaw: float | None = None, seconds: float = 1.0, name: str = "line",
+    points: np.ndarray,
+    start: Stop | None = None,
+    *,
+    speed: float = 1.1,
+    fps: float = 30.0,
+    floor: float = 0.0,
+    yaw: float | None = None,
+    seconds: float = 1.0,
+    name: str = "line",
 ) -> Route:
     """Walk along a line ``points`` (N, 2), metres, and stand at its end for some ``seconds``.
 
-    ``start``: where the walker rests at first and from where it goes to the line; None rests for an instant at the line's
-    beginning and looks along it. ``yaw``: the heading that is kept all the way; None looks where one goes. Corners are rounded,
-    bends taken more slowly. Raises InputError where the line is shorter than ``SHORTEST``, not a number, or the speed not one
-    of people.
+    ``start``: where the walker rests at first and from where it goes to the line; None rests for an
+    instant at the line's beginning and looks along it. ``yaw``: the heading that is kept all the
+    way; None looks where one goes. Corners are rounded, bends taken more slowly. Raises InputError
+    where the line is shorter than ``SHORTEST``, not a number, or the speed not one of people.
     """
     points = np.asarray(points, float)
     if not np.isfinite(points).all():
@@ -50,7 +62,9 @@ def trail(
         raise InputError(f"People walk at {SLOWEST} to {FASTEST} m/s; choose a speed between them.")
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) if len(points) else 0.0
     if length < SHORTEST:
-        raise InputError(f"The {name} is only {length:.2f} m long; it needs {SHORTEST} m to walk along.")
+        raise InputError(
+            f"The {name} is only {length:.2f} m long; it needs {SHORTEST} m to walk along."
+        )
     if start is not None:
         origin = np.array(start.position)
         ahead = origin + AFTER_SEAT * np.array([-np.sin(start.yaw), np.cos(start.yaw)])
@@ -69,19 +83,29 @@ def trail(
     position = np.concatenate([resting[0], leg.position, resting[1]])
     position[:, 2] = floor
     turns = 2 * np.pi * round((begin.yaw - float(leg.yaw[0])) / (2 * np.pi))
-    heading = np.concatenate([np.full(before, begin.yaw), leg.yaw + turns, np.full(after, leg.yaw[-1] + turns)])
+    heading = np.concatenate(
+        [np.full(before, begin.yaw), leg.yaw + turns, np.full(after, leg.yaw[-1] + turns)]
+    )
     last = len(heading) - 1
-    return Route(RootPath(position, heading), (Rest(begin, 0, before - 1), Rest(end, last - after + 1, last)))
+    return Route(
+        RootPath(position, heading), (Rest(begin, 0, before - 1), Rest(end, last - after + 1, last))
+    )
 
 
 def _runs(flags: np.ndarray, least: int) -> list[tuple[int, int]]:
-    """Ranges (first, end exclusive) of at least ``least`` frames in which the flags (T,) are set."""
+    """Ranges (first, end exclusive) of at least ``least`` frames in which the flags (T,) are
+    set.
+    """
     edges = np.flatnonzero(np.diff(flags, prepend=False, append=False)).reshape(-1, 2)
     return [(int(a), int(b)) for a, b in edges if b - a >= least]
 
 
-def _headings(velocity: np.ndarray, stands: list[tuple[int, int]], yaw: float, fps: float) -> np.ndarray:
-    """Yaw (T,) of the direction of travel; held in ``stands``, with the turn to where it leaves in their last part."""
+def _headings(
+    velocity: np.ndarray, stands: list[tuple[int, int]], yaw: float, fps: float
+) -> np.ndarray:
+    """Yaw (T,) of the direction of travel; held in ``stands``, with the turn to where it leaves in
+    their last part.
+    """
     frames = len(velocity)
     moving = np.ones(frames, bool)
     for a, b in stands:
@@ -92,7 +116,11 @@ def _headings(velocity: np.ndarray, stands: list[tuple[int, int]], yaw: float, f
     heading = np.unwrap(np.arctan2(-velocity[told, 0], velocity[told, 1]))
     out = np.interp(np.arange(frames), told, heading)
     for a, b in stands:
-        before = out[a - 1] if a > 0 else yaw + 2 * np.pi * round((out[min(b, frames - 1)] - yaw) / (2 * np.pi))
+        before = (
+            out[a - 1]
+            if a > 0
+            else yaw + 2 * np.pi * round((out[min(b, frames - 1)] - yaw) / (2 * np.pi))
+        )
         after = out[b] if b < frames else before
         needed = (0.6 + (_TURN_SECONDS - 0.6) * abs(after - before) / np.pi) * fps
         u = np.clip((np.arange(a, b) - max(a, b - needed)) / max(min(needed, b - a), 1.0), 0.0, 1.0)
@@ -103,12 +131,16 @@ def _headings(velocity: np.ndarray, stands: list[tuple[int, int]], yaw: float, f
 def followed(positions: np.ndarray, fps: float, yaw: float = 0.0, floor: float = 0.0) -> Route:
     """The root of what moved: ``positions`` (T, 2), metres, at ``fps``; the frames stay the same.
 
-    Smoothed; it looks where it goes, holds its heading where it stands (``yaw`` where it stands from the first) and turns
-    before it leaves. ``rests``: where it stands. Raises InputError where it does not move or is not a number.
+    Smoothed; it looks where it goes, holds its heading where it stands (``yaw`` where it stands
+    from the first) and turns before it leaves. ``rests``: where it stands. Raises InputError where
+    it does not move or is not a number.
     """
     positions = np.asarray(positions, float)
     if not np.isfinite(positions).all():
-        raise InputError("The object to follow has a place that is not a number; fix its keys, drivers or constraints.")
+        raise InputError(
+            "The object to follow has a place that is not a number; fix its keys, drivers or "
+            "constraints."
+        )
     if len(positions) < 2 or np.ptp(positions, axis=0).max() < SHORTEST / 2:
         raise InputError("The object to follow hardly moves over the floor; choose one that does.")
     smooth = gaussian(positions, _SHAKE * fps)
@@ -127,6 +159,11 @@ def followed(positions: np.ndarray, fps: float, yaw: float = 0.0, floor: float =
         heading = gaussian(raw, sway)
     path = RootPath(np.c_[smooth, np.full(len(smooth), floor)], heading)
     rests = [
-        Rest(Stop((float(smooth[a, 0]), float(smooth[a, 1])), float(heading[a]), (b - a) / fps), a, b - 1) for a, b in stands
+        Rest(
+            Stop((float(smooth[a, 0]), float(smooth[a, 1])), float(heading[a]), (b - a) / fps),
+            a,
+            b - 1,
+        )
+        for a, b in stands
     ]
     return Route(path, tuple(rests))

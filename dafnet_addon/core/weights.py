@@ -1,8 +1,10 @@
-"""Weights files: a short, suspicious reader and a writer of the safetensors format, and what a file says of itself.
+"""Weights files: a short, suspicious reader and a writer of the safetensors format, and what a file
+says of itself.
 
-Layout: 8 bytes, the header's length N (little endian); N bytes of JSON, ``{name: {"dtype", "shape", "data_offsets":
-[begin, end]}, "__metadata__": {text: text}}``; then the tensors, row-major, little endian, without a hole. Nothing is
-ever unpickled, and every number in the header is checked before a byte is used.
+Layout: 8 bytes, the header's length N (little endian); N bytes of JSON, ``{name: {"dtype", "shape",
+"data_offsets": [begin, end]}, "__metadata__": {text: text}}``; then the tensors, row-major, little
+endian, without a hole. Nothing is ever unpickled, and every number in the header is checked before
+a byte is used.
 """
 
 import json
@@ -17,23 +19,41 @@ import numpy as np
 from .errors import WeightsError
 from .text import printable, read_json
 
-__all__ = ["FORMAT", "Weights", "load_weights", "read_safetensors", "write_safetensors", "quantised"]
+__all__ = [
+    "FORMAT",
+    "Weights",
+    "load_weights",
+    "read_safetensors",
+    "write_safetensors",
+    "quantised",
+]
 
 FORMAT = "dafnet-1"
 """Value of the metadata key ``format``; another one means other tensors."""
 
-_MOST_HEADER, _MOST_FILE = 1 << 20, 1 << 29  # bytes; the paper's model in single precision is a quarter of that
+# bytes; the paper's model in single precision is a quarter of that
+_MOST_HEADER, _MOST_FILE = 1 << 20, 1 << 29
 _SHOWN = 60  # characters of a name in a sentence
-_DTYPES = {"F64": "<f8", "F32": "<f4", "F16": "<f2", "BF16": "<u2", "I64": "<i8", "I32": "<i4", "I8": "i1", "U8": "u1"}
+_DTYPES = {
+    "F64": "<f8",
+    "F32": "<f4",
+    "F16": "<f2",
+    "BF16": "<u2",
+    "I64": "<i8",
+    "I32": "<i4",
+    "I8": "i1",
+    "U8": "u1",
+}
 _WRITTEN = {np.dtype(code): name for name, code in _DTYPES.items() if name != "BF16"}
 
 
 def read_safetensors(path: str | Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Tensors (read-only, BF16 widened to float32, all else as stored) and metadata of a ``.safetensors`` file.
+    """Tensors (read-only, BF16 widened to float32, all else as stored) and metadata of a
+    ``.safetensors`` file.
 
-    Raises WeightsError where the file is missing, truncated, over 512 MiB, or its header is not what the format asks for:
-    too long, no JSON that ``read_json`` takes, an unknown type, offsets that leave the file, overlap, leave holes or differ
-    from the shape.
+    Raises WeightsError where the file is missing, truncated, over 512 MiB, or its header is not
+    what the format asks for: too long, no JSON that ``read_json`` takes, an unknown type, offsets
+    that leave the file, overlap, leave holes or differ from the shape.
     """
     path = Path(path)
     header, data = _parts(path)
@@ -47,7 +67,9 @@ def read_safetensors(path: str | Path) -> tuple[dict[str, np.ndarray], dict[str,
     if not isinstance(entries, dict):
         raise _damaged(path, "its header is not an object")
     metadata = entries.pop("__metadata__", {})
-    if not isinstance(metadata, dict) or not all(isinstance(value, str) for value in metadata.values()):
+    if not isinstance(metadata, dict) or not all(
+        isinstance(value, str) for value in metadata.values()
+    ):
         raise _damaged(path, "its metadata is not text")
 
     for name, entry in entries.items():
@@ -58,29 +80,40 @@ def read_safetensors(path: str | Path) -> tuple[dict[str, np.ndarray], dict[str,
 
     tensors = {}
     for name, entry in entries.items():
-        array: np.ndarray = np.ndarray(entry["shape"], _DTYPES[entry["dtype"]], data, entry["data_offsets"][0])
-        tensors[name] = (array.astype(np.uint32) << 16).view(np.float32) if entry["dtype"] == "BF16" else array
+        array: np.ndarray = np.ndarray(
+            entry["shape"], _DTYPES[entry["dtype"]], data, entry["data_offsets"][0]
+        )
+        tensors[name] = (
+            (array.astype(np.uint32) << 16).view(np.float32) if entry["dtype"] == "BF16" else array
+        )
     return tensors, metadata
 
 
 def _damaged(path: Path, what: str) -> WeightsError:
     return WeightsError(
-        f"The weights file '{path.name}' is damaged ({what}); install the extension again or choose another file.")
+        f"The weights file '{path.name}' is damaged ({what}); install the extension again or "
+        "choose another file."
+    )
 
 
 def _other_version(path: Path, what: str) -> WeightsError:
     return WeightsError(
         f"The weights file '{path.name}' was made for another version ({what}); "
-        "update the extension or choose another file.")
+        "update the extension or choose another file."
+    )
 
 
 def _parts(path: Path) -> tuple[bytes, bytes]:
-    """Header and data of a file; the length that it claims is compared with its own before it is believed."""
+    """Header and data of a file; the length that it claims is compared with its own before it is
+    believed.
+    """
     try:
         with path.open("rb") as file:
             size = file.seek(0, 2)
             if size > _MOST_FILE:
-                raise WeightsError(f"The weights file '{path.name}' is larger than 512 MiB; choose another file.")
+                raise WeightsError(
+                    f"The weights file '{path.name}' is larger than 512 MiB; choose another file."
+                )
             file.seek(0)
             length = int.from_bytes(file.read(8), "little")
             if not 2 <= length <= min(size - 8, _MOST_HEADER):
@@ -97,14 +130,20 @@ def _parts(path: Path) -> tuple[bytes, bytes]:
 
 
 def _check_entry(path: Path, name: str, entry: object) -> None:
-    """Raise WeightsError unless this describes one tensor whose bytes are as many as its shape asks for."""
+    """Raise WeightsError unless this describes one tensor whose bytes are as many as its shape asks
+    for.
+    """
     if not isinstance(entry, dict) or set(entry) != {"dtype", "shape", "data_offsets"}:
         raise _damaged(path, f"'{name}' is not described as it should be")
     dtype, shape, offsets = entry["dtype"], entry["shape"], entry["data_offsets"]
     if not isinstance(dtype, str) or dtype not in _DTYPES:
         raise _damaged(path, f"'{name}' has an unknown type")
     # A tensor without values may not be huge in its other directions either: NumPy makes none.
-    if not _are_counts(shape) or len(shape) > 8 or math.prod(size or 1 for size in shape) > _MOST_FILE:
+    if (
+        not _are_counts(shape)
+        or len(shape) > 8
+        or math.prod(size or 1 for size in shape) > _MOST_FILE
+    ):
         raise _damaged(path, f"'{name}' has an impossible shape")
     if not _are_counts(offsets) or len(offsets) != 2:
         raise _damaged(path, f"'{name}' has impossible offsets")
@@ -113,12 +152,20 @@ def _check_entry(path: Path, name: str, entry: object) -> None:
 
 
 def _are_counts(values: Any) -> bool:
-    """Whether this is a list of whole numbers from 0 to 512 MiB (JSON's true is a number to Python, not to us)."""
-    return isinstance(values, list) and all(type(value) is int and 0 <= value <= _MOST_FILE for value in values)
+    """Whether this is a list of whole numbers from 0 to 512 MiB (JSON's true is a number to Python,
+    not to us).
+    """
+    return isinstance(values, list) and all(
+        type(value) is int and 0 <= value <= _MOST_FILE for value in values
+    )
 
 
-def write_safetensors(path: str | Path, tensors: Mapping[str, np.ndarray], metadata: Mapping[str, str]) -> None:
-    """Write tensors and text metadata; the same content gives the same bytes. Raises TypeError for other types."""
+def write_safetensors(
+    path: str | Path, tensors: Mapping[str, np.ndarray], metadata: Mapping[str, str]
+) -> None:
+    """Write tensors and text metadata; the same content gives the same bytes. Raises TypeError for
+    other types.
+    """
     header: dict[str, Any] = {"__metadata__": dict(sorted(metadata.items()))}
     chunks: list[bytes] = []
     offset = 0
@@ -130,7 +177,11 @@ def write_safetensors(path: str | Path, tensors: Mapping[str, np.ndarray], metad
             raise TypeError(f"a weights file cannot hold {array.dtype} ('{name}')")
         chunks.append(array.astype(dtype).tobytes())
         end = offset + len(chunks[-1])
-        header[name] = {"dtype": _WRITTEN[dtype], "shape": list(array.shape), "data_offsets": [offset, end]}
+        header[name] = {
+            "dtype": _WRITTEN[dtype],
+            "shape": list(array.shape),
+            "data_offsets": [offset, end],
+        }
         offset = end
     text = json.dumps(header, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 8)
@@ -138,9 +189,11 @@ def write_safetensors(path: str | Path, tensors: Mapping[str, np.ndarray], metad
 
 
 def quantised(array: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """An array in 8 bits, and a float32 scale (rows,) of its rows (first axis), from each row's largest magnitude.
+    """An array in 8 bits, and a float32 scale (rows,) of its rows (first axis), from each row's
+    largest magnitude.
 
-    Stored as ``name`` and ``name.scale``; ``load_weights`` multiplies them again. The error is at most half a scale.
+    Stored as ``name`` and ``name.scale``; ``load_weights`` multiplies them again. The error is at
+    most half a scale.
     """
     rows = array.reshape(len(array), -1)
     scale = (np.abs(rows).max(axis=1, initial=0.0) / 127.0).astype(np.float32)
@@ -152,9 +205,9 @@ def quantised(array: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 class Weights:
     """A model as its file gives it.
 
-    ``tensors``: float32 arrays by name, 8-bit and half-precision ones expanded. ``config``: the parsed metadata key
-    ``config`` (architecture, normalisation, frame rate, skeleton). ``metadata``: all of the file's own words. ``path``:
-    where it lies.
+    ``tensors``: float32 arrays by name, 8-bit and half-precision ones expanded. ``config``: the
+    parsed metadata key ``config`` (architecture, normalisation, frame rate, skeleton).
+    ``metadata``: all of the file's own words. ``path``: where it lies.
     """
 
     tensors: dict[str, np.ndarray]
@@ -163,16 +216,22 @@ class Weights:
     path: Path
 
     def require(self, name: str, shape: tuple[int, ...] | None = None) -> np.ndarray:
-        """The tensor of this name; raises WeightsError where it is missing or does not have this shape."""
+        """The tensor of this name; raises WeightsError where it is missing or does not have this
+        shape.
+        """
         tensor = self.tensors.get(name)
         if tensor is None:
             raise _other_version(self.path, f"'{name}' is missing")
         if shape is not None and tensor.shape != tuple(shape):
-            raise _other_version(self.path, f"'{name}' has the shape {tensor.shape}, not {tuple(shape)}")
+            raise _other_version(
+                self.path, f"'{name}' has the shape {tensor.shape}, not {tuple(shape)}"
+            )
         return tensor
 
     def says(self, key: str) -> Any:
-        """What the metadata says under a key: parsed where it is JSON, as it stands where not, None where it says nothing."""
+        """What the metadata says under a key: parsed where it is JSON, as it stands where not, None
+        where it says nothing.
+        """
         said = self.metadata.get(key)
         try:
             return None if said is None else read_json(said)
@@ -181,9 +240,11 @@ class Weights:
 
 
 def load_weights(path: str | Path | None = None) -> Weights:
-    """Read a weights file, or the one that ships in ``weights_stub`` beside the package where ``path`` is None.
+    """Read a weights file, or the one that ships in ``weights_stub`` beside the package where
+    ``path`` is None.
 
-    Raises WeightsError where the file is missing, damaged (see ``read_safetensors``), or made for another version.
+    Raises WeightsError where the file is missing, damaged (see ``read_safetensors``), or made for
+    another version.
     """
     path = _shipped() if path is None else Path(path)
     stored, metadata = read_safetensors(path)
@@ -225,5 +286,7 @@ def _shipped() -> Path:
     found = sorted(folder.glob("*.safetensors"))
     if len(found) != 1:
         what = "no weights file" if not found else "more than one weights file"
-        raise WeightsError(f"There is {what} in '{folder}'; install the extension again or choose a weights file.")
+        raise WeightsError(
+            f"There is {what} in '{folder}'; install the extension again or choose a weights file."
+        )
     return found[0]

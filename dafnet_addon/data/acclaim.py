@@ -1,4 +1,5 @@
-"""Reads Acclaim motion: a skeleton of bones (.asf) and, for it, the bones' angles in every frame (.amc).
+"""Reads Acclaim motion: a skeleton of bones (.asf) and, for it, the bones' angles in every frame
+(.amc).
 
 Bones are told apart without regard to case, and a comma may be the decimal point.
 """
@@ -32,8 +33,9 @@ _PER_BONE = 2000  # characters of an .asf; real ones take about 200
 
 @dataclass(frozen=True)
 class Skeleton:
-    """An .asf file: ``bones`` (the root first, parents before children), each with its vector (3,) in the file's units, its
-    axis rotation (3, 3) and the degrees of freedom it has in the .amc, in order. ``unit``: metres of one unit.
+    """An .asf file: ``bones`` (the root first, parents before children), each with its vector (3,)
+    in the file's units, its axis rotation (3, 3) and the degrees of freedom it has in the .amc, in
+    order. ``unit``: metres of one unit.
     """
 
     bones: tuple[str, ...]
@@ -58,7 +60,9 @@ def _lines(text: str) -> Iterator[list[str]]:
 
 
 def _sections(text: str) -> dict[str, list[list[str]]]:
-    """The lines of a file, as words, under each of its ``:keyword`` lines; what follows the keyword is the first line."""
+    """The lines of a file, as words, under each of its ``:keyword`` lines; what follows the keyword
+    is the first line.
+    """
     sections: dict[str, list[list[str]]] = {}
     lines: list[list[str]] = []
     for words in _lines(text):
@@ -95,7 +99,8 @@ def read_asf(file: Path) -> Skeleton:
         return _skeleton(_sections(text))
     except (KeyError, IndexError, ValueError) as error:
         raise InputError(
-            f"The ASF file '{file}' is damaged or breaks off (near: {str(error)[:120]}); get it again from where it came."
+            f"The ASF file '{file}' is damaged or breaks off (near: {str(error)[:120]}); get it "
+            "again from where it came."
         ) from None
 
 
@@ -141,24 +146,35 @@ def _skeleton(sections: dict[str, list[list[str]]]) -> Skeleton:
     if length <= 0:
         raise ValueError("the unit of length")
     return Skeleton(
-        tuple(names), tuple(parents), np.stack(vectors), np.stack(axes), tuple(freedoms), _numbers(root["position"], 3),
-        _INCH / length, degrees,
+        tuple(names),
+        tuple(parents),
+        np.stack(vectors),
+        np.stack(axes),
+        tuple(freedoms),
+        _numbers(root["position"], 3),
+        _INCH / length,
+        degrees,
     )
 
 
 def bones_of_amc(file: Path) -> set[str]:
     """Names of the bones, in lower case, that an .amc file moves."""
     return {
-        words[0].lower() for words in _lines(text_of(file)) if not words[0].startswith(":") and not words[0].isdigit()
+        words[0].lower()
+        for words in _lines(text_of(file))
+        if not words[0].startswith(":") and not words[0].isdigit()
     }
 
 
 def read_amc(file: Path, skeleton: Skeleton) -> Recording:
-    """The recording in an .amc file of a skeleton. Joints are called by the bone that begins there, ends of leaf bones
-    "<bone> end". Raises InputError where the file is not whole or is another skeleton's.
+    """The recording in an .amc file of a skeleton. Joints are called by the bone that begins there,
+    ends of leaf bones "<bone> end". Raises InputError where the file is not whole or is another
+    skeleton's.
     """
     rate, degrees, frames = None, skeleton.degrees, 0
-    freedoms = {bone.lower(): len(own) for bone, own in zip(skeleton.bones, skeleton.freedoms, strict=True)}
+    freedoms = {
+        bone.lower(): len(own) for bone, own in zip(skeleton.bones, skeleton.freedoms, strict=True)
+    }
     values = {bone: array("d") for bone in freedoms}
     for words in _lines(text_of(file)):
         key = words[0].lower()
@@ -178,7 +194,8 @@ def read_amc(file: Path, skeleton: Skeleton) -> Recording:
                 raise _broken(file, words[0], freedoms[key], frames)
         elif not key.startswith(":"):
             raise InputError(
-                f"The AMC file '{file}' moves the bone '{printable(words[0])}', which its .asf does not have; put it beside "
+                f"The AMC file '{file}' moves the bone '{printable(words[0])}', which its .asf "
+                "does not have; put it beside "
                 "its own .asf."
             )
     check_size(file, frames, 2 * len(skeleton.bones), sum(map(len, values.values())))
@@ -197,18 +214,22 @@ def _rate(words: list[str], file: Path) -> float:
         return float(_numbers(words, 1)[0])
     except ValueError:
         raise InputError(
-            f"The AMC file '{file}' gives no number as its samples per second; mend its line :SAMPLES-PER-SECOND."
+            f"The AMC file '{file}' gives no number as its samples per second; mend its line "
+            ":SAMPLES-PER-SECOND."
         ) from None
 
 
 def _broken(file: Path, bone: str, count: int, frames: int) -> InputError:
     return InputError(
-        f"The AMC file '{file}' does not give the bone '{printable(bone)}' {count} numbers in each of its {frames} frames, so "
+        f"The AMC file '{file}' does not give the bone '{printable(bone)}' {count} numbers in "
+        f"each of its {frames} frames, so "
         "that it has broken off or is another skeleton's; get it again from where it came."
     )
 
 
-def _recording(skeleton: Skeleton, moved: list[np.ndarray], degrees: bool, rate: float | None) -> Recording:
+def _recording(
+    skeleton: Skeleton, moved: list[np.ndarray], degrees: bool, rate: float | None
+) -> Recording:
     bones = list(skeleton.bones)
     leaves = sorted({*range(1, len(bones))} - {*skeleton.parents})
     names = (*bones, *(f"{bones[b]} end" for b in leaves))
@@ -225,7 +246,9 @@ def _recording(skeleton: Skeleton, moved: list[np.ndarray], degrees: bool, rate:
             turn = np.tile(np.eye(3), (frames, 1, 1))
             for freedom, column in zip(skeleton.freedoms[b], moved[b][rows].T, strict=True):
                 if freedom[0] == "r":
-                    turn = rotation_about(freedom[1], np.radians(column) if degrees else column) @ turn
+                    turn = (
+                        rotation_about(freedom[1], np.radians(column) if degrees else column) @ turn
+                    )
                 elif freedom[0] == "t" and b == 0:
                     offsets[:, 0, "xyz".index(freedom[1])] += column
             local[:, b] = axis @ turn @ axis.T

@@ -1,4 +1,6 @@
-"""Opens archives of arrays (.npz) that anyone may have made: nothing is unpacked before its size is known to be sound."""
+"""Opens archives of arrays (.npz) that anyone may have made: nothing is unpacked before its size is
+known to be sound.
+"""
 
 import struct
 import zlib
@@ -17,12 +19,25 @@ from ..core.errors import InputError
 __all__ = ["names_in", "read_arrays"]
 
 _SPARE, _PACKED = 100_000_000, 20
-"""An archive may unpack to so many bytes, and to so many times its own size; motion is packed to a half or a third."""
+"""An archive may unpack to so many bytes, and to so many times its own size; motion is packed to a
+half or a third.
+"""
 
 _KINDS = "fiuU"  # numbers and text
 _DAMAGE = (
-    BadZipFile, EOFError, KeyError, NotImplementedError, OSError, OverflowError, RuntimeError, SyntaxError, TokenError,
-    TypeError, ValueError, struct.error, zlib.error,
+    BadZipFile,
+    EOFError,
+    KeyError,
+    NotImplementedError,
+    OSError,
+    OverflowError,
+    RuntimeError,
+    SyntaxError,
+    TokenError,
+    TypeError,
+    ValueError,
+    struct.error,
+    zlib.error,
 )
 """All that a damaged archive may raise in zipfile and in NumPy's reader of headers."""
 
@@ -34,11 +49,15 @@ def _opened(file: Path) -> Iterator[ZipFile]:
             yield archive
     except _DAMAGE as error:
         reason = " ".join(str(error).split())[:120]
-        raise InputError(f"The archive '{file}' cannot be read ({reason}); get it again from where it came.") from None
+        raise InputError(
+            f"The archive '{file}' cannot be read ({reason}); get it again from where it came."
+        ) from None
 
 
 def _array(name: str, data: bytes) -> np.ndarray:
-    """The array in a member of an archive, without a copy. Raises ValueError where it is not just what its header announces."""
+    """The array in a member of an archive, without a copy. Raises ValueError where it is not just
+    what its header announces.
+    """
     member = BytesIO(data)
     version = np.lib.format.read_magic(member)
     if version == (1, 0):
@@ -51,7 +70,9 @@ def _array(name: str, data: bytes) -> np.ndarray:
     if dtype.kind not in _KINDS or min(shape, default=0) < 0:
         raise ValueError(f"'{name}' holds neither numbers nor text")
     if prod(shape) * max(dtype.itemsize, 1) != held:
-        raise ValueError(f"'{name}' announces {'×'.join(map(str, shape))} entries, but holds {held} bytes")
+        raise ValueError(
+            f"'{name}' announces {'×'.join(map(str, shape))} entries, but holds {held} bytes"
+        )
     flat = np.frombuffer(data, dtype, offset=member.tell()) if held else np.zeros(0, dtype)
     return flat.reshape(shape, order="F" if by_columns else "C")
 
@@ -63,7 +84,9 @@ def names_in(file: Path) -> list[str]:
 
 
 def read_arrays(file: Path, *names: str) -> list[np.ndarray]:
-    """Arrays of numbers or text by name. Raises InputError where one is missing, damaged, or larger than the file can hold."""
+    """Arrays of numbers or text by name. Raises InputError where one is missing, damaged, or larger
+    than the file can hold.
+    """
     with _opened(file) as archive:
         missing = [name for name in names if f"{name}.npy" not in archive.namelist()]
         if missing:
@@ -71,7 +94,9 @@ def read_arrays(file: Path, *names: str) -> list[np.ndarray]:
         infos = [archive.getinfo(f"{name}.npy") for name in names]
         unpacked = sum(info.file_size for info in infos)
         if unpacked > _SPARE + _PACKED * file.stat().st_size:
-            raise ValueError(f"it would unpack to {unpacked / 1e6:.0f} MB, which no motion of its size does")
+            raise ValueError(
+                f"it would unpack to {unpacked / 1e6:.0f} MB, which no motion of its size does"
+            )
         if any(info.compress_type not in (ZIP_STORED, ZIP_DEFLATED) for info in infos):
             raise ValueError("it is packed as no .npz is")
         return [_array(info.filename, archive.read(info)) for info in infos]

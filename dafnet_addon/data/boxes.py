@@ -1,6 +1,7 @@
 """Upright boxes as arrays, and their occupancy in the sensor: the furniture that training composes.
 
-A piece of furniture is rows of a (B, 7) array: centre x y z, half sizes x y z, yaw (radians, counter-clockwise). World, metres.
+A piece of furniture is rows of a (B, 7) array: centre x y z, half sizes x y z, yaw (radians,
+counter-clockwise). World, metres.
 """
 
 import numpy as np
@@ -21,13 +22,17 @@ _DISC = SPHERES[: len(SPHERES) // _LAYERS, :2]
 _HEIGHTS = SPHERES[:: len(_DISC), 2]
 
 
-def box(center: tuple[float, float, float], size: tuple[float, float, float], yaw: float = 0.0) -> np.ndarray:
+def box(
+    center: tuple[float, float, float], size: tuple[float, float, float], yaw: float = 0.0
+) -> np.ndarray:
     """One row: a box of full ``size`` about ``center``."""
     return np.array([*center, *(0.5 * s for s in size), yaw])
 
 
 def placed(boxes: np.ndarray, position: np.ndarray, yaw: float) -> np.ndarray:
-    """Boxes of a piece's own frame, turned by ``yaw`` and moved to ``position`` (2,) on the floor."""
+    """Boxes of a piece's own frame, turned by ``yaw`` and moved to ``position`` (2,) on the
+    floor.
+    """
     out = boxes.copy()
     out[:, :3] = rotate(yaw_matrix(np.array(yaw)), boxes[:, :3])
     out[:, :2] += position
@@ -43,8 +48,12 @@ def distances(boxes: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def near(boxes: np.ndarray, path: RootPath) -> np.ndarray:
-    """The boxes that the sensor may see along a path, the nearest first, filled up or cut to (MOST, 7)."""
-    gap = np.linalg.norm(path.position[None, :, :2] - boxes[:, None, :2], axis=-1).min(1, initial=np.inf)
+    """The boxes that the sensor may see along a path, the nearest first, filled up or cut to (MOST,
+    7).
+    """
+    gap = np.linalg.norm(path.position[None, :, :2] - boxes[:, None, :2], axis=-1).min(
+        1, initial=np.inf
+    )
     gap -= np.linalg.norm(boxes[:, 3:5], axis=1)
     order = np.argsort(gap)[:MOST]
     out = np.tile(ABSENT, (MOST, 1))
@@ -56,13 +65,14 @@ def near(boxes: np.ndarray, path: RootPath) -> np.ndarray:
 def occupancy(boxes: np.ndarray, path: RootPath) -> np.ndarray:
     """Occupancy (T, 2640) float32 of static upright boxes along a root path on the floor z = 0.
 
-    Equal to ``core.occupancy`` of the same boxes; both being upright, the distance is one in the plane and one in height,
-    which costs a hundredth of the distances in space.
+    Equal to ``core.occupancy`` of the same boxes; both being upright, the distance is one in the
+    plane and one in height, which costs a hundredth of the distances in space.
     """
     out = np.zeros((len(path), _LAYERS, len(_DISC)), dtype=np.float32)
     for center, half, yaw in zip(boxes[:, :3], boxes[:, 3:6], boxes[:, 6], strict=True):
         near = np.flatnonzero(
-            np.linalg.norm(path.position[:, :2] - center[:2], axis=1) < REACH + RADIUS + np.linalg.norm(half[:2])
+            np.linalg.norm(path.position[:, :2] - center[:2], axis=1)
+            < REACH + RADIUS + np.linalg.norm(half[:2])
         )
         above = np.abs(_HEIGHTS - center[2]) - half[2]
         layers = np.flatnonzero(above < RADIUS)

@@ -1,7 +1,8 @@
-"""Reads Biovision hierarchies (.bvh): a skeleton of offsets, and channels of angles in degrees for every frame.
+"""Reads Biovision hierarchies (.bvh): a skeleton of offsets, and channels of angles in degrees for
+every frame.
 
-Exporters take liberties, all of which are read: case, spaces, tabs and blank lines as they come, decimal commas, end sites
-of any name, one frame more or less than is announced.
+Exporters take liberties, all of which are read: case, spaces, tabs and blank lines as they come,
+decimal commas, end sites of any name, one frame more or less than is announced.
 """
 
 import re
@@ -55,7 +56,11 @@ def _hierarchy(text: str) -> list[_Joint]:
                 raise ValueError("it holds several skeletons")
             start = tokens.index("{", i)
             parent = open_joints[-1] if open_joints else -1
-            named = f"{joints[parent].name} end" if word.startswith("END") else " ".join(tokens[i + 1 : start])
+            named = (
+                f"{joints[parent].name} end"
+                if word.startswith("END")
+                else " ".join(tokens[i + 1 : start])
+            )
             joints.append(_Joint(printable(named), parent))
             open_joints.append(len(joints) - 1)
             i = start + 1
@@ -66,7 +71,11 @@ def _hierarchy(text: str) -> list[_Joint]:
             joints[open_joints[-1]].offset = tuple(offset.tolist())
             i += 4
         elif word == "CHANNELS" and open_joints:
-            channels = list(takewhile(_CHANNELS.__contains__, (token.lower() for token in tokens[i + 2 : i + 8])))
+            channels = list(
+                takewhile(
+                    _CHANNELS.__contains__, (token.lower() for token in tokens[i + 2 : i + 8])
+                )
+            )
             if tokens[i + 1 : i + 2] != [str(len(channels))]:
                 raise ValueError(f"the channels of '{joints[open_joints[-1]].name}'")
             joints[open_joints[-1]].channels = channels
@@ -82,7 +91,9 @@ def _hierarchy(text: str) -> list[_Joint]:
 
 
 def _parts(text: str) -> tuple[list[_Joint], int, float, np.ndarray]:
-    """The joints, the frames and the seconds between them as announced, and all numbers (N,). Raises ValueError."""
+    """The joints, the frames and the seconds between them as announced, and all numbers (N,).
+    Raises ValueError.
+    """
     motion = _MOTION.search(text)
     times = _TIMES.match(text[motion.end() : motion.end() + _TIMES_WITHIN]) if motion else None
     if motion is None or times is None:
@@ -90,30 +101,46 @@ def _parts(text: str) -> tuple[list[_Joint], int, float, np.ndarray]:
     if motion.start() > MOST_JOINTS * _PER_JOINT:
         raise ValueError("its skeleton is no body's")
     announced, (step,) = int(times[1]), numbers_in(times[2])
-    return _hierarchy(text[: motion.start()]), announced, float(step), numbers_in(text[motion.end() + times.end() :])
+    return (
+        _hierarchy(text[: motion.start()]),
+        announced,
+        float(step),
+        numbers_in(text[motion.end() + times.end() :]),
+    )
 
 
 def read_bvh(file: Path) -> Recording:
     """The recording in a .bvh file; end sites are joints called "<parent> end".
 
-    Channels turn in the order they are listed (the first is the outermost rotation); a position channel stands in for that
-    part of its joint's offset. Raises InputError where the file is not whole.
+    Channels turn in the order they are listed (the first is the outermost rotation); a position
+    channel stands in for that part of its joint's offset. Raises InputError where the file is not
+    whole.
     """
     text = text_of(file)
     if not re.match(r"\s*HIERARCHY\b", text, re.IGNORECASE):
-        raise InputError(f"The file '{file}' does not begin with HIERARCHY as a BVH file does; export it again as BVH.")
+        raise InputError(
+            f"The file '{file}' does not begin with HIERARCHY as a BVH file does; export it again "
+            "as BVH."
+        )
     try:
         joints, announced, step, values = _parts(text)
     except ValueError as error:
         raise InputError(
-            f"The BVH file '{file}' is damaged or breaks off (near: {str(error)[:120]}); export it again from where it came."
+            f"The BVH file '{file}' is damaged or breaks off (near: {str(error)[:120]}); export "
+            "it again from where it came."
         ) from None
     kinds = sum(len(joint.channels) for joint in joints)
     frames = len(values) // max(kinds, 1)
     # Several exporters count the rest pose, or forget it.
-    if frames < 1 or abs(frames - announced) > 1 or len(values) != frames * kinds or not sound(values):
+    if (
+        frames < 1
+        or abs(frames - announced) > 1
+        or len(values) != frames * kinds
+        or not sound(values)
+    ):
         raise InputError(
-            f"The BVH file '{file}' announces {announced} frames of {kinds} numbers, but holds {len(values)} numbers, or some "
+            f"The BVH file '{file}' announces {announced} frames of {kinds} numbers, but holds "
+            f"{len(values)} numbers, or some "
             "that no motion has; export it again from where it came."
         )
     check_size(file, frames, len(joints), len(values))
@@ -141,4 +168,10 @@ def _recording(joints: list[_Joint], values: np.ndarray, step: float) -> Recordi
     rest = posed(parents, rest_offsets[None], np.tile(np.eye(3), (1, len(joints), 1, 1)))[0]
     # Frame times are written with few digits: 0.0333333 is 30 a second.
     rate = round(1.0 / step, 2) if step > 0 else None
-    return Recording(tuple(j.name for j in joints), parents, posed_in_blocks(parents, len(values), pose), rest, rate)
+    return Recording(
+        tuple(j.name for j in joints),
+        parents,
+        posed_in_blocks(parents, len(values), pose),
+        rest,
+        rate,
+    )

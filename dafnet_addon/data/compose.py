@@ -1,8 +1,9 @@
-"""Composed motions: captured pieces joined and combined into what nobody recorded in one go, and what training needs often.
+"""Composed motions: captured pieces joined and combined into what nobody recorded in one go, and
+what training needs often.
 
-Walking up to a seat and sitting down, getting up and walking off, working while seated, writing on a desk or a board, lying
-down on a bed. All is made of captured motion on the canonical body; what is added are joins, lent upper bodies and courses of
-hands.
+Walking up to a seat and sitting down, getting up and walking off, working while seated, writing on
+a desk or a board, lying down on a bed. All is made of captured motion on the canonical body; what
+is added are joins, lent upper bodies and courses of hands.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,7 +15,18 @@ from ..core.root import root_from_joints, to_root
 from ..core.rotations import normalised, rotate, yaw_matrix
 from ..core.skeleton import SEAT_TO_PELVIS, joint
 from .courses import AT_DESKS, course_through, drawing, lettering, wandering
-from .joins import FEET, LENGTHS, ease, frames_of, handed, joined, lent, on_the_body, presence, swayed
+from .joins import (
+    FEET,
+    LENGTHS,
+    ease,
+    frames_of,
+    handed,
+    joined,
+    lent,
+    on_the_body,
+    presence,
+    swayed,
+)
 from .pieces import (
     BEFORE,
     DIRECTIONS,
@@ -36,9 +48,18 @@ from .windows import Motion, mirrored
 
 __all__ = ["LEANS", "at_board", "at_top", "composed", "seated_work"]
 
-_BUSY = {"standing_gesture", "social_gesture", "greeting", "documents", "work_standing", "reach-hand-task", "standing_idle"}
+_BUSY = {
+    "standing_gesture",
+    "social_gesture",
+    "greeting",
+    "documents",
+    "work_standing",
+    "reach-hand-task",
+    "standing_idle",
+}
 _HIGHEST_BED = 0.62
-_CARRIES, _WRIST_LIES = 0.02, 0.09  # metres over a bed: of a body, against the bare floor; and of a wrist whose hand lies on it
+# metres over a bed: of a body, against the bare floor; and of a wrist whose hand lies on it
+_CARRIES, _WRIST_LIES = 0.02, 0.09
 _TURNING = 66  # frames of getting onto a bed
 _WAITS = 90  # frames
 _SITS = 16  # sit-downs of one body that are composed with
@@ -48,8 +69,12 @@ LEANS = (-0.3, -0.15, 0.0, 0.0, 0.15, 0.3)  # radians; back is positive
 _AT_DESK_LEANS = (-0.2, -0.1, 0.0, 0.0, 0.06)
 
 
-def _to_and_from_seats(motions: list[Motion], sits: list[Piece], to: Pool, away: Pool) -> Iterator[Composed]:
-    """Walks that end in a sit-down ("approach"), and stand-ups that go on as a walk ("leave"), all around the seat."""
+def _to_and_from_seats(
+    motions: list[Motion], sits: list[Piece], to: Pool, away: Pool
+) -> Iterator[Composed]:
+    """Walks that end in a sit-down ("approach"), and stand-ups that go on as a walk ("leave"), all
+    around the seat.
+    """
     for sit in sits:
         each = 1 if sit.borrowed else 2
         path = root_from_joints(sit.joints)
@@ -66,32 +91,59 @@ def _to_and_from_seats(motions: list[Motion], sits: list[Piece], to: Pool, away:
 
 
 def _waiting(sits: list[Piece]) -> Iterator[Composed]:
-    """Standing still before a seat for a while, then sitting down ("wait"), and the same reversed."""
+    """Standing still before a seat for a while, then sitting down ("wait"), and the same
+    reversed.
+    """
     for sit in sits:
         stands = np.repeat(sit.joints[:1], _WAITS, axis=0)
         whole = np.concatenate([stands, sit.joints])
         focus = np.arange(0, _WAITS, 5)
         yield from made("wait", sit.name, sit.subject, "sit-stand", whole, focus)
-        yield from made("wait", sit.name + " reversed", sit.subject, "sit-stand", whole[::-1], len(whole) - 1 - focus[::-1])
+        yield from made(
+            "wait",
+            sit.name + " reversed",
+            sit.subject,
+            "sit-stand",
+            whole[::-1],
+            len(whole) - 1 - focus[::-1],
+        )
 
 
 def at_top(
-    rng: np.random.Generator, joints: np.ndarray, start: int, end: int, height: float, farther: float = 0.0
+    rng: np.random.Generator,
+    joints: np.ndarray,
+    start: int,
+    end: int,
+    height: float,
+    farther: float = 0.0,
 ) -> np.ndarray:
-    """The motion with hands that work on a top at ``height`` in frames ``start`` to ``end``, wherever its root is then."""
+    """The motion with hands that work on a top at ``height`` in frames ``start`` to ``end``,
+    wherever its root is then.
+    """
     path = root_from_joints(joints)
     origin, turn = path.position[(start + end) // 2], path.rotation[(start + end) // 2]
     out = joints
-    for side, sign, course in zip(("left_", "right_"), (-1.0, 1.0), AT_DESKS[rng.integers(len(AT_DESKS))], strict=True):
+    for side, sign, course in zip(
+        ("left_", "right_"), (-1.0, 1.0), AT_DESKS[rng.integers(len(AT_DESKS))], strict=True
+    ):
         if course is not None:
             local = course(rng, len(joints), sign) + np.array([0.0, farther, height])
             first = start + int(rng.integers(0, 12))
-            out = handed(out, side, origin + rotate(turn, local), presence(len(joints), first, end - int(rng.integers(0, 12))))
+            out = handed(
+                out,
+                side,
+                origin + rotate(turn, local),
+                presence(len(joints), first, end - int(rng.integers(0, 12))),
+            )
     return out
 
 
-def _leaning(rng: np.random.Generator, frames: int, rest: int, leans: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """How a body leans back and turns on its seat (T,), radians, once it rests; it goes from one of ``leans`` to another."""
+def _leaning(
+    rng: np.random.Generator, frames: int, rest: int, leans: Sequence[float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """How a body leans back and turns on its seat (T,), radians, once it rests; it goes from one of
+    ``leans`` to another.
+    """
     stops = np.concatenate([[0.0, 0.0], rng.choice(leans, 5) * rng.uniform(0.6, 1.0, 5)])
     lean = course_through(stops, [rest, *rng.integers(30, 60, 5)])
     lean = np.pad(lean, (0, frames), mode="edge")[:frames]
@@ -103,10 +155,11 @@ def _leaning(rng: np.random.Generator, frames: int, rest: int, leans: Sequence[f
 def seated_work(
     rng: np.random.Generator, sit: np.ndarray, upper: np.ndarray, leans: Sequence[float]
 ) -> tuple[np.ndarray, int]:
-    """A motion (T, 22, 3) that ends seated, gone on for ``WORKS`` frames under another's upper body; and where it rests.
+    """A motion (T, 22, 3) that ends seated, gone on for ``WORKS`` frames under another's upper
+    body; and where it rests.
 
-    That is 20 frames before the end of ``sit``: from there on ``upper`` (T, 22, 3) is lent and the trunk leans, from one of
-    ``leans`` (radians, back is positive) to another.
+    That is 20 frames before the end of ``sit``: from there on ``upper`` (T, 22, 3) is lent and the
+    trunk leans, from one of ``leans`` (radians, back is positive) to another.
     """
     body = np.concatenate([sit, np.repeat(sit[-1:], WORKS, axis=0)])
     rest, frames = len(sit) - 20, len(body)
@@ -116,7 +169,9 @@ def seated_work(
 
 
 def at_board(rng: np.random.Generator, joints: np.ndarray, start: int, end: int) -> np.ndarray:
-    """The motion with a right hand that writes or draws on a board in frames ``start`` to ``end``, before its root there."""
+    """The motion with a right hand that writes or draws on a board in frames ``start`` to ``end``,
+    before its root there.
+    """
     path, middle = root_from_joints(joints), (start + end) // 2
     course = (lettering, lettering, drawing)[rng.integers(3)](rng, len(joints))
     wrist = path.position[middle] + rotate(path.rotation[middle], course)
@@ -124,7 +179,9 @@ def at_board(rng: np.random.Generator, joints: np.ndarray, start: int, end: int)
 
 
 def _while_seated(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed]:
-    """Seated legs under upper bodies that gesture, greet and reach ("work"), or whose hands work at a desk ("desk")."""
+    """Seated legs under upper bodies that gesture, greet and reach ("work"), or whose hands work at
+    a desk ("desk").
+    """
     rng = np.random.default_rng(12)
     seated = upper_bodies(motions, {"seated_chair", "seated_table"})
     busy = upper_bodies(motions, _BUSY) + seated
@@ -139,11 +196,15 @@ def _while_seated(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed
             if kind == "desk":
                 top = body[rest + 20, 0, 2] - SEAT_TO_PELVIS + rng.uniform(0.24, 0.33)
                 body = at_top(rng, body, rest + 5, frames + 60, top)
-            yield from made(kind, sit.name, sit.subject, "seated", body, np.arange(rest, frames - 20, 5))
+            yield from made(
+                kind, sit.name, sit.subject, "seated", body, np.arange(rest, frames - 20, 5)
+            )
 
 
 def _while_standing(motions: list[Motion], to: Pool, away: Pool) -> Iterator[Composed]:
-    """A walk up to a board ("write") or a counter ("counter"), work there on captured standing, and a walk away."""
+    """A walk up to a board ("write") or a counter ("counter"), work there on captured standing, and
+    a walk away.
+    """
     rng = np.random.default_rng(13)
     behind = range(DIRECTIONS // 4, 3 * DIRECTIONS // 4 + 1)
     idles = upper_bodies([m for m in motions if m.source != TOELESS], {"standing_idle", "standing"})
@@ -151,10 +212,15 @@ def _while_standing(motions: list[Motion], to: Pool, away: Pool) -> Iterator[Com
         for stands in (idle, mirrored(idle)):
             features = features_of(stands)
             for kind in ("write", "counter"):
-                come, go = (list(ways_of(p, f, _BOARD, 1, behind)) for p, f in ((to, features[0]), (away, features[-1])))
+                come, go = (
+                    list(ways_of(p, f, _BOARD, 1, behind))
+                    for p, f in ((to, features[0]), (away, features[-1]))
+                )
                 if not come or not go:
                     continue
-                whole = joined(joined(come[rng.integers(len(come))], stands), go[rng.integers(len(go))])
+                whole = joined(
+                    joined(come[rng.integers(len(come))], stands), go[rng.integers(len(go))]
+                )
                 start, end = BEFORE + 8, BEFORE + WORKS - 4
                 if kind == "counter":
                     whole = at_top(rng, whole, start, end, rng.uniform(0.72, 1.05))
@@ -162,11 +228,20 @@ def _while_standing(motions: list[Motion], to: Pool, away: Pool) -> Iterator[Com
                     whole = at_board(rng, whole, start, end)
                 if rng.random() < 0.5:
                     whole = mirrored(whole)
-                yield from made(kind, "standing", "composed", "standing", whole, np.arange(start - 30, end + 30, 5))
+                yield from made(
+                    kind,
+                    "standing",
+                    "composed",
+                    "standing",
+                    whole,
+                    np.arange(start - 30, end + 30, 5),
+                )
 
 
 def _lying_down(motions: list[Motion]) -> list[np.ndarray]:
-    """Captured pieces that begin sitting on the floor, lie back and stay; also made by reversing sitting up from lying."""
+    """Captured pieces that begin sitting on the floor, lie back and stay; also made by reversing
+    sitting up from lying.
+    """
     found = []
     for m in (m for m in motions if m.category == "lying"):
         for joints in (m.joints, m.joints[::-1]):
@@ -181,19 +256,25 @@ def _lying_down(motions: list[Motion]) -> list[np.ndarray]:
 
 
 def _lifted(joints: np.ndarray, height: float) -> np.ndarray:
-    """A body on the floor, on a bed of that height instead; hands that sank into the floor lie on it."""
+    """A body on the floor, on a bed of that height instead; hands that sank into the floor lie on
+    it.
+    """
     out = joints + np.array([0.0, 0.0, height + _CARRIES])
     for side in ("left_", "right_"):
         wrist = out[:, joint(side + "wrist")].copy()
         over = wrist[:, 2] - height - _WRIST_LIES
         wrist[:, 2] = height + _WRIST_LIES + 0.5 * (over + np.sqrt(over**2 + 0.03**2))
         shoulder, elbow, hand = (joint(side + n) for n in ("shoulder", "elbow", "wrist"))
-        out[:, elbow], out[:, hand] = two_bone(out[:, shoulder], wrist, out[:, elbow], LENGTHS[elbow], LENGTHS[hand])
+        out[:, elbow], out[:, hand] = two_bone(
+            out[:, shoulder], wrist, out[:, elbow], LENGTHS[elbow], LENGTHS[hand]
+        )
     return out
 
 
 def _onto_the_bed(seated: np.ndarray, lying: np.ndarray, turn: float, inward: float) -> np.ndarray:
-    """From one seated pose (22, 3) on a bed's edge to one that sits on the bed along it: the legs rise, the body turns."""
+    """From one seated pose (22, 3) on a bed's edge to one that sits on the bed along it: the legs
+    rise, the body turns.
+    """
     t = np.linspace(0.0, 1.0, _TURNING)
     rise, turned, place = (1 - ease(x)[:, None, None] for x in (t / 0.6, (t - 0.15) / 0.85, t))
     poses = []
@@ -205,12 +286,19 @@ def _onto_the_bed(seated: np.ndarray, lying: np.ndarray, turn: float, inward: fl
     feet = [j for pair in FEET for j in pair]
     local[:, feet, 2] = (a + (b - a) * rise)[:, feet, 2] + 0.05 * np.sin(np.pi * rise[:, :, 0])
     yaw = root_from_joints(np.repeat(seated[None], 2, axis=0)).yaw[0]
-    origin = seated[0] * (1, 1, 0) + rotate(yaw_matrix(np.array(yaw)), np.array([0.0, -inward, 0.0])) * turned[:, 0]
-    return on_the_body(rotate(yaw_matrix(yaw + turn * turned[:, 0, 0])[:, None], local) + origin[:, None])
+    origin = (
+        seated[0] * (1, 1, 0)
+        + rotate(yaw_matrix(np.array(yaw)), np.array([0.0, -inward, 0.0])) * turned[:, 0]
+    )
+    return on_the_body(
+        rotate(yaw_matrix(yaw + turn * turned[:, 0, 0])[:, None], local) + origin[:, None]
+    )
 
 
 def _lying(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed]:
-    """Sitting down on a bed's edge, turning onto it and lying back ("lie"), and the same reversed."""
+    """Sitting down on a bed's edge, turning onto it and lying back ("lie"), and the same
+    reversed.
+    """
     rng = np.random.default_rng(14)
     pieces = _lying_down(motions)
     for sit in (s for s in sits if pieces and not s.borrowed):
@@ -224,24 +312,45 @@ def _lying(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed]:
         whole = joined(np.concatenate([sit.joints, turning[1:]]), lies)
         start, frames = len(sit.joints) - 20, len(whole)
         yield from made("lie", sit.name, sit.subject, "lying", whole, np.arange(start, frames, 5))
-        yield from made("lie", sit.name + " reversed", sit.subject, "lying", whole[::-1], np.arange(0, frames - start, 5))
+        yield from made(
+            "lie",
+            sit.name + " reversed",
+            sit.subject,
+            "lying",
+            whole[::-1],
+            np.arange(0, frames - start, 5),
+        )
 
 
 def _some_of_each_body(sits: list[Piece]) -> list[Piece]:
-    """At most ``_SITS`` sit-downs of one body, spread over all that it has: who sat down a hundred times sat much alike."""
+    """At most ``_SITS`` sit-downs of one body, spread over all that it has: who sat down a hundred
+    times sat much alike.
+    """
     bodies: dict[str, list[Piece]] = {}
     for sit in sits:
         bodies.setdefault(sit.subject, []).append(sit)
-    return [own[k] for own in bodies.values() for k in np.unique(np.linspace(0, len(own) - 1, _SITS).round().astype(int))]
+    return [
+        own[k]
+        for own in bodies.values()
+        for k in np.unique(np.linspace(0, len(own) - 1, _SITS).round().astype(int))
+    ]
 
 
 def composed(motions: list[Motion]) -> list[Composed]:
-    """All composed motions of captured ones on the canonical body; the same for the same motions."""
+    """All composed motions of captured ones on the canonical body; the same for the same
+    motions.
+    """
     to, away = pool_of(motions, arriving=True), pool_of(motions, arriving=False)
     sits = list(sit_downs(motions))
     # Many of those with borrowed arms, and all of them begin in front of the seat.
-    sits = _some_of_each_body([s for s in sits if not s.borrowed]) + [s for s in sits if s.borrowed][::9]
+    sits = (
+        _some_of_each_body([s for s in sits if not s.borrowed])
+        + [s for s in sits if s.borrowed][::9]
+    )
     return [
-        *_to_and_from_seats(motions, sits, to, away), *_waiting(sits), *_while_seated(motions, sits),
-        *_while_standing(motions, to, away), *_lying(motions, sits),
+        *_to_and_from_seats(motions, sits, to, away),
+        *_waiting(sits),
+        *_while_seated(motions, sits),
+        *_while_standing(motions, to, away),
+        *_lying(motions, sits),
     ]

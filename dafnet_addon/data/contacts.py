@@ -1,4 +1,6 @@
-"""Where the body touches: feet on the floor, hands at work, the pelvis at rest, told from height, speed and duration."""
+"""Where the body touches: feet on the floor, hands at work, the pelvis at rest, told from height,
+speed and duration.
+"""
 
 import numpy as np
 
@@ -20,7 +22,9 @@ _PELVIS_LOW, _PELVIS_SLOW, _PELVIS_FRAMES = 0.86, 0.12, 8
 def _median(values: np.ndarray) -> np.ndarray:
     """Running median of ``values`` (T, …) over ``_MEDIAN`` frames; the ends are held."""
     half = _MEDIAN // 2
-    padded = np.concatenate([np.repeat(values[:1], half, axis=0), values, np.repeat(values[-1:], half, axis=0)])
+    padded = np.concatenate(
+        [np.repeat(values[:1], half, axis=0), values, np.repeat(values[-1:], half, axis=0)]
+    )
     return np.median(np.lib.stride_tricks.sliding_window_view(padded, _MEDIAN, axis=0), axis=-1)
 
 
@@ -32,11 +36,13 @@ def _lasting(flags: np.ndarray, shortest: int) -> np.ndarray:
 
 
 def contacts(joints: np.ndarray) -> np.ndarray:
-    """Contacts (T, 5) bool of a motion (T, 22, 3) in metres at 30 fps: left foot, right foot, left hand, right hand, pelvis.
+    """Contacts (T, 5) bool of a motion (T, 22, 3) in metres at 30 fps: left foot, right foot, left
+    hand, right hand, pelvis.
 
-    A foot touches while its toe base or heel is near the floor z = 0 and slow. A hand touches while it is still for 0.3 s where
-    there may be furniture and the arm does not simply hang. The pelvis touches while it is low and still for a quarter of a
-    second, in sitting or lying; in a squat the feet are under it.
+    A foot touches while its toe base or heel is near the floor z = 0 and slow. A hand touches while
+    it is still for 0.3 s where there may be furniture and the arm does not simply hang. The pelvis
+    touches while it is low and still for a quarter of a second, in sitting or lying; in a squat the
+    feet are under it.
     """
     out = np.zeros((len(joints), len(CONTACTS)), dtype=bool)
     if len(joints) < 2:
@@ -44,7 +50,9 @@ def contacts(joints: np.ndarray) -> np.ndarray:
     height = _median(joints[..., 2])
     speed = _median(np.linalg.norm(np.gradient(joints, axis=0), axis=-1) * 30.0)
     for column, side in enumerate(("left_", "right_")):
-        toe, ankle, elbow, wrist = (joint(side + part) for part in ("foot", "ankle", "elbow", "wrist"))
+        toe, ankle, elbow, wrist = (
+            joint(side + part) for part in ("foot", "ankle", "elbow", "wrist")
+        )
         on_toe = (height[:, toe] < _TOE_HIGH) & (speed[:, toe] < _FOOT_SLOW)
         on_heel = (height[:, ankle] < _ANKLE_HIGH) & (speed[:, ankle] < _FOOT_SLOW)
         out[:, column] = _lasting(_median((on_toe | on_heel).astype(float)) > 0.5, 3)

@@ -1,4 +1,5 @@
-"""Finds frames of captured motion that are no motion: T-poses, frozen or lost joints, flips, impossible speeds.
+"""Finds frames of captured motion that are no motion: T-poses, frozen or lost joints, flips,
+impossible speeds.
 
 What is found is cut, never mended, and said with its reason.
 """
@@ -13,12 +14,14 @@ from ..core.skeleton import PARENTS, UPPER, joint
 __all__ = ["REASONS", "Cut", "bad_frames", "cuts"]
 
 REASONS = ("T-pose", "dropout", "flip", "speed")
-"""Why frames are cut: straight arms held out over straight legs, as for calibration; joints that stand still for some frames
-and then jump, or leave their bone; a body turned by over 70 degrees in a frame; a joint faster than a body can.
+"""Why frames are cut: straight arms held out over straight legs, as for calibration; joints that
+stand still for some frames and then jump, or leave their bone; a body turned by over 70 degrees in
+a frame; a joint faster than a body can.
 """
 
 _FPS = 30.0
-_FASTEST_ROOT, _FASTEST_LIMB = 9.0, 13.0  # metres a second: sprinting; a thrown hand or a kicking foot seen from the pelvis
+# metres a second: sprinting; a thrown hand or a kicking foot seen from the pelvis
+_FASTEST_ROOT, _FASTEST_LIMB = 9.0, 13.0
 _JUMP = 0.05  # metres in a frame, after joints stood still to the tenth of a millimetre
 _FROZEN = 3  # frames
 _T_POSE = 5  # frames
@@ -39,15 +42,23 @@ def _runs(flags: np.ndarray) -> np.ndarray:
 
 
 def _t_pose(joints: np.ndarray, limbs: np.ndarray) -> np.ndarray:
-    """Where straight arms are held out to the sides over straight legs, and the raising and lowering of the arms around it."""
+    """Where straight arms are held out to the sides over straight legs, and the raising and
+    lowering of the arms around it.
+    """
+
     def direction(a: str, b: str) -> np.ndarray:
         return normalised(joints[:, joint(b)] - joints[:, joint(a)])
 
-    left, right = direction("left_shoulder", "left_wrist"), direction("right_shoulder", "right_wrist")
+    left, right = (
+        direction("left_shoulder", "left_wrist"),
+        direction("right_shoulder", "right_wrist"),
+    )
     apart = (left * right).sum(-1)
     straight = np.ones(len(joints), dtype=bool)
     for side in ("left_", "right_"):
-        straight &= (direction(side + "shoulder", side + "elbow") * direction(side + "elbow", side + "wrist")).sum(-1) > 0.85
+        straight &= (
+            direction(side + "shoulder", side + "elbow") * direction(side + "elbow", side + "wrist")
+        ).sum(-1) > 0.85
         straight &= direction(side + "hip", side + "ankle")[:, 2] < -0.96
     level = (left[:, 2] > -0.6) & (right[:, 2] > -0.6) & (np.abs(left[:, 2] - right[:, 2]) < 0.25)
     held = straight & level & (apart < -0.6) & (np.concatenate([limbs, limbs[-1:]]) * _FPS < 0.7)
@@ -59,11 +70,14 @@ def _t_pose(joints: np.ndarray, limbs: np.ndarray) -> np.ndarray:
 
 def _dropout(joints: np.ndarray, step: np.ndarray) -> np.ndarray:
     bad = np.zeros(len(joints), dtype=bool)
-    # A frozen joint that jumps when it comes back was not seen meanwhile; one that does not may simply have rested. Planted
-    # feet stand quite still in cleaned motion, and leave the floor fast.
+    # A frozen joint that jumps when it comes back was not seen meanwhile; one that does not may
+    # simply have rested. Planted feet stand quite still in cleaned motion, and leave the floor
+    # fast.
     for j in UPPER:
         for start, end in _runs(step[:, j] < 1e-4):
-            jumps = max(step[start - 1, j] if start else 0.0, step[end, j] if end < len(step) else 0.0)
+            jumps = max(
+                step[start - 1, j] if start else 0.0, step[end, j] if end < len(step) else 0.0
+            )
             if end - start >= _FROZEN and jumps > _JUMP:
                 bad[start : end + 1] = True
     bones = np.linalg.norm(joints[:, 1:] - joints[:, list(PARENTS[1:])], axis=-1)
@@ -84,7 +98,9 @@ def _both_sides(between: np.ndarray) -> np.ndarray:
 
 
 def bad_frames(joints: np.ndarray) -> dict[str, np.ndarray]:
-    """For each of ``REASONS`` the frames (T,) of joints (T, 22, 3), 30 fps, metres, z up, that are bad because of it."""
+    """For each of ``REASONS`` the frames (T,) of joints (T, 22, 3), 30 fps, metres, z up, that are
+    bad because of it.
+    """
     if len(joints) < 2:
         return {reason: np.zeros(len(joints), dtype=bool) for reason in REASONS}
     step = np.linalg.norm(np.diff(joints, axis=0), axis=-1)
@@ -100,6 +116,12 @@ def bad_frames(joints: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def cuts(joints: np.ndarray) -> list[Cut]:
-    """What to cut from joints (T, 22, 3), 30 fps, metres, z up: runs of bad frames, each with its reason, in order of time."""
-    found = [Cut(int(a), int(b), reason) for reason, bad in bad_frames(joints).items() for a, b in _runs(bad)]
+    """What to cut from joints (T, 22, 3), 30 fps, metres, z up: runs of bad frames, each with its
+    reason, in order of time.
+    """
+    found = [
+        Cut(int(a), int(b), reason)
+        for reason, bad in bad_frames(joints).items()
+        for a, b in _runs(bad)
+    ]
     return sorted(found, key=lambda cut: (cut.start, cut.end))

@@ -20,12 +20,18 @@ _PELVIS = 0.42, 0.82  # resting heights that every other seat is moved to
 
 
 def fit_report(
-    motions: list[Motion], draws: Draws, rng: np.random.Generator, count: int = 200, bank: ShapeBank = NO_BANK
+    motions: list[Motion],
+    draws: Draws,
+    rng: np.random.Generator,
+    count: int = 200,
+    bank: ShapeBank = NO_BANK,
 ) -> str:
-    """A table of ``count`` moments of every kind in ``draws``: pieces fitted of pieces tried, and moments not used, with why.
+    """A table of ``count`` moments of every kind in ``draws``: pieces fitted of pieces tried, and
+    moments not used, with why.
 
-    A moment cannot be used where a seat or bed fits nowhere ("no seat", "no bed"), or where the motion is cut off half-way down
-    to one ("cut"). A desk, board or shelf that does not fit is left out. Every other seat is moved to a random height first.
+    A moment cannot be used where a seat or bed fits nowhere ("no seat", "no bed"), or where the
+    motion is cut off half-way down to one ("cut"). A desk, board or shelf that does not fit is left
+    out. Every other seat is moved to a random height first.
     """
     head = f"{'moments of':14}{'used':>7}{'no seat':>9}{'no bed':>8}{'cut':>6}"
     lines = [head + "".join(piece.rjust(12) for piece in _PIECES)]
@@ -43,5 +49,8 @@ def fit_report(
                 tally[piece + " tried"] += 1
                 tally[piece + " fitted"] += found is not None
         cells = "".join(f"{tally[p + ' fitted']}/{tally[p + ' tried']}".rjust(12) for p in _PIECES)
-        lines.append(f"{kind:14}{tally['']:>7}{tally['no seat']:>9}{tally['no bed']:>8}{tally['cut']:>6}" + cells)
+        lines.append(
+            f"{kind:14}{tally['']:>7}{tally['no seat']:>9}{tally['no bed']:>8}{tally['cut']:>6}"
+            + cells
+        )
     return "\n".join(lines)

@@ -1,7 +1,9 @@
-"""Clips of bodies that training never sees, with furniture fitted to them once: what the metrics are measured on.
+"""Clips of bodies that training never sees, with furniture fitted to them once: what the metrics
+are measured on.
 
-``held_out.json`` freezes them: which frames of which clip, its seated episodes and its furniture, found once and kept, so that
-figures of different weights are of the same test. It holds no motion; that comes from the motion files.
+``held_out.json`` freezes them: which frames of which clip, its seated episodes and its furniture,
+found once and kept, so that figures of different weights are of the same test. It holds no motion;
+that comes from the motion files.
 """
 
 import json
@@ -23,7 +25,16 @@ from .prepare import load_motions
 from .rests import Rest, rest_of
 from .windows import Motion, mirrored, motion_of
 
-__all__ = ["ACTIVITIES", "FROZEN", "HeldClip", "fingerprint", "frozen_text", "held_out", "is_frozen", "test_motions"]
+__all__ = [
+    "ACTIVITIES",
+    "FROZEN",
+    "HeldClip",
+    "fingerprint",
+    "frozen_text",
+    "held_out",
+    "is_frozen",
+    "test_motions",
+]
 
 FROZEN = Path(__file__).with_name("held_out.json")
 ACTIVITIES = {
@@ -35,18 +46,22 @@ ACTIVITIES = {
     "lie": ("lying",),
 }
 """Activities, and the categories of clips that are of them."""
-_ACTIVITY = {category: activity for activity, categories in ACTIVITIES.items() for category in categories}
+_ACTIVITY = {
+    category: activity for activity, categories in ACTIVITIES.items() for category in categories
+}
 _TEST_ONLY = {"hdm05_cuts"}  # share-alike: the weights that ship must not be of it
 _SAME = 0.01  # metres by which a fingerprint may be off
 
 
 @dataclass(frozen=True)
 class HeldClip:
-    """``joints`` (T, 22, 3): ground truth, 30 fps. ``path``: its raw root. ``boxes`` (B, 7): its furniture, the same as its
-    ``scene``. ``rests``: seated episodes, on a bed lying ones. ``activity``: one of ``ACTIVITIES``. ``unseen``: whether the
-    body has no clip in training. ``composed``: whether it was made of several clips, or raised from the floor onto a bed.
-    ``room``: what there is beside seats and chance pieces, "desk", "shelf" or "bed" where the body uses one, else "".
-    ``real``: real pieces beside the boxes; ``piece``: the one that carries the body, with its ``kind`` and ``maker``.
+    """``joints`` (T, 22, 3): ground truth, 30 fps. ``path``: its raw root. ``boxes`` (B, 7): its
+    furniture, the same as its ``scene``. ``rests``: seated episodes, on a bed lying ones.
+    ``activity``: one of ``ACTIVITIES``. ``unseen``: whether the body has no clip in training.
+    ``composed``: whether it was made of several clips, or raised from the floor onto a bed.
+    ``room``: what there is beside seats and chance pieces, "desk", "shelf" or "bed" where the body
+    uses one, else "". ``real``: real pieces beside the boxes; ``piece``: the one that carries the
+    body, with its ``kind`` and ``maker``.
     """
 
     name: str
@@ -76,14 +91,18 @@ class HeldClip:
 
 
 def fingerprint(joints: np.ndarray) -> list[float]:
-    """Seven numbers (metres) that tell one motion (T, 22, 3) from another: mean and spread of its points, mean step a frame."""
+    """Seven numbers (metres) that tell one motion (T, 22, 3) from another: mean and spread of its
+    points, mean step a frame.
+    """
     step = np.linalg.norm(np.diff(joints, axis=0), axis=-1).mean()
     numbers = [*joints.mean((0, 1)), *joints.std((0, 1)), step]
     return [round(float(number), 4) for number in numbers]
 
 
 def is_frozen(joints: np.ndarray, frozen: dict[str, Any]) -> bool:
-    """Whether a motion (T, 22, 3) is the one whose number of frames and fingerprint a frozen clip holds."""
+    """Whether a motion (T, 22, 3) is the one whose number of frames and fingerprint a frozen clip
+    holds.
+    """
     return len(joints) == frozen["frames"] and bool(
         np.abs(np.subtract(fingerprint(joints), frozen["fingerprint"])).max() <= _SAME
     )
@@ -97,7 +116,9 @@ def frozen_text(frozen: dict[str, Any]) -> str:
 
 
 def test_motions(folder: Path) -> dict[str, Motion]:
-    """All motions of the test by name: those of ``load_motions``, and of sources that are never trained on."""
+    """All motions of the test by name: those of ``load_motions``, and of sources that are never
+    trained on.
+    """
     found = load_motions(folder, "choose", "tell")
     bodies: dict[str, list[Clip]] = defaultdict(list)
     for clip in read_clips(folder):
@@ -105,7 +126,9 @@ def test_motions(folder: Path) -> dict[str, Motion]:
             bodies[clip.subject].append(clip)
     for clips in bodies.values():
         body, wanted = calibrate(clips), [c for c in clips if c.category in _ACTIVITY]
-        found += [motion_of(c.name, c.source, c.subject, c.category, canonical(c, body)) for c in wanted]
+        found += [
+            motion_of(c.name, c.source, c.subject, c.category, canonical(c, body)) for c in wanted
+        ]
     return {f"{m.source}/{m.name}": m for m in found}
 
 
@@ -124,20 +147,31 @@ def _clip(frozen: dict[str, Any], motion: Motion) -> HeldClip:
     joints = motion.joints[start : start + frozen["frames"]] + np.array([0.0, 0.0, raised])
     if not is_frozen(joints, frozen):
         raise InputError(
-            f"The held-out clip '{frozen['name']}' is not the motion that the test's furniture was fitted to; "
-            "use the motion files and the readers that 'held_out.json' was made with, or freeze the test anew."
+            f"The held-out clip '{frozen['name']}' is not the motion that the test's furniture "
+            "was fitted to; "
+            "use the motion files and the readers that 'held_out.json' was made with, or freeze "
+            "the test anew."
         )
     path = raw_root_from_joints(joints)
     rests = tuple(rest_of(joints, path, a, b) for a, b in frozen["rests"])
     return HeldClip(
-        frozen["name"], f"{motion.source}/{motion.subject}", _ACTIVITY[motion.category], frozen["unseen"],
-        "composed" in frozen or raised > 0, frozen.get("room", ""), joints, path,
-        np.array(frozen["boxes"]).reshape(-1, 7), rests,
+        frozen["name"],
+        f"{motion.source}/{motion.subject}",
+        _ACTIVITY[motion.category],
+        frozen["unseen"],
+        "composed" in frozen or raised > 0,
+        frozen.get("room", ""),
+        joints,
+        path,
+        np.array(frozen["boxes"]).reshape(-1, 7),
+        rests,
     )
 
 
 def held_out(folder: Path) -> list[HeldClip]:
-    """The frozen clips, cut from the motion files in ``folder``. Raises InputError where one is missing or not the same."""
+    """The frozen clips, cut from the motion files in ``folder``. Raises InputError where one is
+    missing or not the same.
+    """
     motions = test_motions(folder)
     clips = []
     for frozen in json.loads(FROZEN.read_text(encoding="utf-8"))["clips"]:
@@ -145,6 +179,11 @@ def held_out(folder: Path) -> list[HeldClip]:
         needed = [recipe["walk"], recipe["sit"]] if recipe else [frozen["name"]]
         for name in needed:
             if name not in motions:
-                raise InputError(f"The held-out clip '{name}' is not in '{folder}'; give the folder with all files.")
-        clips.append(_clip(frozen, _composed(recipe, motions) if recipe else motions[frozen["name"]]))
+                raise InputError(
+                    f"The held-out clip '{name}' is not in '{folder}'; give the folder with all "
+                    "files."
+                )
+        clips.append(
+            _clip(frozen, _composed(recipe, motions) if recipe else motions[frozen["name"]])
+        )
     return clips

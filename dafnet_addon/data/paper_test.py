@@ -1,18 +1,23 @@
-"""A test set like the paper's (section 6.2), as near as open data allows: five kinds of furniture, approached and used.
+"""A test set like the paper's (section 6.2), as near as open data allows: five kinds of furniture,
+approached and used.
 
-The paper's test has a low chair, a high and wide one, a chair and desk low and high, and a whiteboard, 4135 frames in all,
-"motion that approaches furniture from different directions, sits or stands, and begins interacting". Nobody has published such
-captures, so these are composed, as training motion is (``compose``), but of the motion of bodies that training never sees: a
-walk is joined to a sit-down whose seat is moved to the wanted height; then another's captured upper body gestures over the
-seated legs, or hands are led over a desk; at the board a hand is led over captured standing. Figures on it are of composed
-motion and are not to be mixed with those on captured clips.
+The paper's test has a low chair, a high and wide one, a chair and desk low and high, and a
+whiteboard, 4135 frames in all, "motion that approaches furniture from different directions, sits or
+stands, and begins interacting". Nobody has published such captures, so these are composed, as
+training motion is (``compose``), but of the motion of bodies that training never sees: a walk is
+joined to a sit-down whose seat is moved to the wanted height; then another's captured upper body
+gestures over the seated legs, or hands are led over a desk; at the board a hand is led over
+captured standing. Figures on it are of composed motion and are not to be mixed with those on
+captured clips.
 
-The paper only lowers seats. Here UI-PRMD's two bodies, who sat at 0.35 and 0.47 m, are raised where that is lower than a kind
-asks, to its lowest height and by no more than 4 cm; everything else is lowered. One sits down between chair and desk, so desks
-stand farther off than one would draw them up, and backs lean forward to them.
+The paper only lowers seats. Here UI-PRMD's two bodies, who sat at 0.35 and 0.47 m, are raised where
+that is lower than a kind asks, to its lowest height and by no more than 4 cm; everything else is
+lowered. One sits down between chair and desk, so desks stand farther off than one would draw them
+up, and backs lean forward to them.
 
-``paper_test.json`` freezes it: a recipe for each clip, its furniture, fitted once, and a fingerprint. It holds no motion; that
-comes from the motion files. To make it anew: ``python -m dafnet_addon.data.paper_test FOLDER [--seed N]``.
+``paper_test.json`` freezes it: a recipe for each clip, its furniture, fitted once, and a
+fingerprint. It holds no motion; that comes from the motion files. To make it anew: ``python -m
+dafnet_addon.data.paper_test FOLDER [--seed N]``.
 """
 
 import argparse
@@ -39,7 +44,17 @@ from .flesh import probes
 from .furniture import SeatKind, board_for, desk_for, seat_for
 from .held_out import HeldClip, fingerprint, frozen_text, is_frozen
 from .joins import joined
-from .pieces import DIRECTIONS, TOELESS, Pool, features_of, fluent, matches_of, pool_of, sit_downs, upper_bodies
+from .pieces import (
+    DIRECTIONS,
+    TOELESS,
+    Pool,
+    features_of,
+    fluent,
+    matches_of,
+    pool_of,
+    sit_downs,
+    upper_bodies,
+)
 from .prepare import load_motions
 from .rests import Rest, rest_of, resting
 from .retarget import at_seat_height
@@ -55,8 +70,8 @@ SEED = 2
 
 @dataclass(frozen=True)
 class _Kind:
-    """How many ``clips``, and of one ``body`` at most; heights (metres) of the ``seat`` and of the desk's ``top``, where there
-    are any; which ``chair``.
+    """How many ``clips``, and of one ``body`` at most; heights (metres) of the ``seat`` and of the
+    desk's ``top``, where there are any; which ``chair``.
     """
 
     clips: int
@@ -66,8 +81,26 @@ class _Kind:
     chair: SeatKind | None = None
 
 
-_CHAIR = SeatKind((0.20, 0.25), (0.13, 0.26), (0.10, 0.28), (0.03, 0.06), 1.0, 0.0, SEAT_TO_PELVIS, ("legs", "column"))
-_WIDE = SeatKind((0.30, 0.42), (0.14, 0.28), (0.10, 0.30), (0.03, 0.08), 1.0, 0.0, SEAT_TO_PELVIS, ("legs", "panels"))
+_CHAIR = SeatKind(
+    (0.20, 0.25),
+    (0.13, 0.26),
+    (0.10, 0.28),
+    (0.03, 0.06),
+    1.0,
+    0.0,
+    SEAT_TO_PELVIS,
+    ("legs", "column"),
+)
+_WIDE = SeatKind(
+    (0.30, 0.42),
+    (0.14, 0.28),
+    (0.10, 0.30),
+    (0.03, 0.08),
+    1.0,
+    0.0,
+    SEAT_TO_PELVIS,
+    ("legs", "panels"),
+)
 _KINDS = {
     "low chair": _Kind(6, 2, (0.38, 0.42), None, _CHAIR),
     "high wide chair": _Kind(6, 3, (0.50, 0.55), None, _WIDE),
@@ -76,14 +109,19 @@ _KINDS = {
     "whiteboard": _Kind(6, 3),
 }
 _ACTIVITY = {kind: "sit down or up" if about.seat else "reach" for kind, about in _KINDS.items()}
-_RAISED = 0.04  # metres; the paper only lowers seats, here the lower of two sources may be raised by so much
+# metres; the paper only lowers seats, here the lower of two sources may be raised by so much
+_RAISED = 0.04
 _COMES = 70  # frames of walking up
 _FROM = 1.0  # metres from where a clip ends, at least, it begins
-_FLOATS = 0.04  # metres over the floor, within which the lower foot of a walk mostly is: one of the captures is not
+# metres over the floor, within which the lower foot of a walk mostly is: one of the captures is not
+_FLOATS = 0.04
 _KEPT = (84, 2)  # frames of a captured walk before and after the join; the way up is known for 80
-_USES, _WORKS, _WRITES = 45, 85, 95  # frames after a sit-down on a chair and at a desk, and at a board
-_SEATED_HANDS, _STANDING_HANDS = 24, 34  # frames after a sit-down's end, or after the join at a board, when hands are at work
-_FARTHER = (0.08, 0.24)  # metres by which a desk's work is farther from the body than training's: one sits down before it
+# frames after a sit-down on a chair and at a desk, and at a board
+_USES, _WORKS, _WRITES = 45, 85, 95
+# frames after a sit-down's end, or after the join at a board, when hands are at work
+_SEATED_HANDS, _STANDING_HANDS = 24, 34
+# metres by which a desk's work is farther from the body than training's: one sits down before it
+_FARTHER = (0.08, 0.24)
 _AT_DESKS = (-0.34, -0.26, -0.18)  # radians; one leans forward to reach it
 _BOARD = np.array([0.0, 0.6])  # from the root that stands before it
 _TO_BOARDS = range(DIRECTIONS // 4, 3 * DIRECTIONS // 4 + 1)
@@ -91,19 +129,28 @@ _EACH = 6  # walks from each direction to a sit-down
 _MOMENT = 40  # frames of a walk that count as one
 _SLACK = 3  # rounds, in which more and more of the same is let in
 _TRIES = 10  # pieces of furniture that are drawn
-_OVER, _HOVERS = 0.08, 0.2  # metres over a desk's top, within which a working wrist mostly is, and one that cannot reach it
+# metres over a desk's top, within which a working wrist mostly is, and one that cannot reach it
+_OVER, _HOVERS = 0.08, 0.2
 _OFF = 0.015  # metres by which a desk, which is fitted to hands, may be higher or lower than wanted
 _DESK = (0.28, 0.15)  # metres; half the width and depth of a desk at least
 _AT_BOARD = 0.1  # metres from a board within which a wrist that writes on it mostly is
-_WHITEBOARD, _OFF_FLOOR = (0.5, 0.3), 0.4  # metres; half the width and height of a board, and its lower edge, at least
+# metres; half the width and height of a board, and its lower edge, at least
+_WHITEBOARD, _OFF_FLOOR = (0.5, 0.3), 0.4
 _ONE_SEAT = 0.25  # metres
-_UNDER, _CUTS = -0.01, 0.01  # metres of toes over the floor at least, and of bones in furniture at most
+# metres of toes over the floor at least, and of bones in furniture at most
+_UNDER, _CUTS = -0.01, 0.01
 _SLIDES = 0.02  # metres that a standing foot moves in a frame at most
 _WRISTS = [joint("left_wrist"), joint("right_wrist")]
 _TOES = [joint("left_foot"), joint("right_foot")]
 _FEET = [*_TOES, joint("left_ankle"), joint("right_ankle")]
 _SEATED = {"seated_chair", "seated_table"}
-_GESTURES = _SEATED | {"standing_gesture", "social_gesture", "greeting", "documents", "work_standing"}
+_GESTURES = _SEATED | {
+    "standing_gesture",
+    "social_gesture",
+    "greeting",
+    "documents",
+    "work_standing",
+}
 _STANDS = {"standing_idle", "standing"}
 
 Recipe = dict[str, Any]
@@ -113,15 +160,17 @@ def _unseen(folder: Path) -> dict[str, Motion]:
     """Motions by "source/name", of bodies that have no clip in training."""
     motions = load_motions(folder, "choose", "tell")
     return {
-        f"{m.source}/{m.name}": m for m in motions if TRAINED_ON_PARTLY.isdisjoint({m.source, f"{m.source}/{m.subject}"})
+        f"{m.source}/{m.name}": m
+        for m in motions
+        if TRAINED_ON_PARTLY.isdisjoint({m.source, f"{m.source}/{m.subject}"})
     }
 
 
 def side_of(clip: HeldClip) -> str:
     """Where a clip comes from: "front", "left", "right" or "behind".
 
-    Front and behind are the furniture's, before its seat or its board; left and right are those of whoever uses it. Seen from
-    where the clip ends.
+    Front and behind are the furniture's, before its seat or its board; left and right are those of
+    whoever uses it. Seen from where the clip ends.
     """
     return _side(clip.path, "board" in clip.room)
 
@@ -135,8 +184,14 @@ def _side(path: RootPath, board: bool) -> str:
 
 
 def _pieces(motion: Motion, seated: bool) -> list[np.ndarray]:
-    """What a recipe counts its piece in: a motion's sit-downs, or its pieces of an upper body at work."""
-    return [piece.joints for piece in sit_downs([motion])] if seated else upper_bodies([motion], {motion.category})
+    """What a recipe counts its piece in: a motion's sit-downs, or its pieces of an upper body at
+    work.
+    """
+    return (
+        [piece.joints for piece in sit_downs([motion])]
+        if seated
+        else upper_bodies([motion], {motion.category})
+    )
 
 
 def _picked(recipe: Recipe, part: str, motions: dict[str, Motion]) -> np.ndarray:
@@ -144,7 +199,11 @@ def _picked(recipe: Recipe, part: str, motions: dict[str, Motion]) -> np.ndarray
     words = recipe[part]
     motion = motions[words["clip"]]
     if part == "walk":
-        found = [motion.joints[words["at"] - _COMES : words["at"] + 1]] if words["at"] < len(motion.joints) else []
+        found = (
+            [motion.joints[words["at"] - _COMES : words["at"] + 1]]
+            if words["at"] < len(motion.joints)
+            else []
+        )
     else:
         found = _pieces(motion, part == "sit")[words["piece"] :]
     if not found:
@@ -154,8 +213,10 @@ def _picked(recipe: Recipe, part: str, motions: dict[str, Motion]) -> np.ndarray
 
 def _changed(name: str) -> str:
     return (
-        f"The paper test's clip '{name}' is not the motion that its furniture was fitted to; use the motion files and the "
-        "readers that 'paper_test.json' was made with, or make it anew with 'python -m dafnet_addon.data.paper_test FOLDER'."
+        f"The paper test's clip '{name}' is not the motion that its furniture was fitted to; use "
+        "the motion files and the "
+        "readers that 'paper_test.json' was made with, or make it anew with 'python -m "
+        "dafnet_addon.data.paper_test FOLDER'."
     )
 
 
@@ -176,7 +237,9 @@ def _replayed(recipe: Recipe, motions: dict[str, Motion]) -> np.ndarray:
         joints = at_board(rng, joints, _COMES + 8, len(joints) - 4)[: _COMES + _WRITES]
         return mirrored(joints) if recipe["mirrored"] else joints
     top = recipe.get("top")
-    body, rest = seated_work(rng, joints, _picked(recipe, "upper", motions), _AT_DESKS if top else LEANS)
+    body, rest = seated_work(
+        rng, joints, _picked(recipe, "upper", motions), _AT_DESKS if top else LEANS
+    )
     if top:
         body = at_top(rng, body, rest + 5, len(body) + 60, top, recipe["farther"])
     return body[: len(joints) + (_WORKS if top else _USES)]
@@ -196,23 +259,35 @@ def _held(recipe: Recipe, motions: dict[str, Motion], joints: np.ndarray) -> Hel
     path = raw_root_from_joints(joints)
     rests = tuple(rest_of(joints, path, start, end) for start, end in recipe["rests"])
     return HeldClip(
-        recipe["name"], _body(recipe, motions), _ACTIVITY[recipe["kind"]], True, True, recipe["kind"], joints, path,
-        np.array(recipe["boxes"]).reshape(-1, 7), rests,
+        recipe["name"],
+        _body(recipe, motions),
+        _ACTIVITY[recipe["kind"]],
+        True,
+        True,
+        recipe["kind"],
+        joints,
+        path,
+        np.array(recipe["boxes"]).reshape(-1, 7),
+        rests,
     )
 
 
 def paper_test(folder: Path) -> list[HeldClip]:
-    """The frozen clips, composed again of the motion files in ``folder``; ``room`` says of which of the five kinds each is.
+    """The frozen clips, composed again of the motion files in ``folder``; ``room`` says of which of
+    the five kinds each is.
 
     Raises InputError where a motion is missing or not the same.
     """
     motions = _unseen(folder)
     clips = []
     for recipe in json.loads(FROZEN.read_text(encoding="utf-8"))["clips"]:
-        for name in (recipe[part]["clip"] for part in ("walk", "sit", "upper", "stand") if part in recipe):
+        for name in (
+            recipe[part]["clip"] for part in ("walk", "sit", "upper", "stand") if part in recipe
+        ):
             if name not in motions:
                 raise InputError(
-                    f"The paper test's clip '{recipe['name']}' needs '{name}', which is not in '{folder}'; "
+                    f"The paper test's clip '{recipe['name']}' needs '{name}', which is not in "
+                    f"'{folder}'; "
                     "give the folder with all files."
                 )
         joints = _replayed(recipe, motions)
@@ -222,13 +297,20 @@ def paper_test(folder: Path) -> list[HeldClip]:
     return clips
 
 
-def _candidates(rng: np.random.Generator, kind: str, motions: dict[str, Motion], pool: Pool) -> Iterator[Recipe]:
-    """Recipes of a kind, without furniture: every sit-down or stand after the walk that matches best from each direction."""
+def _candidates(
+    rng: np.random.Generator, kind: str, motions: dict[str, Motion], pool: Pool
+) -> Iterator[Recipe]:
+    """Recipes of a kind, without furniture: every sit-down or stand after the walk that matches
+    best from each direction.
+    """
     about, part = _KINDS[kind], _part(kind)
     lend = _SEATED if about.top else _GESTURES
     uppers = [
         {"clip": name, "piece": k, "mirrored": mirror}
-        for name, m in motions.items() if m.category in lend for k in range(len(_pieces(m, False))) for mirror in (False, True)
+        for name, m in motions.items()
+        if m.category in lend
+        for k in range(len(_pieces(m, False)))
+        for mirror in (False, True)
     ]
     for name, motion in motions.items():
         if part == "stand" and (motion.category not in _STANDS or motion.source == TOELESS):
@@ -237,14 +319,20 @@ def _candidates(rng: np.random.Generator, kind: str, motions: dict[str, Motion],
             path = root_from_joints(joints)
             place, directions = _BOARD, _TO_BOARDS
             if about.seat:
-                place, directions = rotate(path.rotation[0].T, joints[-1, 0] - path.position[0])[:2], range(DIRECTIONS)
+                place, directions = (
+                    rotate(path.rotation[0].T, joints[-1, 0] - path.position[0])[:2],
+                    range(DIRECTIONS),
+                )
             for clip, at in matches_of(pool, features_of(joints)[0], place, _EACH, directions):
                 walk, mirror = pool.names[clip]
                 if not _comes(pool.clips[clip][at - _COMES : at + 1]):
                     continue
                 recipe = {
-                    "name": kind, "kind": kind, "seed": int(rng.integers(1 << 31)),
-                    "walk": {"clip": walk, "mirrored": mirror, "at": at}, part: {"clip": name, "piece": k},
+                    "name": kind,
+                    "kind": kind,
+                    "seed": int(rng.integers(1 << 31)),
+                    "walk": {"clip": walk, "mirrored": mirror, "at": at},
+                    part: {"clip": name, "piece": k},
                 }
                 if about.seat is None:
                     yield recipe | {"mirrored": bool(rng.random() < 0.5)}
@@ -255,12 +343,17 @@ def _candidates(rng: np.random.Generator, kind: str, motions: dict[str, Motion],
                 seat = rng.uniform(low, max(low, min(high, source)))
                 recipe |= {"upper": uppers[rng.integers(len(uppers))], "seat": round(seat, 3)}
                 if about.top:
-                    recipe |= {"top": round(rng.uniform(*about.top), 3), "farther": round(rng.uniform(*_FARTHER), 3)}
+                    recipe |= {
+                        "top": round(rng.uniform(*about.top), 3),
+                        "farther": round(rng.uniform(*_FARTHER), 3),
+                    }
                 yield recipe
 
 
 def _comes(walk: np.ndarray) -> bool:
-    """Whether a walk (T, 22, 3) goes on the floor, forward and upright: nobody comes up to furniture backward or bowing."""
+    """Whether a walk (T, 22, 3) goes on the floor, forward and upright: nobody comes up to
+    furniture backward or bowing.
+    """
     moved = velocities(root_from_joints(walk))[:, :2]
     trunk = normalised(walk[:, joint("neck")] - walk[:, 0])[:, 2]
     over = (walk[:, _FEET, 2] - REST[_FEET, 2]).min(1)
@@ -268,28 +361,49 @@ def _comes(walk: np.ndarray) -> bool:
     return bool(forward and trunk.min() > 0.9 and np.quantile(over, 0.9) < _FLOATS)
 
 
-def _chair_of(rng: np.random.Generator, kind: SeatKind, rest: Rest, points: np.ndarray) -> np.ndarray | None:
-    """A chair of the kind, with its back, under who rests; None where no try leaves the body's way (``points``) free."""
+def _chair_of(
+    rng: np.random.Generator, kind: SeatKind, rest: Rest, points: np.ndarray
+) -> np.ndarray | None:
+    """A chair of the kind, with its back, under who rests; None where no try leaves the body's way
+    (``points``) free.
+    """
     for _ in range(_TRIES):
         chair = seat_for(rng, rest, points, kind)
-        if chair is not None and (chair[:, 2] + chair[:, 5]).max() > rest.position[2] - SEAT_TO_PELVIS + 0.15:
+        if (
+            chair is not None
+            and (chair[:, 2] + chair[:, 5]).max() > rest.position[2] - SEAT_TO_PELVIS + 0.15
+        ):
             return chair
     return None
 
 
 def _desk_of(
-    rng: np.random.Generator, top: float, joints: np.ndarray, works: int, rest: Rest, points: np.ndarray, chair: np.ndarray
+    rng: np.random.Generator,
+    top: float,
+    joints: np.ndarray,
+    works: int,
+    rest: Rest,
+    points: np.ndarray,
+    chair: np.ndarray,
 ) -> np.ndarray | None:
-    """A desk under the hands that work from frame ``works`` on, apart from the chair; None where none can be had."""
+    """A desk under the hands that work from frame ``works`` on, apart from the chair; None where
+    none can be had.
+    """
     over = joints[works:, _WRISTS, 2] - top
     mostly = np.median(over, axis=0)
-    hands = [joints[works:, _WRISTS[i]] for i in range(2) if mostly[i] < _OVER and over[:, i].min() > 0.0]
+    hands = [
+        joints[works:, _WRISTS[i]] for i in range(2) if mostly[i] < _OVER and over[:, i].min() > 0.0
+    ]
     if not hands or ((mostly >= _OVER) & (mostly < _HOVERS)).any():
         return None
     use = Use("desk", works, len(joints), np.concatenate(hands), rest.yaw)
     for _ in range(_TRIES):
         desk = desk_for(rng, use, points)
-        if desk is None or abs(desk[0, 2] + desk[0, 5] - top) > _OFF or (desk[0, 3:5] < _DESK).any():
+        if (
+            desk is None
+            or abs(desk[0, 2] + desk[0, 5] - top) > _OFF
+            or (desk[0, 3:5] < _DESK).any()
+        ):
             continue
         if distances(desk, _filled(chair)).min() > 0.0:
             return desk
@@ -297,10 +411,16 @@ def _desk_of(
 
 
 def _board_of(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
-    """A board at a hand that writes, as large as whiteboards are and off the floor; None where none can be had."""
+    """A board at a hand that writes, as large as whiteboards are and off the floor; None where none
+    can be had.
+    """
     for _ in range(_TRIES):
         board = board_for(rng, use, points)
-        if board is None or (board[0, [3, 5]] < _WHITEBOARD).any() or board[0, 2] - board[0, 5] < _OFF_FLOOR:
+        if (
+            board is None
+            or (board[0, [3, 5]] < _WHITEBOARD).any()
+            or board[0, 2] - board[0, 5] < _OFF_FLOOR
+        ):
             continue
         if np.median(distances(board, use.points)) < _AT_BOARD:
             return board
@@ -315,16 +435,26 @@ def _filled(boxes: np.ndarray) -> np.ndarray:
 
 
 def _sound(joints: np.ndarray, boxes: np.ndarray) -> bool:
-    """Whether a motion (T, 22, 3) is fluent and on the floor, its feet do not slide and its bones stay out of the furniture."""
+    """Whether a motion (T, 22, 3) is fluent and on the floor, its feet do not slide and its bones
+    stay out of the furniture.
+    """
     stands = contacts(joints)[:, :2]
-    steps = np.linalg.norm(np.diff(joints[:, _TOES, :2], axis=0), axis=-1) * (stands[1:] & stands[:-1])
+    steps = np.linalg.norm(np.diff(joints[:, _TOES, :2], axis=0), axis=-1) * (
+        stands[1:] & stands[:-1]
+    )
     inside = -distances(boxes, body_points(joints).reshape(-1, 3)).min()
     smooth = fluent(joints)[2:].all()  # the first frames have no speed before them
-    return bool(smooth and joints[:, _TOES, 2].min() > _UNDER and steps.max() < _SLIDES and inside < _CUTS)
+    return bool(
+        smooth and joints[:, _TOES, 2].min() > _UNDER and steps.max() < _SLIDES and inside < _CUTS
+    )
 
 
-def _furnished(rng: np.random.Generator, recipe: Recipe, joints: np.ndarray, path: RootPath) -> Recipe | None:
-    """The recipe with its furniture, seated episode and fingerprint; None where nothing fits or the motion is not sound."""
+def _furnished(
+    rng: np.random.Generator, recipe: Recipe, joints: np.ndarray, path: RootPath
+) -> Recipe | None:
+    """The recipe with its furniture, seated episode and fingerprint; None where nothing fits or the
+    motion is not sound.
+    """
     about, points = _KINDS[recipe["kind"]], probes(joints)
     rests: list[list[int]] = []
     boxes: np.ndarray | None
@@ -333,11 +463,18 @@ def _furnished(rng: np.random.Generator, recipe: Recipe, joints: np.ndarray, pat
         boxes = _board_of(rng, used[-1], points) if used else None
         works = _COMES + _STANDING_HANDS
     else:
-        after = [r.start for r in resting(joints, path) if np.linalg.norm(r.position[:2] - path.position[-1, :2]) < _ONE_SEAT]
+        after = [
+            r.start
+            for r in resting(joints, path)
+            if np.linalg.norm(r.position[:2] - path.position[-1, :2]) < _ONE_SEAT
+        ]
         if not after:
             return None
         rest = rest_of(joints, path, after[0], len(joints))
-        works, rests = len(joints) - (_WORKS if about.top else _USES) + _SEATED_HANDS, [[rest.start, rest.end]]
+        works, rests = (
+            len(joints) - (_WORKS if about.top else _USES) + _SEATED_HANDS,
+            [[rest.start, rest.end]],
+        )
         boxes = _chair_of(rng, about.chair, rest, points)
         if boxes is not None and about.top:
             desk = _desk_of(rng, recipe["top"], joints, works, rest, points, boxes)
@@ -345,17 +482,21 @@ def _furnished(rng: np.random.Generator, recipe: Recipe, joints: np.ndarray, pat
     if boxes is None or not _sound(joints, boxes):
         return None
     return recipe | {
-        "frames": len(joints), "works": works, "rests": rests, "fingerprint": fingerprint(joints),
+        "frames": len(joints),
+        "works": works,
+        "rests": rests,
+        "fingerprint": fingerprint(joints),
         "boxes": np.round(boxes, 4).tolist(),
     }
 
 
 def freeze_paper_test(folder: Path, seed: int = SEED) -> dict[str, Any]:
-    """What ``paper_test.json`` holds, made of the motion files in ``folder``; the same for the same files and ``seed``.
+    """What ``paper_test.json`` holds, made of the motion files in ``folder``; the same for the same
+    files and ``seed``.
 
-    Of all ways in which the pieces may be joined, in random order, those are kept whose side, body and pieces are not in it too
-    often yet; where that leaves too few, more of one body and of one walk's clip. Raises InputError where the folder's motion
-    does not give every kind.
+    Of all ways in which the pieces may be joined, in random order, those are kept whose side, body
+    and pieces are not in it too often yet; where that leaves too few, more of one body and of one
+    walk's clip. Raises InputError where the folder's motion does not give every kind.
     """
     motions = _unseen(folder)
     pool = pool_of(list(motions.values()), arriving=True, kept=_KEPT)
@@ -369,7 +510,9 @@ def freeze_paper_test(folder: Path, seed: int = SEED) -> dict[str, Any]:
             recipe = candidates[i]
             piece, walk, body = recipe[_part(kind)], recipe["walk"], _body(recipe, motions)
             most = {
-                (kind, body): about.body + slack, (kind, walk["clip"]): 3 + slack, (kind, piece["clip"], piece["piece"]): 1,
+                (kind, body): about.body + slack,
+                (kind, walk["clip"]): 3 + slack,
+                (kind, piece["clip"], piece["piece"]): 1,
                 (kind, walk["clip"], walk["at"] // _MOMENT): 1,
             }
             if any(used[word] >= limit for word, limit in most.items()):
@@ -381,7 +524,8 @@ def freeze_paper_test(folder: Path, seed: int = SEED) -> dict[str, Any]:
             if apart < _FROM or (about.seat is None and side == "behind"):
                 continue
             if about.top is None and about.seat and side in ("left", "right"):
-                side = "a side"  # of the paper's three; one can hardly come to a desk from its front
+                # of the paper's three; one can hardly come to a desk from its front
+                side = "a side"
             made = _furnished(rng, recipe, joints, path) if used[kind, side] < 2 else None
             if made is not None:
                 count += 1
@@ -390,15 +534,24 @@ def freeze_paper_test(folder: Path, seed: int = SEED) -> dict[str, Any]:
             if count == about.clips:
                 break
         else:
-            raise InputError(f"The motion in '{folder}' gives only {count} clips of a {kind}; give the folder with all files.")
+            raise InputError(
+                f"The motion in '{folder}' gives only {count} clips of a {kind}; give the folder "
+                "with all files."
+            )
     return {"version": 1, "seed": seed, "clips": clips}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Make ``paper_test.json`` anew; 0 if all went well, else 1 and a sentence on standard error."""
-    parser = argparse.ArgumentParser(prog="python -m dafnet_addon.data.paper_test", description="Makes the test set anew.")
+    """Make ``paper_test.json`` anew; 0 if all went well, else 1 and a sentence on standard
+    error.
+    """
+    parser = argparse.ArgumentParser(
+        prog="python -m dafnet_addon.data.paper_test", description="Makes the test set anew."
+    )
     parser.add_argument("folder", type=Path, help="the motion files")
-    parser.add_argument("--seed", type=int, default=SEED, help="the test that ships has %(default)s")
+    parser.add_argument(
+        "--seed", type=int, default=SEED, help="the test that ships has %(default)s"
+    )
     options = parser.parse_args(arguments)
     try:
         frozen = freeze_paper_test(options.folder, options.seed)

@@ -1,4 +1,5 @@
-"""Captured pieces that motions are composed of: sit-downs, upper bodies at work, and walks that come or go as a pose asks.
+"""Captured pieces that motions are composed of: sit-downs, upper bodies at work, and walks that
+come or go as a pose asks.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,33 +13,71 @@ from ..core.skeleton import joint
 from .windows import COMPOSED, Motion, mirrored, motion_of
 
 __all__ = [
-    "BEFORE", "DIRECTIONS", "STAYS", "TOELESS", "WORKS", "Composed", "Piece", "Pool", "entrance", "features_of", "fluent",
-    "made", "matches_of", "pool_of", "sit_downs", "upper_bodies", "ways_of",
+    "BEFORE",
+    "DIRECTIONS",
+    "STAYS",
+    "TOELESS",
+    "WORKS",
+    "Composed",
+    "Piece",
+    "Pool",
+    "entrance",
+    "features_of",
+    "fluent",
+    "made",
+    "matches_of",
+    "pool_of",
+    "sit_downs",
+    "upper_bodies",
+    "ways_of",
 ]
 
-_WALK = {"locomotion", "walk", "turn", "carry_other", "door", "reach-hand-task", "greeting", "standing"}
+_WALK = {
+    "locomotion",
+    "walk",
+    "turn",
+    "carry_other",
+    "door",
+    "reach-hand-task",
+    "greeting",
+    "standing",
+}
 _SIT = {"sit-stand", "sit_down", "stand_up"}
 _MATCHED = [
-    joint(n) for n in ("pelvis", "neck", "left_knee", "right_knee", "left_foot", "right_foot", "left_wrist", "right_wrist")
+    joint(n)
+    for n in (
+        "pelvis",
+        "neck",
+        "left_knee",
+        "right_knee",
+        "left_foot",
+        "right_foot",
+        "left_wrist",
+        "right_wrist",
+    )
 ]
 _WEIGHTS = np.array([1.0, 0.7, 1.0, 1.0, 2.5, 2.5, 0.4, 0.4])[:, None]
 _SECONDS = 0.12  # by which velocities count as lengths
 BEFORE = 110  # frames of walking that are kept
 _TRAVELLED = 80  # frames in which a body must have come from elsewhere
 _FAR = 0.8  # metres
-_ALIKE = 0.09  # metres: mean weighted difference, of places and velocities, of poses that may be joined
+# metres: mean weighted difference, of places and velocities, of poses that may be joined
+_ALIKE = 0.09
 _CLEAR = 0.42  # metres between a seat's middle and the way to it
 DIRECTIONS = 8
 TOELESS = "reactidle"
 WORKS = 180  # frames of work that are joined to a sit-down or a walk
 _SLOW = 0.45  # metres per second of the root
 _LONGEST, STAYS = 120, 60  # frames of sitting down and of resting that are kept
-_FASTEST, _HARDEST = 5.0, 75.0  # metres per second, and per second squared: the 99.9th percentile of what is captured, about
+# metres per second, and per second squared: the 99.9th percentile of what is captured, about
+_FASTEST, _HARDEST = 5.0, 75.0
 
 
 @dataclass(frozen=True)
 class Composed:
-    """A composed motion: one word for its ``kind``, and the frames ``focus`` (N,) around which windows are drawn."""
+    """A composed motion: one word for its ``kind``, and the frames ``focus`` (N,) around which
+    windows are drawn.
+    """
 
     kind: str
     motion: Motion
@@ -46,14 +85,22 @@ class Composed:
 
 
 def fluent(joints: np.ndarray) -> np.ndarray:
-    """False in frames (T,) around a speed or an acceleration that no captured motion of these kinds has."""
+    """False in frames (T,) around a speed or an acceleration that no captured motion of these kinds
+    has.
+    """
     step = np.diff(joints, axis=0, prepend=joints[:1])
     change = np.diff(step, axis=0, prepend=step[:1])
-    return (np.linalg.norm(step, axis=-1).max(1) * 30 < _FASTEST) & (np.linalg.norm(change, axis=-1).max(1) * 900 < _HARDEST)
+    return (np.linalg.norm(step, axis=-1).max(1) * 30 < _FASTEST) & (
+        np.linalg.norm(change, axis=-1).max(1) * 900 < _HARDEST
+    )
 
 
-def made(kind: str, name: str, subject: str, category: str, joints: np.ndarray, focus: np.ndarray) -> Iterator[Composed]:
-    """The composed motion, where it is fluent; nothing where it is not. ``focus`` counts frames of ``joints``."""
+def made(
+    kind: str, name: str, subject: str, category: str, joints: np.ndarray, focus: np.ndarray
+) -> Iterator[Composed]:
+    """The composed motion, where it is fluent; nothing where it is not. ``focus`` counts frames of
+    ``joints``.
+    """
     if not fluent(joints).all():
         return
     motion = motion_of(f"{name} {kind}", COMPOSED, subject, category, joints)
@@ -65,7 +112,9 @@ def made(kind: str, name: str, subject: str, category: str, joints: np.ndarray, 
 
 
 def entrance(joints: np.ndarray, rest_start: int) -> int | None:
-    """The last frame before a rest in which the body stands still and upright; None where there is none."""
+    """The last frame before a rest in which the body stands still and upright; None where there is
+    none.
+    """
     speed = np.linalg.norm(np.diff(joints, axis=0, prepend=joints[:1]), axis=-1).max(1) * 30
     stands = np.flatnonzero((joints[:rest_start, 0, 2] > 0.9) & (speed[:rest_start] < 0.35))
     return int(stands[-1]) if len(stands) else None
@@ -73,7 +122,9 @@ def entrance(joints: np.ndarray, rest_start: int) -> int | None:
 
 @dataclass(frozen=True)
 class Piece:
-    """Captured motion that first stands upright and then sits down and rests, or does so in a mirror or reversed."""
+    """Captured motion that first stands upright and then sits down and rests, or does so in a
+    mirror or reversed.
+    """
 
     name: str
     subject: str
@@ -87,13 +138,20 @@ def sit_downs(motions: list[Motion]) -> Iterator[Piece]:
             continue
         for joints, how in ((m.joints, ""), (m.joints[::-1], " reversed")):
             frames, ended = len(joints), 0
-            rests = [(r.start, r.end) if not how else (frames - r.end, frames - r.start) for r in m.rests]
+            rests = [
+                (r.start, r.end) if not how else (frames - r.end, frames - r.start) for r in m.rests
+            ]
             for start, end in sorted(rests):
                 entry = entrance(joints[ended:start], start - ended)
                 if entry is not None and start - ended - entry < _LONGEST:
                     piece = joints[ended + entry : min(end, start + STAYS)]
                     yield Piece(m.name + how, m.subject, m.source == "ui_prmd", piece)
-                    yield Piece(m.name + how + " mirrored", m.subject, m.source == "ui_prmd", mirrored(piece))
+                    yield Piece(
+                        m.name + how + " mirrored",
+                        m.subject,
+                        m.source == "ui_prmd",
+                        mirrored(piece),
+                    )
                 ended = end
 
 
@@ -106,16 +164,27 @@ def upper_bodies(motions: list[Motion], categories: set[str]) -> list[np.ndarray
                 piece = m.joints[start : start + WORKS]
                 trunk = normalised(piece[:, joint("neck")] - piece[:, 0])[:, 2]
                 stays = np.ptp(piece[:, 0, :2], axis=0).max() < 0.3
-                if stays and trunk.min() > 0.75 and m.valid[start : start + WORKS].all() and fluent(piece).all():
+                if (
+                    stays
+                    and trunk.min() > 0.75
+                    and m.valid[start : start + WORKS].all()
+                    and fluent(piece).all()
+                ):
                     found.append(piece)
     return found
 
 
 def features_of(joints: np.ndarray) -> np.ndarray:
-    """What must match at a join (T, 48): places of joints in the root's frames, and their velocities there."""
+    """What must match at a join (T, 48): places of joints in the root's frames, and their
+    velocities there.
+    """
     path = root_from_joints(joints)
     places = to_root(path, joints)[:, _MATCHED]
-    velocity = rotate(transpose(path.rotation)[:, None], np.gradient(joints[:, _MATCHED], axis=0)) * 30 * _SECONDS
+    velocity = (
+        rotate(transpose(path.rotation)[:, None], np.gradient(joints[:, _MATCHED], axis=0))
+        * 30
+        * _SECONDS
+    )
     return np.concatenate([places * _WEIGHTS, velocity * _WEIGHTS], axis=1).reshape(len(joints), -1)
 
 
@@ -123,8 +192,9 @@ def features_of(joints: np.ndarray) -> np.ndarray:
 class Pool:
     """Frames (N, 2: clip, frame) in which a body is slow that comes from, or goes, elsewhere.
 
-    ``features`` (N, 48) must match; ``tracks`` (N, T, 2): where it was before, or will be, as seen from it, the farthest first.
-    ``names``: of each clip its source and name, as "source/name", and whether it is seen in a mirror.
+    ``features`` (N, 48) must match; ``tracks`` (N, T, 2): where it was before, or will be, as seen
+    from it, the farthest first. ``names``: of each clip its source and name, as "source/name", and
+    whether it is seen in a mirror.
     """
 
     arriving: bool
@@ -135,8 +205,12 @@ class Pool:
     tracks: np.ndarray
 
 
-def pool_of(motions: list[Motion], arriving: bool, kept: tuple[int, int] = (BEFORE, BEFORE)) -> Pool:
-    """All places where a walk may end, or begin, with ``kept`` frames of its clip before and after them."""
+def pool_of(
+    motions: list[Motion], arriving: bool, kept: tuple[int, int] = (BEFORE, BEFORE)
+) -> Pool:
+    """All places where a walk may end, or begin, with ``kept`` frames of its clip before and after
+    them.
+    """
     clips: list[np.ndarray] = []
     names: list[tuple[str, bool]] = []
     rows, features, tracks = [], [], []
@@ -148,9 +222,14 @@ def pool_of(motions: list[Motion], arriving: bool, kept: tuple[int, int] = (BEFO
             path = root_from_joints(joints)
             frames = np.arange(kept[0], len(joints) - kept[1], 2)
             slow = np.linalg.norm(np.gradient(path.position, axis=0), axis=-1) * 30 < _SLOW
-            far = np.linalg.norm(path.position[frames + offsets[0]] - path.position[frames], axis=-1) > _FAR
+            far = (
+                np.linalg.norm(path.position[frames + offsets[0]] - path.position[frames], axis=-1)
+                > _FAR
+            )
             broken = np.concatenate([[0], np.cumsum(~(m.valid & fluent(joints)))])
-            frames = frames[slow[frames] & far & (broken[frames + kept[1]] == broken[frames - kept[0]])]
+            frames = frames[
+                slow[frames] & far & (broken[frames + kept[1]] == broken[frames - kept[0]])
+            ]
             if len(frames):
                 around = path.position[frames[:, None] + offsets] - path.position[frames][:, None]
                 tracks.append(np.einsum("nji,ntj->nti", path.rotation[frames], around)[..., :2])
@@ -159,21 +238,44 @@ def pool_of(motions: list[Motion], arriving: bool, kept: tuple[int, int] = (BEFO
                 clips.append(joints)
                 names.append((f"{m.source}/{m.name}", mirror))
     if not clips:
-        return Pool(arriving, [], [], np.zeros((0, 2), int), np.zeros((0, 48), np.float32), np.zeros((0, len(offsets), 2)))
-    return Pool(arriving, clips, names, np.concatenate(rows), np.concatenate(features), np.concatenate(tracks))
+        return Pool(
+            arriving,
+            [],
+            [],
+            np.zeros((0, 2), int),
+            np.zeros((0, 48), np.float32),
+            np.zeros((0, len(offsets), 2)),
+        )
+    return Pool(
+        arriving,
+        clips,
+        names,
+        np.concatenate(rows),
+        np.concatenate(features),
+        np.concatenate(tracks),
+    )
 
 
 def matches_of(
-    pool: Pool, pose: np.ndarray, place: np.ndarray, each: int, directions: Sequence[int] = range(DIRECTIONS)
+    pool: Pool,
+    pose: np.ndarray,
+    place: np.ndarray,
+    each: int,
+    directions: Sequence[int] = range(DIRECTIONS),
 ) -> Iterator[tuple[int, int]]:
-    """Clip and frame in the pool where a walk ends, or begins, that matches ``pose``: as ``ways_of`` finds them."""
+    """Clip and frame in the pool where a walk ends, or begins, that matches ``pose``: as
+    ``ways_of`` finds them.
+    """
     cost = np.abs(pool.features - pose.astype(np.float32)).mean(1)
     like = np.flatnonzero(cost < _ALIKE)
     like = like[np.argsort(cost[like])]
     way = pool.tracks[like] - place
     clear = np.linalg.norm(way[:, :-2], axis=-1).min(1) > _CLEAR
     like, way = like[clear], way[clear]
-    sector = np.round(np.arctan2(-way[:, 0, 0], way[:, 0, 1]) / (2 * np.pi / DIRECTIONS)).astype(int) % DIRECTIONS
+    sector = (
+        np.round(np.arctan2(-way[:, 0, 0], way[:, 0, 1]) / (2 * np.pi / DIRECTIONS)).astype(int)
+        % DIRECTIONS
+    )
     for direction in directions:
         used: set[int] = set()
         for clip, at in pool.rows[like[sector == direction]]:
@@ -183,12 +285,21 @@ def matches_of(
 
 
 def ways_of(
-    pool: Pool, pose: np.ndarray, place: np.ndarray, each: int, directions: Sequence[int] = range(DIRECTIONS)
+    pool: Pool,
+    pose: np.ndarray,
+    place: np.ndarray,
+    each: int,
+    directions: Sequence[int] = range(DIRECTIONS),
 ) -> Iterator[np.ndarray]:
-    """Walks that end, or begin, with a pose that matches ``pose`` (48,): the best ``each`` in every direction from a place.
+    """Walks that end, or begin, with a pose that matches ``pose`` (48,): the best ``each`` in every
+    direction from a place.
 
-    ``place`` (2,): a seat's middle, say, in the root's frame at the join; a way that leads through it is none. Direction 0 is
-    the one that the body faces, the others follow counter-clockwise.
+    ``place`` (2,): a seat's middle, say, in the root's frame at the join; a way that leads through
+    it is none. Direction 0 is the one that the body faces, the others follow counter-clockwise.
     """
     for clip, at in matches_of(pool, pose, place, each, directions):
-        yield pool.clips[clip][at - BEFORE : at + 1] if pool.arriving else pool.clips[clip][at : at + BEFORE]
+        yield (
+            pool.clips[clip][at - BEFORE : at + 1]
+            if pool.arriving
+            else pool.clips[clip][at : at + BEFORE]
+        )

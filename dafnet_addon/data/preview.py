@@ -1,4 +1,6 @@
-"""A contact sheet of a dataset: for every kind of moment some that windows are drawn around, furnished, with contacts."""
+"""A contact sheet of a dataset: for every kind of moment some that windows are drawn around,
+furnished, with contacts.
+"""
 
 from pathlib import Path
 
@@ -20,9 +22,16 @@ _TRIES = 10
 
 
 def preview(
-    file: Path, motions: list[Motion], draws: Draws, rng: np.random.Generator, each: int = 1, bank: ShapeBank = NO_BANK
+    file: Path,
+    motions: list[Motion],
+    draws: Draws,
+    rng: np.random.Generator,
+    each: int = 1,
+    bank: ShapeBank = NO_BANK,
 ) -> None:
-    """Draw ``each`` moments of every kind into ``file`` (.png), with furniture as training fits it."""
+    """Draw ``each`` moments of every kind into ``file`` (.png), with furniture as training fits
+    it.
+    """
     rows, touching = [], []
     for kind, (moments, weights) in draws.items():
         shown = 0

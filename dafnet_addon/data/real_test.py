@@ -1,11 +1,14 @@
-"""The test among real furniture: captured sitting and lying, on pieces of makers whose furniture training never saw.
+"""The test among real furniture: captured sitting and lying, on pieces of makers whose furniture
+training never saw.
 
-Bodies and makers that choose weights are apart from those that tell how good they are (``splits``). ``real_test.json`` freezes
-which frames of which motion, which piece at its true size, where it stands, and how high it carries the pelvis; it holds no
-motion and no furniture, which come from the motion files and the furniture library.
+Bodies and makers that choose weights are apart from those that tell how good they are (``splits``).
+``real_test.json`` freezes which frames of which motion, which piece at its true size, where it
+stands, and how high it carries the pelvis; it holds no motion and no furniture, which come from the
+motion files and the furniture library.
 
-The captured pelvis is moved to the height at which the piece carries one (``retarget``, ``shapes.PELVIS_OVER``): so the motion
-is at most a seat's height away from what was captured, and the piece is not changed at all.
+The captured pelvis is moved to the height at which the piece carries one (``retarget``,
+``shapes.PELVIS_OVER``): so the motion is at most a seat's height away from what was captured, and
+the piece is not changed at all.
 """
 
 import argparse
@@ -43,10 +46,15 @@ _SEED = 41
 
 
 def _sitting(motions: Sequence[Motion]) -> Iterator[tuple[Motion, int, int, Rest]]:
-    """Where bodies sit, with frames before and after: motion, first frame, end, and the episode in the motion's frames."""
+    """Where bodies sit, with frames before and after: motion, first frame, end, and the episode in
+    the motion's frames.
+    """
     for motion in motions:
         for rest in motion.rests if motion.category != "lying" else ():
-            first, end = max(0, rest.start - _BEFORE), min(len(motion.joints), rest.end + _AFTER, rest.start + _LONGEST)
+            first, end = (
+                max(0, rest.start - _BEFORE),
+                min(len(motion.joints), rest.end + _AFTER, rest.start + _LONGEST),
+            )
             if motion.valid[first:end].all():
                 yield motion, first, end, rest
 
@@ -63,7 +71,9 @@ def _by_kind(pieces: Sequence[Piece], rng: np.random.Generator) -> list[Piece]:
 
 
 def freeze_real(folder: Path, library: Path) -> dict[str, Any]:
-    """Fit the test anew: what ``real_test.json`` holds. It is done once, before any weights are measured on it."""
+    """Fit the test anew: what ``real_test.json`` holds. It is done once, before any weights are
+    measured on it.
+    """
     motions = test_motions(folder)
     pieces, _ = read_library(library)
     clips: list[dict[str, Any]] = []
@@ -105,7 +115,13 @@ def _frozen_sitting(
 
 
 def _on_piece(
-    rng: np.random.Generator, bank: ShapeBank, number: int, motion: Motion, first: int, end: int, rest: Rest
+    rng: np.random.Generator,
+    bank: ShapeBank,
+    number: int,
+    motion: Motion,
+    first: int,
+    end: int,
+    rest: Rest,
 ) -> dict[str, Any] | None:
     """One episode on one piece, or None where the body would cut it."""
     shape = bank.shapes[number]
@@ -123,27 +139,44 @@ def _on_piece(
     if under is None:
         return None
     return {
-        "name": f"{motion.source}/{motion.name}", "start": first, "frames": end - first, "was": round(was, 4),
-        "pelvis": round(shape.seat.pelvis, 4), "rest": [start, stop], "activity": "sit down or up",
-        "fingerprint": fingerprint(joints), **_beside(rng, bank, number, under, points, path),
+        "name": f"{motion.source}/{motion.name}",
+        "start": first,
+        "frames": end - first,
+        "was": round(was, 4),
+        "pelvis": round(shape.seat.pelvis, 4),
+        "rest": [start, stop],
+        "activity": "sit down or up",
+        "fingerprint": fingerprint(joints),
+        **_beside(rng, bank, number, under, points, path),
     }
 
 
 def _beside(
-    rng: np.random.Generator, bank: ShapeBank, number: int, under: Furnishing, points: np.ndarray, path: RootPath
+    rng: np.random.Generator,
+    bank: ShapeBank,
+    number: int,
+    under: Furnishing,
+    points: np.ndarray,
+    path: RootPath,
 ) -> dict[str, Any]:
-    """What a frozen clip holds of its furniture: the piece in use first, then some that stand about."""
+    """What a frozen clip holds of its furniture: the piece in use first, then some that stand
+    about.
+    """
     rows = [[bank.shapes[number].name, *under.shapes[0, 1:]]]
     for _ in range(int(rng.integers(0, _STRAYS + 1))):
         for row in stray_shape(rng, bank, points, path).shapes:
             rows.append([bank.shapes[int(row[0])].name, *row[1:]])
     return {
-        "piece": bank.shapes[number].name, "kind": bank.shapes[number].kind, "maker": bank.shapes[number].maker,
+        "piece": bank.shapes[number].name,
+        "kind": bank.shapes[number].kind,
+        "maker": bank.shapes[number].maker,
         "rows": [[name, *(round(float(v), 4) for v in row)] for name, *row in rows],
     }
 
 
-def _frozen_lying(rng: np.random.Generator, role: str, folder: Path, bank: ShapeBank) -> list[dict[str, Any]]:
+def _frozen_lying(
+    rng: np.random.Generator, role: str, folder: Path, bank: ShapeBank
+) -> list[dict[str, Any]]:
     """The lying clips of the test on boxes, on real beds and sofas instead."""
     found = []
     for clip in held_out(folder):
@@ -164,34 +197,60 @@ def _frozen_lying(rng: np.random.Generator, role: str, folder: Path, bank: Shape
                 if under is None:
                     continue
                 furniture = _beside(rng, bank, int(number), under, points, path)
-                found.append({
-                    "name": clip.name, "lies": True, "raised": round(raised, 4), "frames": len(joints), "activity": "lie",
-                    "pelvis": round(float(np.median(joints[use.start : use.end, 0, 2])), 4), "rest": [use.start, use.end],
-                    "fingerprint": fingerprint(joints), "role": role, "body": clip.body, **furniture,
-                })
+                found.append(
+                    {
+                        "name": clip.name,
+                        "lies": True,
+                        "raised": round(raised, 4),
+                        "frames": len(joints),
+                        "activity": "lie",
+                        "pelvis": round(float(np.median(joints[use.start : use.end, 0, 2])), 4),
+                        "rest": [use.start, use.end],
+                        "fingerprint": fingerprint(joints),
+                        "role": role,
+                        "body": clip.body,
+                        **furniture,
+                    }
+                )
                 break
     return found
 
 
 def real_test(folder: Path, library: Path, role: str) -> list[HeldClip]:
-    """The frozen clips of those that 'choose' or 'tell', cut from the motion files in ``folder``, with pieces of ``library``.
+    """The frozen clips of those that 'choose' or 'tell', cut from the motion files in ``folder``,
+    with pieces of ``library``.
 
     Raises InputError where a motion or a piece is missing or not the same.
     """
-    frozen = [clip for clip in json.loads(FROZEN_REAL.read_text(encoding="utf-8"))["clips"] if clip["role"] == role]
+    frozen = [
+        clip
+        for clip in json.loads(FROZEN_REAL.read_text(encoding="utf-8"))["clips"]
+        if clip["role"] == role
+    ]
     motions = test_motions(folder)
-    beds = {clip.name: clip for clip in held_out(folder)} if any("lies" in clip for clip in frozen) else {}
+    beds = (
+        {clip.name: clip for clip in held_out(folder)}
+        if any("lies" in clip for clip in frozen)
+        else {}
+    )
     wanted = {row[0] for clip in frozen for row in clip["rows"]}
     pieces = {piece.name: piece for piece in read_library(library)[0]}
     if missing := sorted(wanted - pieces.keys()):
-        raise InputError(f"The furniture library '{library}' lacks '{missing[0]}'; give the one that the test was made with.")
+        raise InputError(
+            f"The furniture library '{library}' lacks '{missing[0]}'; give the one that the test "
+            "was made with."
+        )
     bank = bank_of([pieces[name] for name in sorted(wanted)], factors=(1.0,))
     numbers = {shape.name: i for i, shape in enumerate(bank.shapes)}
     return [_clip(clip, motions, beds, bank, numbers) for clip in frozen]
 
 
 def _clip(
-    frozen: dict[str, Any], motions: dict[str, Motion], beds: dict[str, HeldClip], bank: ShapeBank, numbers: dict[str, int]
+    frozen: dict[str, Any],
+    motions: dict[str, Motion],
+    beds: dict[str, HeldClip],
+    bank: ShapeBank,
+    numbers: dict[str, int],
 ) -> HeldClip:
     name = frozen["name"]
     if "lies" in frozen:
@@ -200,22 +259,39 @@ def _clip(
         cut = motions[name].joints[frozen["start"] : frozen["start"] + frozen["frames"]]
         joints = at_seat_height(cut, frozen["was"], frozen["pelvis"])
     else:
-        raise InputError(f"The test's motion '{name}' is not in the folder; give the folder with all files.")
+        raise InputError(
+            f"The test's motion '{name}' is not in the folder; give the folder with all files."
+        )
     if not is_frozen(joints, frozen):
-        raise InputError(f"The motion '{name}' is not the one that the test was made with; use its files, or freeze it anew.")
+        raise InputError(
+            f"The motion '{name}' is not the one that the test was made with; use its files, or "
+            "freeze it anew."
+        )
     path = raw_root_from_joints(joints)
     rows = np.array([[numbers[row[0]], *row[1:]] for row in frozen["rows"]], float)
     return HeldClip(
-        name=f"{name} on {frozen['piece']}", body=frozen["body"], activity=frozen["activity"], unseen=True, composed=False,
-        room="bed" if "lies" in frozen else "", joints=joints, path=path, boxes=np.zeros((0, 7)),
-        rests=(rest_of(joints, path, *frozen["rest"]),), real=Furnishing(shapes=rows, bank=bank), piece=frozen["piece"],
-        kind="lying" if "lies" in frozen else frozen["kind"], maker=frozen["maker"],
+        name=f"{name} on {frozen['piece']}",
+        body=frozen["body"],
+        activity=frozen["activity"],
+        unseen=True,
+        composed=False,
+        room="bed" if "lies" in frozen else "",
+        joints=joints,
+        path=path,
+        boxes=np.zeros((0, 7)),
+        rests=(rest_of(joints, path, *frozen["rest"]),),
+        real=Furnishing(shapes=rows, bank=bank),
+        piece=frozen["piece"],
+        kind="lying" if "lies" in frozen else frozen["kind"],
+        maker=frozen["maker"],
     )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Make ``real_test.json`` anew; 0 if all went well, else 1 and a sentence on standard error."""
-    parser = argparse.ArgumentParser(prog="python -m dafnet_addon.data.real_test", description="Makes the test set anew.")
+    parser = argparse.ArgumentParser(
+        prog="python -m dafnet_addon.data.real_test", description="Makes the test set anew."
+    )
     parser.add_argument("folder", type=Path, help="the motion files")
     parser.add_argument("library", type=Path, help="the furniture library")
     options = parser.parse_args(arguments)

@@ -1,4 +1,6 @@
-"""A captured skeleton as its file has it: joints by name, in the file's own units and axes; and how bones pose it."""
+"""A captured skeleton as its file has it: joints by name, in the file's own units and axes; and how
+bones pose it.
+"""
 
 import re
 from array import array
@@ -13,7 +15,15 @@ from ..core.errors import InputError
 from ..core.rotations import rotate
 
 __all__ = [
-    "MOST_JOINTS", "Recording", "check_size", "numbers_in", "posed", "posed_in_blocks", "printable", "rotation_about", "sound",
+    "MOST_JOINTS",
+    "Recording",
+    "check_size",
+    "numbers_in",
+    "posed",
+    "posed_in_blocks",
+    "printable",
+    "rotation_about",
+    "sound",
     "text_of",
 ]
 
@@ -28,9 +38,11 @@ _CHUNK = 1 << 20  # characters
 
 @dataclass(frozen=True)
 class Recording:
-    """``positions`` (T, J, 3): joints in the file's units and axes. ``rest`` (J, 3): the skeleton with no rotation at all.
+    """``positions`` (T, J, 3): joints in the file's units and axes. ``rest`` (J, 3): the skeleton
+    with no rotation at all.
 
-    ``rate``: frames a second, or None where the file does not say. ``unit``: metres of one of its units, or None likewise.
+    ``rate``: frames a second, or None where the file does not say. ``unit``: metres of one of its
+    units, or None likewise.
     """
 
     names: tuple[str, ...]
@@ -45,14 +57,17 @@ class Recording:
 
 
 def text_of(file: Path) -> str:
-    """A text file as editors and exporters leave it, with or without a byte order mark; what is not ASCII stands for itself.
+    """A text file as editors and exporters leave it, with or without a byte order mark; what is not
+    ASCII stands for itself.
 
     Raises InputError where the file cannot be opened.
     """
     try:
         data = file.read_bytes()
     except OSError as error:
-        raise InputError(f"The file '{file}' cannot be opened ({error.strerror}); look at its permissions.") from None
+        raise InputError(
+            f"The file '{file}' cannot be opened ({error.strerror}); look at its permissions."
+        ) from None
     if data[:2] in (BOM_UTF16_LE, BOM_UTF16_BE):
         return data.decode("utf-16", errors="replace")
     return data.removeprefix(BOM_UTF8).decode("latin-1")
@@ -64,7 +79,8 @@ def printable(name: str) -> str:
 
 
 def numbers_in(text: str) -> np.ndarray:
-    """The numbers (N,) of a text, separated by spaces; a comma is a decimal point where there is no other.
+    """The numbers (N,) of a text, separated by spaces; a comma is a decimal point where there is no
+    other.
 
     Raises ValueError where something else is among them.
     """
@@ -88,10 +104,13 @@ def sound(numbers: np.ndarray) -> bool:
 
 
 def check_size(file: Path, frames: int, joints: int, numbers: int) -> None:
-    """Raises InputError where so many joints and frames would take far more memory than the numbers that move them."""
+    """Raises InputError where so many joints and frames would take far more memory than the numbers
+    that move them.
+    """
     if joints > MOST_JOINTS or frames * joints * 24 > _SPARE + 16 * numbers:
         raise InputError(
-            f"The file '{file}' has a skeleton of {joints} joints in {frames} frames, but only {numbers} numbers that move it, "
+            f"The file '{file}' has a skeleton of {joints} joints in {frames} frames, but only "
+            f"{numbers} numbers that move it, "
             "which is no body's; export the body's skeleton alone."
         )
 
@@ -109,10 +128,11 @@ def rotation_about(axis: str, angle: np.ndarray) -> np.ndarray:
 
 
 def posed(parents: tuple[int, ...], offsets: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """Positions (T, J, 3) of joints at ``offsets`` (J, 3) or (T, J, 3) in their parents' frames, turned by ``local``.
+    """Positions (T, J, 3) of joints at ``offsets`` (J, 3) or (T, J, 3) in their parents' frames,
+    turned by ``local``.
 
-    ``local`` (T, J, 3, 3) are rotations in the parent's frame; parents come before their children, the first joint is the
-    root, whose offset is its position.
+    ``local`` (T, J, 3, 3) are rotations in the parent's frame; parents come before their children,
+    the first joint is the root, whose offset is its position.
     """
     offsets = np.broadcast_to(offsets, (*local.shape[:2], 3))
     turned, positions = local.copy(), offsets.copy()
@@ -125,7 +145,9 @@ def posed(parents: tuple[int, ...], offsets: np.ndarray, local: np.ndarray) -> n
 def posed_in_blocks(
     parents: tuple[int, ...], frames: int, pose: Callable[[slice], tuple[np.ndarray, np.ndarray]]
 ) -> np.ndarray:
-    """``posed`` for many frames: ``pose`` gives offsets and rotations of some, which take six times what positions do."""
+    """``posed`` for many frames: ``pose`` gives offsets and rotations of some, which take six times
+    what positions do.
+    """
     out = np.empty((frames, len(parents), 3))
     step = max(1, _BLOCK // len(parents))
     for start in range(0, frames, step):

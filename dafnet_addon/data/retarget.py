@@ -1,9 +1,11 @@
-"""Moves captured sitting to seats of other heights: contacts are kept, and the body leans and bends as the new height asks.
+"""Moves captured sitting to seats of other heights: contacts are kept, and the body leans and bends
+as the new height asks.
 
-Paper, section 5.2, after Tonneau et al. (2016): a key joint near the source's furniture keeps its place relative to sampled
-points of it when these move. Here the points are the seat, which goes up or down, the floor, which stays, and, for hands,
-the body's own thighs and shoulders; the whole body is then solved on its key joints. All is closed-form and treats every
-frame at once, so that windows can be drawn with it; nothing in it knows which way time runs.
+Paper, section 5.2, after Tonneau et al. (2016): a key joint near the source's furniture keeps its
+place relative to sampled points of it when these move. Here the points are the seat, which goes up
+or down, the floor, which stays, and, for hands, the body's own thighs and shoulders; the whole body
+is then solved on its key joints. All is closed-form and treats every frame at once, so that windows
+can be drawn with it; nothing in it knows which way time runs.
 """
 
 import numpy as np
@@ -16,30 +18,45 @@ from .canonical import FOOT, LEG, SHIN, THIGH
 __all__ = ["at_seat_height"]
 
 _HIPS, _KNEES, _ANKLES, _TOES, _SHOULDERS, _ELBOWS, _WRISTS = (
-    [joint("left_" + n), joint("right_" + n)] for n in ("hip", "knee", "ankle", "foot", "shoulder", "elbow", "wrist")
+    [joint("left_" + n), joint("right_" + n)]
+    for n in ("hip", "knee", "ankle", "foot", "shoulder", "elbow", "wrist")
 )
 _ARMS = _ELBOWS + _WRISTS
 _NECK, _HEAD = joint("neck"), joint("head")
 _BODY = [j for j in range(22) if j not in _KNEES + _ANKLES + _TOES]
 _UPPER_ARM, _FOREARM = (float(np.linalg.norm(OFFSETS[j[0]])) for j in (_ELBOWS, _WRISTS))
-_MASS = np.zeros(22)  # of what moves with the pelvis (all but shins and feet), near each joint; after de Leva (1996)
-for _joints, _share in (([0], 0.20), ([joint("spine2")], 0.13), ([joint("spine3")], 0.14), ([_HEAD], 0.07), (_SHOULDERS, 0.03),
-                        (_ELBOWS, 0.025), (_WRISTS, 0.02), (_HIPS, 0.08)):
+# of what moves with the pelvis (all but shins and feet), near each joint; after de Leva (1996)
+_MASS = np.zeros(22)
+for _joints, _share in (
+    ([0], 0.20),
+    ([joint("spine2")], 0.13),
+    ([joint("spine3")], 0.14),
+    ([_HEAD], 0.07),
+    (_SHOULDERS, 0.03),
+    (_ELBOWS, 0.025),
+    (_WRISTS, 0.02),
+    (_HIPS, 0.08),
+):
     _MASS[_joints] = _share
 _MASS /= _MASS.sum()
 _UP = np.array([0.0, 0.0, 1.0])
 
 _STANDING = 0.92  # metres; a pelvis above it is not moved
-_CORNER = 0.2  # of the way from standing to seated, over which the pelvis' own course fades into the seat's
+# of the way from standing to seated, over which the pelvis' own course fades into the seat's
+_CORNER = 0.2
 _CARRIED = 0.12  # metres over the seat, within which the seat takes over the weight
 _LEAN = 1.5  # share of its lean that the trunk gains for each metre that the seat is lower
 _GAIN = (0.6, 1.5)
 _SIGMA = 9  # frames; the trunk leans before the pelvis moves, and until after
-_STRAIGHT, _SOFT = 0.985 * LEG, 0.03  # metres; near this length the heel begins to lift, so that the knee does not lock
+# metres; near this length the heel begins to lift, so that the knee does not lock
+_STRAIGHT, _SOFT = 0.985 * LEG, 0.03
 _TIPTOE = np.radians(40.0)  # between foot and leg; beyond it the toes leave the floor, too
-_HANGS = (0.06, 0.18)  # metres; a foot higher over the floor than the first begins to belong to the seat
-_PERCH = (0.75, 0.6)  # above this height (metres) one sits nearer the edge: by this share of what the pelvis is higher
-_TOUCH = (0.12, 0.30)  # metres from the wrist to thigh bone or seat: the hand rests there; it has nothing to do with it
+# metres; a foot higher over the floor than the first begins to belong to the seat
+_HANGS = (0.06, 0.18)
+# above this height (metres) one sits nearer the edge: by this share of what the pelvis is higher
+_PERCH = (0.75, 0.6)
+# metres from the wrist to thigh bone or seat: the hand rests there; it has nothing to do with it
+_TOUCH = (0.12, 0.30)
 _SEAT = np.array([(x, y, -SEAT_TO_PELVIS) for x in (-0.25, 0.25) for y in (-0.15, 0.05)])
 _THIGH = np.array([0.1, 0.35, 0.6, 0.85])
 
@@ -79,10 +96,11 @@ def _length(v: np.ndarray) -> np.ndarray:
 
 
 def _feet(joints: np.ndarray, hips: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ankles and toes (T, 2, 3) under moved hips, whose seat has risen by ``rise`` (T, 1): where they were, if on the floor.
+    """Ankles and toes (T, 2, 3) under moved hips, whose seat has risen by ``rise`` (T, 1): where
+    they were, if on the floor.
 
-    Where the leg is too short the heel lifts about the planted toes, and at last the toes come with it. Feet that hang go
-    with the seat, down to the floor.
+    Where the leg is too short the heel lifts about the planted toes, and at last the toes come with
+    it. Feet that hang go with the seat, down to the floor.
     """
     ankle, toe = joints[:, _ANKLES], joints[:, _TOES]
     over = np.minimum(toe[..., 2] - REST[_TOES, 2], ankle[..., 2] - REST[_ANKLES, 2])
@@ -105,14 +123,25 @@ def _feet(joints: np.ndarray, hips: np.ndarray, rise: np.ndarray) -> tuple[np.nd
     apart = apart - lift
     closed = np.clip((apart**2 + FOOT**2 - leg**2) / (2 * apart * FOOT), angle, 1.0)
     toe = toe + toward * lift
-    return toe + FOOT * (closed * toward + np.sqrt(1 - closed**2) * normalised(heel - toward * angle)), toe
+    return toe + FOOT * (
+        closed * toward + np.sqrt(1 - closed**2) * normalised(heel - toward * angle)
+    ), toe
 
 
-def _knees(joints: np.ndarray, hips: np.ndarray, ankles: np.ndarray, forward: np.ndarray) -> np.ndarray:
+def _knees(
+    joints: np.ndarray, hips: np.ndarray, ankles: np.ndarray, forward: np.ndarray
+) -> np.ndarray:
     """Knees (T, 2, 3) between moved hips and ankles: their hinges turn as little as they can."""
     hinge = np.cross(joints[:, _KNEES] - joints[:, _HIPS], joints[:, _ANKLES] - joints[:, _KNEES])
     bend = np.cross(ankles - hips, hinge)
-    return two_bone(hips, ankles, hips + bend, THIGH, SHIN, fallback=np.broadcast_to(forward[:, None], bend.shape))[0]
+    return two_bone(
+        hips,
+        ankles,
+        hips + bend,
+        THIGH,
+        SHIN,
+        fallback=np.broadcast_to(forward[:, None], bend.shape),
+    )[0]
 
 
 def _thighs(joints: np.ndarray) -> np.ndarray:
@@ -121,17 +150,23 @@ def _thighs(joints: np.ndarray) -> np.ndarray:
     return (hips + _THIGH[:, None] * (knees - hips)).reshape(len(joints), -1, 3)
 
 
-def _arms(joints: np.ndarray, out: np.ndarray, seat: np.ndarray, heading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Elbows and wrists (T, 2, 3) of the moved body ``out``, whose seat has moved by ``seat`` (T, 3).
+def _arms(
+    joints: np.ndarray, out: np.ndarray, seat: np.ndarray, heading: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Elbows and wrists (T, 2, 3) of the moved body ``out``, whose seat has moved by ``seat`` (T,
+    3).
 
-    A hand keeps its place to the points of thighs and seat that it is near to: p' = sum of w_j (t_j + p - s_j), w_j falling
-    linearly from 1 at the smallest distance to 0 at the mean one (paper, section 5.2); a free hand goes with its shoulder.
-    ``heading`` (T, 3, 3): rows right, forward, up.
+    A hand keeps its place to the points of thighs and seat that it is near to: p' = sum of w_j (t_j
+    + p - s_j), w_j falling linearly from 1 at the smallest distance to 0 at the mean one (paper,
+    section 5.2); a free hand goes with its shoulder. ``heading`` (T, 3, 3): rows right, forward,
+    up.
     """
     shoulder, elbow, wrist = joints[:, _SHOULDERS], joints[:, _ELBOWS], joints[:, _WRISTS]
     thighs = _thighs(joints)
     points = np.concatenate([thighs, joints[:, :1] + _SEAT @ heading], axis=1)
-    moved = np.concatenate([_thighs(out) - thighs, np.repeat(seat[:, None], len(_SEAT), axis=1)], axis=1)
+    moved = np.concatenate(
+        [_thighs(out) - thighs, np.repeat(seat[:, None], len(_SEAT), axis=1)], axis=1
+    )
     distance = _length(wrist[:, :, None] - points[:, None])[..., 0]
     least, mean = distance.min(-1, keepdims=True), distance.mean(-1, keepdims=True)
     weight = np.clip((mean - distance) / (mean - least), 0.0, 1.0)
@@ -140,23 +175,28 @@ def _arms(joints: np.ndarray, out: np.ndarray, seat: np.ndarray, heading: np.nda
     shoulders = out[:, _SHOULDERS]
     wrists = wrist + rests * nearby + (1 - rests) * (shoulders - shoulder)
     backward = np.broadcast_to(-heading[:, None, 1], elbow.shape)
-    return two_bone(shoulders, wrists, shoulders + elbow - shoulder, _UPPER_ARM, _FOREARM, fallback=backward)
+    return two_bone(
+        shoulders, wrists, shoulders + elbow - shoulder, _UPPER_ARM, _FOREARM, fallback=backward
+    )
 
 
 def at_seat_height(joints: np.ndarray, resting_pelvis: float, wanted: float) -> np.ndarray:
-    """The motion (T, 22, 3) of the canonical body with its resting pelvis moved from one height to another (metres).
+    """The motion (T, 22, 3) of the canonical body with its resting pelvis moved from one height to
+    another (metres).
 
-    The pelvis goes all the way while seated, none while standing, in between in proportion. Feet stay; on a high seat heels
-    lift, then toes. On the way to a lower seat the trunk leans further, to a higher one less, and as long as the seat does not
-    carry it the upper body keeps its centre of mass over the feet as it was. Hands go with what they are near to. Bones keep
-    their lengths.
+    The pelvis goes all the way while seated, none while standing, in between in proportion. Feet
+    stay; on a high seat heels lift, then toes. On the way to a lower seat the trunk leans further,
+    to a higher one less, and as long as the seat does not carry it the upper body keeps its centre
+    of mass over the feet as it was. Hands go with what they are near to. Bones keep their lengths.
     """
     height = joints[:, 0, 2]
     standing = max(_STANDING, resting_pelvis + 0.08)
     down = (standing - height) / (standing - resting_pelvis)
     share = _ramp(down)[:, None]
     rise = (wanted - resting_pelvis) * share
-    right = normalised((joints[:, _HIPS[1]] - joints[:, _HIPS[0]]) * (1, 1, 0), fallback=np.array([1.0, 0.0, 0.0]))
+    right = normalised(
+        (joints[:, _HIPS[1]] - joints[:, _HIPS[0]]) * (1, 1, 0), fallback=np.array([1.0, 0.0, 0.0])
+    )
     heading = np.stack([right, np.cross(_UP, right), np.broadcast_to(_UP, right.shape)], axis=1)
     forward = heading[:, 1]
 
@@ -170,8 +210,14 @@ def at_seat_height(joints: np.ndarray, resting_pelvis: float, wanted: float) -> 
     out[:, _BODY] = pelvis + _turned(joints[:, _BODY] - pelvis, right, -further)
     # Arms hang and the face looks ahead, however the trunk leans.
     out[:, _HEAD] = out[:, _NECK] + joints[:, _HEAD] - joints[:, _NECK]
-    out[:, _ARMS] = joints[:, _ARMS] + np.tile(out[:, _SHOULDERS] - joints[:, _SHOULDERS], (1, 2, 1))
-    balance = np.einsum("tjc,j->tc", joints - out, _MASS) * (1, 1, 0) * _ramp((height - resting_pelvis) / _CARRIED)[:, None]
+    out[:, _ARMS] = joints[:, _ARMS] + np.tile(
+        out[:, _SHOULDERS] - joints[:, _SHOULDERS], (1, 2, 1)
+    )
+    balance = (
+        np.einsum("tjc,j->tc", joints - out, _MASS)
+        * (1, 1, 0)
+        * _ramp((height - resting_pelvis) / _CARRIED)[:, None]
+    )
     edge = _PERCH[1] * max(0.0, wanted - max(_PERCH[0], resting_pelvis))
     out[:, _BODY] += (rise * _UP + balance + edge * share * forward)[:, None]
     ankles, out[:, _TOES] = _feet(joints, out[:, _HIPS], rise)

@@ -1,8 +1,10 @@
-"""Which joint of a captured skeleton is which of ours: maps by name, one file each in ``rigs/``, checked on the skeleton.
+"""Which joint of a captured skeleton is which of ours: maps by name, one file each in ``rigs/``,
+checked on the skeleton.
 
-A map says for each of our 22 joints the source's joint, or several with weights that sum to one where ours lies between
-them. ``known_by`` lists further names that tell the convention from others. Names are compared without case, spaces,
-underscores, a prefix that ends in a colon, and one that the pelvis has before its name, as in ``mixamorig1_Hips``.
+A map says for each of our 22 joints the source's joint, or several with weights that sum to one
+where ours lies between them. ``known_by`` lists further names that tell the convention from others.
+Names are compared without case, spaces, underscores, a prefix that ends in a colon, and one that
+the pelvis has before its name, as in ``mixamorig1_Hips``.
 """
 
 import json
@@ -25,7 +27,9 @@ _PREFIXES = 8  # tried at most
 
 @dataclass(frozen=True)
 class Rig:
-    """One convention: ``joints`` gives each of our joints as source names (normalised) and weights."""
+    """One convention: ``joints`` gives each of our joints as source names (normalised) and
+    weights.
+    """
 
     name: str
     about: str
@@ -49,15 +53,22 @@ def rigs() -> tuple[Rig, ...]:
     for file in sorted((Path(__file__).parent / "rigs").glob("*.json")):
         data = json.loads(file.read_text(encoding="utf-8"))
         joints = {
-            ours: {_plain(name): weight for name, weight in (theirs if isinstance(theirs, dict) else {theirs: 1.0}).items()}
+            ours: {
+                _plain(name): weight
+                for name, weight in (theirs if isinstance(theirs, dict) else {theirs: 1.0}).items()
+            }
             for ours, theirs in data["joints"].items()
         }
-        found.append(Rig(file.stem, data["about"], frozenset(_plain(n) for n in data["known_by"]), joints))
+        found.append(
+            Rig(file.stem, data["about"], frozenset(_plain(n) for n in data["known_by"]), joints)
+        )
     return tuple(sorted(found, key=lambda rig: (-len(rig.needs), rig.name)))
 
 
 def _called(names: tuple[str, ...], rig: Rig) -> dict[str, int]:
-    """Joints by the names that a convention may know them by: without the prefix that leaves it the most."""
+    """Joints by the names that a convention may know them by: without the prefix that leaves it the
+    most.
+    """
     plain = {_plain(name): i for i, name in reversed(list(enumerate(names)))}
     if "root" in plain:
         plain.setdefault("hips", 0)  # the root has no name of its own in an .asf file
@@ -77,18 +88,26 @@ def rig_of(recording: Recording, file: Path) -> tuple[Rig, dict[str, int]]:
     for rig, index in found:
         if rig.needs <= index.keys():
             return rig, index
-    nearest, index = min(found, key=lambda pair: len(pair[0].needs - pair[1].keys()) / len(pair[0].needs))
+    nearest, index = min(
+        found, key=lambda pair: len(pair[0].needs - pair[1].keys()) / len(pair[0].needs)
+    )
     lacking = [ours for ours, theirs in nearest.joints.items() if not theirs.keys() <= index.keys()]
     wanted = sorted({n for ours in lacking for n in nearest.joints[ours]} - index.keys())
     wanted = wanted or sorted(nearest.known_by - index.keys())
     raise InputError(
-        f"The skeleton of '{file}' is of no known convention: to be read as '{nearest.name}' it lacks {', '.join(wanted)} (for "
-        f"{', '.join(lacking) or 'telling it apart'}); rename its joints, or add a map to dafnet_addon/data/rigs."
+        f"The skeleton of '{file}' is of no known convention: to be read as '{nearest.name}' it "
+        f"lacks {', '.join(wanted)} (for "
+        f"{', '.join(lacking) or 'telling it apart'}); rename its joints, or add a map to "
+        "dafnet_addon/data/rigs."
     )
 
 
-def _check(recording: Recording, rig: Rig, index: dict[str, int], joints: np.ndarray, file: Path) -> None:
-    """Raises InputError where names match but the skeleton is not hung together, or not built, as a body is."""
+def _check(
+    recording: Recording, rig: Rig, index: dict[str, int], joints: np.ndarray, file: Path
+) -> None:
+    """Raises InputError where names match but the skeleton is not hung together, or not built, as a
+    body is.
+    """
 
     def above(source: int) -> set[int]:
         chain: set[int] = set()
@@ -103,7 +122,8 @@ def _check(recording: Recording, rig: Rig, index: dict[str, int], joints: np.nda
         if len(whole) == 2 and main[whole[1]] not in above(main[whole[0]]):
             child, parent = (recording.names[main[j]] for j in whole)
             raise InputError(
-                f"The skeleton of '{file}' matches '{rig.name}' by name, but its joint '{child}' does not hang from "
+                f"The skeleton of '{file}' matches '{rig.name}' by name, but its joint '{child}' "
+                "does not hang from "
                 f"'{parent}'; mend its hierarchy."
             )
 
@@ -116,20 +136,31 @@ def _check(recording: Recording, rig: Rig, index: dict[str, int], joints: np.nda
         ("legs differ in length", length("right_hip", "right_knee", "right_ankle"), (0.85, 1.18)),
         ("thigh is no match for its leg", length("left_hip", "left_knee"), (0.35, 0.65)),
         ("trunk is no match for its legs", length("pelvis", "neck"), (0.30, 0.85)),
-        ("arm is no match for its legs", length("left_shoulder", "left_elbow", "left_wrist"), (0.40, 0.90)),
-        ("arms differ in length", length("right_shoulder", "right_elbow", "right_wrist"), (0.40, 0.90)),
+        (
+            "arm is no match for its legs",
+            length("left_shoulder", "left_elbow", "left_wrist"),
+            (0.40, 0.90),
+        ),
+        (
+            "arms differ in length",
+            length("right_shoulder", "right_elbow", "right_wrist"),
+            (0.40, 0.90),
+        ),
         ("hips lie too far apart", length("left_hip", "right_hip"), (0.08, 0.45)),
     ]
     for what, found, (least, most) in checks:
         if not least * leg <= found <= most * leg:
             raise InputError(
-                f"The skeleton of '{file}' matches '{rig.name}' by name, but its {what} ({found / max(leg, 1e-9):.2f} of the "
-                f"left leg's length, a body has {least} to {most}); rename its joints to what they are."
+                f"The skeleton of '{file}' matches '{rig.name}' by name, but its {what} "
+                f"({found / max(leg, 1e-9):.2f} of the "
+                f"left leg's length, a body has {least} to {most}); rename its joints to what "
+                "they are."
             )
 
 
 def mapped(recording: Recording, file: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Our joints (T, 22, 3) of a recording, and (22, 3) of its rest pose, in its own units and axes.
+    """Our joints (T, 22, 3) of a recording, and (22, 3) of its rest pose, in its own units and
+    axes.
 
     Raises InputError where its skeleton is of no known convention, or is not a body's.
     """

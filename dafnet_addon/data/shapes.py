@@ -1,8 +1,10 @@
-"""Real pieces of furniture as the training holds them: distance grids in bytes, and the places where one sits on them.
+"""Real pieces of furniture as the training holds them: distance grids in bytes, and the places
+where one sits on them.
 
-Every piece is kept at a few heights (``FACTORS``), since a grid that is stretched further no longer holds distances; between
-two of them it is stretched by at most ``STRETCH``, which is off by at most 4 mm at the sensor's reach and by nothing on the
-surface. A placed shape is a row: which shape, x and y (metres), yaw (radians, counter-clockwise), stretch of its height.
+Every piece is kept at a few heights (``FACTORS``), since a grid that is stretched further no longer
+holds distances; between two of them it is stretched by at most ``STRETCH``, which is off by at most
+4 mm at the sensor's reach and by nothing on the surface. A placed shape is a row: which shape, x
+and y (metres), yaw (radians, counter-clockwise), stretch of its height.
 """
 
 from collections.abc import Iterable, Sequence
@@ -21,16 +23,34 @@ from ..director.seats import seat_of
 from .library import Piece
 
 __all__ = [
-    "ABSENT_SHAPE", "DEEPEST", "FACTORS", "FARTHEST", "NO_SHAPES", "PELVIS_OVER", "SHAPES", "STRETCH", "Seat", "Shape",
-    "ShapeBank", "bank_of", "shapes_of",
+    "ABSENT_SHAPE",
+    "DEEPEST",
+    "FACTORS",
+    "FARTHEST",
+    "NO_SHAPES",
+    "PELVIS_OVER",
+    "SHAPES",
+    "STRETCH",
+    "Seat",
+    "Shape",
+    "ShapeBank",
+    "bank_of",
+    "shapes_of",
 ]
 
 PELVIS_OVER = {
-    "table": 0.14, "bench": 0.14, "stool": 0.14, "toilet": 0.11, "chair": 0.11, "armchair": 0.07, "sofa": 0.03,
+    "table": 0.14,
+    "bench": 0.14,
+    "stool": 0.14,
+    "toilet": 0.11,
+    "chair": 0.11,
+    "armchair": 0.07,
+    "sofa": 0.03,
     "bed": 0.03,
 }
-"""Metres by which a seated pelvis joint is over the undeformed surface of a kind of furniture: how far one sinks in belongs to
-the piece. Medians over captured sitting on real furniture; half of the pieces of a kind lie within 2 cm.
+"""Metres by which a seated pelvis joint is over the undeformed surface of a kind of furniture: how
+far one sinks in belongs to the piece. Medians over captured sitting on real furniture; half of the
+pieces of a kind lie within 2 cm.
 """
 
 FACTORS = (0.8, 0.88, 0.97, 1.07, 1.18)
@@ -52,17 +72,30 @@ _APPROACH = np.array([0.0, -3.0])
 _ASTRAY = np.cos(np.radians(60.0))
 _FRAMES_AT_ONCE = 16
 _CORNERS = np.array([(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
-_SIDES = np.array([
-    (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7),
-    (1, 7, 3),
-])
+_SIDES = np.array(
+    [
+        (0, 1, 3),
+        (0, 3, 2),
+        (4, 6, 7),
+        (4, 7, 5),
+        (0, 4, 5),
+        (0, 5, 1),
+        (2, 3, 7),
+        (2, 7, 6),
+        (0, 2, 6),
+        (0, 6, 4),
+        (1, 5, 7),
+        (1, 7, 3),
+    ]
+)
 """A box: its corners from 0 to 1, and their numbers in the triangles of its sides."""
 
 
 @dataclass(frozen=True)
 class Seat:
-    """Where one sits on a shape, in its own frame: ``position`` (2,) under the pelvis, ``yaw`` that one faces, ``height`` of
-    the surface, ``pelvis`` height of the joint, ``aside`` metres to each side where another may sit as well.
+    """Where one sits on a shape, in its own frame: ``position`` (2,) under the pelvis, ``yaw`` that
+    one faces, ``height`` of the surface, ``pelvis`` height of the joint, ``aside`` metres to each
+    side where another may sit as well.
     """
 
     position: np.ndarray
@@ -74,8 +107,9 @@ class Seat:
 
 @dataclass(frozen=True)
 class Shape:
-    """A piece at ``factor`` of its height. ``values`` (nx, ny, nz) uint8: distances from ``DEEPEST`` to ``FARTHEST`` at nodes
-    ``spacing`` metres apart from ``origin`` (3,) on. ``seat``: None where nobody sits.
+    """A piece at ``factor`` of its height. ``values`` (nx, ny, nz) uint8: distances from
+    ``DEEPEST`` to ``FARTHEST`` at nodes ``spacing`` metres apart from ``origin`` (3,) on. ``seat``:
+    None where nobody sits.
     """
 
     name: str
@@ -104,34 +138,50 @@ class ShapeBank:
         return len(self.shapes)
 
     def distances(self, placed: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Signed distance (N,) of world ``points`` (N, 3) to the nearest of the placed shapes (S, 5), at most ``FARTHEST``."""
+        """Signed distance (N,) of world ``points`` (N, 3) to the nearest of the placed shapes (S,
+        5), at most ``FARTHEST``.
+        """
         out = np.full(len(points), FARTHEST, np.float32)
         for number, x, y, yaw, stretch in placed:
             shape = self.shapes[int(number)]
             local = rotate(yaw_matrix(np.array(-yaw)), points - (x, y, 0.0)) / (1.0, 1.0, stretch)
             low = shape.origin
-            near = ((local > low) & (local < low + shape.spacing * (np.array(shape.values.shape) - 1))).all(-1)
+            near = (
+                (local > low) & (local < low + shape.spacing * (np.array(shape.values.shape) - 1))
+            ).all(-1)
             if near.any():
                 out[near] = np.minimum(out[near], _sampled(shape, local[near]))
         return out
 
     def occupancy(self, placed: np.ndarray, path: RootPath) -> np.ndarray:
-        """Occupancy (T, 2640) float32 of placed shapes (S, 5) along a root path on the floor z = 0; as ``core.occupancy``."""
+        """Occupancy (T, 2640) float32 of placed shapes (S, 5) along a root path on the floor z = 0;
+        as ``core.occupancy``.
+        """
         out = np.zeros((len(path), len(SPHERES)), np.float32)
         for row in placed:
             shape = self.shapes[int(row[0])]
             size = shape.spacing * (np.array(shape.values.shape) - 1)
-            reach = REACH + RADIUS + np.linalg.norm(np.maximum(np.abs(shape.origin), np.abs(shape.origin + size))[:2])
-            frames = np.flatnonzero(np.linalg.norm(path.position[:, :2] - row[1:3], axis=-1) < reach)
+            reach = (
+                REACH
+                + RADIUS
+                + np.linalg.norm(np.maximum(np.abs(shape.origin), np.abs(shape.origin + size))[:2])
+            )
+            frames = np.flatnonzero(
+                np.linalg.norm(path.position[:, :2] - row[1:3], axis=-1) < reach
+            )
             for start in range(0, len(frames), _FRAMES_AT_ONCE):
                 some = frames[start : start + _FRAMES_AT_ONCE]
-                spheres = rotate(yaw_matrix(path.yaw[some])[:, None], SPHERES) + path.position[some, None] * (1, 1, 0)
+                spheres = rotate(yaw_matrix(path.yaw[some])[:, None], SPHERES) + path.position[
+                    some, None
+                ] * (1, 1, 0)
                 found = occupancy_of_distance(self.distances(row[None], spheres.reshape(-1, 3)))
                 out[some] = np.maximum(out[some], found.reshape(len(some), -1))
         return out
 
     def meshes(self, placed: np.ndarray, name: str = "") -> list[Mesh]:
-        """Placed shapes (S, 5) as solids of the core, with their grids; their triangles are those of the box around them."""
+        """Placed shapes (S, 5) as solids of the core, with their grids; their triangles are those
+        of the box around them.
+        """
         solids = []
         for number, x, y, yaw, stretch in placed:
             shape = self.shapes[int(number)]
@@ -143,7 +193,9 @@ class ShapeBank:
         return solids
 
     def surface(self, placed: np.ndarray, spacing: float = 0.06) -> np.ndarray:
-        """Points (N, 3) of the placed shapes' surfaces, world, about ``spacing`` metres apart: to be drawn."""
+        """Points (N, 3) of the placed shapes' surfaces, world, about ``spacing`` metres apart: to
+        be drawn.
+        """
         found = [np.zeros((0, 3))]
         for number, x, y, yaw, stretch in placed:
             shape = self.shapes[int(number)]
@@ -157,13 +209,17 @@ class ShapeBank:
     def write(self, file: Path) -> None:
         """Write the bank, whole or not at all."""
         seats = [
-            [*s.seat.position, s.seat.yaw, s.seat.height, s.seat.pelvis, s.seat.aside] if s.seat else [np.nan] * 6
+            [*s.seat.position, s.seat.yaw, s.seat.height, s.seat.pelvis, s.seat.aside]
+            if s.seat
+            else [np.nan] * 6
             for s in self.shapes
         ]
         part = file.with_suffix(".part.npz")
         np.savez_compressed(
-            part, texts=np.array([[s.name, s.kind, s.maker] for s in self.shapes]),
-            places=np.array([[s.factor, *s.origin, s.spacing] for s in self.shapes]), seats=np.array(seats),
+            part,
+            texts=np.array([[s.name, s.kind, s.maker] for s in self.shapes]),
+            places=np.array([[s.factor, *s.origin, s.spacing] for s in self.shapes]),
+            seats=np.array(seats),
             sizes=np.array([s.values.shape for s in self.shapes]),
             values=np.concatenate([s.values.ravel() for s in self.shapes]),
         )
@@ -173,15 +229,25 @@ class ShapeBank:
     def read(file: Path) -> "ShapeBank":
         """What ``write`` wrote."""
         with np.load(file) as z:
-            texts, places, seats, sizes, values = (z[name] for name in ("texts", "places", "seats", "sizes", "values"))
+            texts, places, seats, sizes, values = (
+                z[name] for name in ("texts", "places", "seats", "sizes", "values")
+            )
         shapes, at = [], 0
         for text, place, seat, size in zip(texts, places, seats, sizes, strict=True):
             count = int(np.prod(size))
             sits = None if np.isnan(seat[0]) else Seat(seat[:2], *(float(v) for v in seat[2:]))
-            shapes.append(Shape(
-                name=str(text[0]), kind=str(text[1]), maker=str(text[2]), factor=float(place[0]), origin=place[1:4],
-                spacing=float(place[4]), values=values[at : at + count].reshape(size), seat=sits,
-            ))
+            shapes.append(
+                Shape(
+                    name=str(text[0]),
+                    kind=str(text[1]),
+                    maker=str(text[2]),
+                    factor=float(place[0]),
+                    origin=place[1:4],
+                    spacing=float(place[4]),
+                    values=values[at : at + count].reshape(size),
+                    seat=sits,
+                )
+            )
             at += count
         return ShapeBank(tuple(shapes))
 
@@ -208,13 +274,19 @@ def _sampled(shape: Shape, local: np.ndarray) -> np.ndarray:
 def _stretched(shape: Shape, stretch: float) -> DistanceGrid:
     """The grid of a shape whose height is stretched, on nodes of its own."""
     grid = shape.grid
-    heights = grid.origin[2] * stretch + grid.spacing * np.arange(int(np.ceil((grid.values.shape[2] - 1) * stretch)) + 1)
-    at = np.clip((heights / stretch - grid.origin[2]) / grid.spacing, 0.0, grid.values.shape[2] - 1.001)
+    heights = grid.origin[2] * stretch + grid.spacing * np.arange(
+        int(np.ceil((grid.values.shape[2] - 1) * stretch)) + 1
+    )
+    at = np.clip(
+        (heights / stretch - grid.origin[2]) / grid.spacing, 0.0, grid.values.shape[2] - 1.001
+    )
     below = at.astype(int)
     share = (at - below).astype(np.float32)
     values = grid.values[..., below] * (1 - share) + grid.values[..., below + 1] * share
     values[..., [0, -1]] = FARTHEST
-    return DistanceGrid(grid.origin * (1.0, 1.0, stretch), grid.spacing, values.astype(np.float32), FARTHEST)
+    return DistanceGrid(
+        grid.origin * (1.0, 1.0, stretch), grid.spacing, values.astype(np.float32), FARTHEST
+    )
 
 
 def _seat(piece: Piece, vertices: np.ndarray) -> Seat | None:
@@ -228,7 +300,9 @@ def _seat(piece: Piece, vertices: np.ndarray) -> Seat | None:
         return None
     if np.cos(place.yaw - np.pi) < _ASTRAY:
         return None  # a piece's front faces −y: what looks elsewhere was misjudged
-    return Seat(place.position, place.yaw, place.height, place.height + PELVIS_OVER[piece.kind], place.aside)
+    return Seat(
+        place.position, place.yaw, place.height, place.height + PELVIS_OVER[piece.kind], place.aside
+    )
 
 
 def shapes_of(piece: Piece, factors: Sequence[float] = FACTORS) -> list[Shape]:
@@ -239,10 +313,18 @@ def shapes_of(piece: Piece, factors: Sequence[float] = FACTORS) -> list[Shape]:
         vertices = piece.vertices * (1.0, 1.0, factor)
         grid = build_grid(vertices, piece.triangles, _FLOOR)
         values = np.clip(np.rint((grid.values - DEEPEST) / _STEP), 0, 255).astype(np.uint8)
-        found.append(Shape(
-            name=piece.name, kind=piece.kind, maker=piece.maker, factor=float(factor), origin=grid.origin,
-            spacing=grid.spacing, values=values, seat=_seat(piece, vertices) if sits else None,
-        ))
+        found.append(
+            Shape(
+                name=piece.name,
+                kind=piece.kind,
+                maker=piece.maker,
+                factor=float(factor),
+                origin=grid.origin,
+                spacing=grid.spacing,
+                values=values,
+                seat=_seat(piece, vertices) if sits else None,
+            )
+        )
     return found
 
 

@@ -1,7 +1,9 @@
-"""Contact sheets: motions as rows of stick figures over time, each row ending in its plan seen from above.
+"""Contact sheets: motions as rows of stick figures over time, each row ending in its plan seen from
+above.
 
-Axes are equal and in metres. The body's left is blue, its right orange; an arrow on the floor shows where it faces; furniture
-is drawn as wireframes, contacts as green dots. Needs matplotlib, which is imported when a sheet is drawn.
+Axes are equal and in metres. The body's left is blue, its right orange; an arrow on the floor shows
+where it faces; furniture is drawn as wireframes, contacts as green dots. Needs matplotlib, which is
+imported when a sheet is drawn.
 """
 
 from collections.abc import Sequence
@@ -27,19 +29,39 @@ Cell = tuple[float, float, float, float]  # left, bottom, width, height
 
 _LEFT, _RIGHT, _TRUNK = "#1f6fb4", "#e0701a", "#3a3a3a"
 _FURNITURE, _CONTACT, _FACING, _FAINT = "#8a7a66", "#1e9e3e", "#a01860", "#d4d4d4"
-_WIDTH, _HEIGHT, _BELOW = 1.8, 2.35, 0.32  # a cell, and how much of it lies under the floor line; metres
+# a cell, and how much of it lies under the floor line; metres
+_WIDTH, _HEIGHT, _BELOW = 1.8, 2.35, 0.32
 _INCHES = 0.68  # a metre on paper
-_TURN, _TILT = np.radians(60), np.radians(12)  # the camera: from straight ahead towards the body's right side, and up
-_CONTACT_JOINTS = (joint("left_foot"), joint("right_foot"), joint("left_wrist"), joint("right_wrist"), 0)
-_LEFT_BONES = {joint("left_" + n) for n in ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")}
-_RIGHT_BONES = {joint("right_" + n) for n in ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")}
-_COLOURS = [_LEFT if j in _LEFT_BONES else _RIGHT if j in _RIGHT_BONES else _TRUNK for j in range(22)]
+# the camera: from straight ahead towards the body's right side, and up
+_TURN, _TILT = np.radians(60), np.radians(12)
+_CONTACT_JOINTS = (
+    joint("left_foot"),
+    joint("right_foot"),
+    joint("left_wrist"),
+    joint("right_wrist"),
+    0,
+)
+_LEFT_BONES = {
+    joint("left_" + n)
+    for n in ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
+}
+_RIGHT_BONES = {
+    joint("right_" + n)
+    for n in ("hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist")
+}
+_COLOURS = [
+    _LEFT if j in _LEFT_BONES else _RIGHT if j in _RIGHT_BONES else _TRUNK for j in range(22)
+]
 _CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-_EDGES = np.array([(a, b) for a in range(8) for b in range(a) if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 2])
+_EDGES = np.array(
+    [(a, b) for a in range(8) for b in range(a) if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 2]
+)
 
 
 def _camera(yaw: float) -> np.ndarray:
-    """(3, 3) rows right, up and towards the viewer, of a camera that sees a body that faces ``yaw`` from its right front."""
+    """(3, 3) rows right, up and towards the viewer, of a camera that sees a body that faces ``yaw``
+    from its right front.
+    """
     toward = np.array([np.sin(_TURN) * np.cos(_TILT), np.cos(_TURN) * np.cos(_TILT), np.sin(_TILT)])
     right = normalised(np.cross([0.0, 0.0, 1.0], toward))
     return np.stack([right, np.cross(toward, right), toward]) @ yaw_matrix(np.array(-yaw))
@@ -48,22 +70,38 @@ def _camera(yaw: float) -> np.ndarray:
 def _wireframe(room: Furnishing) -> np.ndarray:
     """(N, 2, 3) edges of the boxes, and dots on the surfaces of the shapes."""
     boxes = room.boxes
-    corners = rotate(yaw_matrix(boxes[:, None, 6]), _CORNERS * boxes[:, None, 3:6]) + boxes[:, None, :3]
+    corners = (
+        rotate(yaw_matrix(boxes[:, None, 6]), _CORNERS * boxes[:, None, 3:6]) + boxes[:, None, :3]
+    )
     dots = room.bank.surface(room.shapes)
-    return np.concatenate([corners[:, _EDGES].reshape(-1, 2, 3), np.stack([dots, dots + np.array([0.0, 0.0, 0.012])], axis=1)])
+    return np.concatenate(
+        [
+            corners[:, _EDGES].reshape(-1, 2, 3),
+            np.stack([dots, dots + np.array([0.0, 0.0, 0.012])], axis=1),
+        ]
+    )
 
 
-def _lines(ax: "Axes", segments: np.ndarray, colours: str | list[str], width: float, cell: Cell) -> None:
+def _lines(
+    ax: "Axes", segments: np.ndarray, colours: str | list[str], width: float, cell: Cell
+) -> None:
     """Draw segments (N, 2, 2), clipped to a cell."""
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Rectangle
 
-    drawn = ax.add_collection(LineCollection(list(segments), colors=colours, linewidths=width, capstyle="round"))
+    drawn = ax.add_collection(
+        LineCollection(list(segments), colors=colours, linewidths=width, capstyle="round")
+    )
     drawn.set_clip_path(Rectangle(cell[:2], *cell[2:], transform=ax.transData))
 
 
 def _figure(
-    ax: "Axes", pose: np.ndarray, yaw: float, room: Furnishing | None, contacts: np.ndarray | None, camera: np.ndarray,
+    ax: "Axes",
+    pose: np.ndarray,
+    yaw: float,
+    room: Furnishing | None,
+    contacts: np.ndarray | None,
+    camera: np.ndarray,
     cell: Cell,
 ) -> None:
     """One pose (22, 3) in its cell, the camera following the pelvis along the floor."""
@@ -83,7 +121,12 @@ def _figure(
 
     forward = rotate(yaw_matrix(np.array(yaw)), np.array([0.0, 1.0, 0.0]))
     start, end = seen(np.stack([ground, ground + 0.38 * forward]))
-    ax.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": _FACING, "lw": 1.0, "shrinkA": 0, "shrinkB": 0})
+    ax.annotate(
+        "",
+        end,
+        start,
+        arrowprops={"arrowstyle": "-|>", "color": _FACING, "lw": 1.0, "shrinkA": 0, "shrinkB": 0},
+    )
 
     bones = np.stack([pose[list(PARENTS[1:])], pose[1:]], axis=1)
     order = np.argsort((bones.mean(1) - ground) @ camera[2])
@@ -96,13 +139,27 @@ def _figure(
     _lines(ax, np.concatenate([np.stack([ring[:-1], ring[1:]], 1), nose[None]]), _TRUNK, 1.4, cell)
     if contacts is not None:
         touching = [j for j, on in zip(_CONTACT_JOINTS, contacts, strict=True) if on]
-        ax.plot(*seen(pose[touching]).T, "o", color=_CONTACT, markersize=4.5, markeredgecolor="white", zorder=4)
+        ax.plot(
+            *seen(pose[touching]).T,
+            "o",
+            color=_CONTACT,
+            markersize=4.5,
+            markeredgecolor="white",
+            zorder=4,
+        )
 
 
 def _plan(
-    ax: "Axes", joints: np.ndarray, yaw: np.ndarray, room: Furnishing | None, frames: np.ndarray, cell: Cell,
+    ax: "Axes",
+    joints: np.ndarray,
+    yaw: np.ndarray,
+    room: Furnishing | None,
+    frames: np.ndarray,
+    cell: Cell,
 ) -> None:
-    """The pelvis' path from above, with hips, shoulders and facing at the frames shown, and a bar of one metre."""
+    """The pelvis' path from above, with hips, shoulders and facing at the frames shown, and a bar
+    of one metre.
+    """
     path = joints[:, 0, :2]
     middle = (path.min(0) + path.max(0)) / 2
     reach = max(float(np.ptp(path, axis=0).max()) / 2 + 0.55, 0.8)
@@ -124,7 +181,18 @@ def _plan(
         _lines(ax, seen(np.concatenate([spans[:, 1:], feet[1:]])), _RIGHT, 1.2, cell)
         forward = rotate(yaw_matrix(yaw[frame]), np.array([0.0, 1.0, 0.0]))
         start, end = seen(np.stack([pose[0], pose[0] + 0.4 * forward]))
-        ax.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": _FACING, "lw": 0.7, "shrinkA": 0, "shrinkB": 0})
+        ax.annotate(
+            "",
+            end,
+            start,
+            arrowprops={
+                "arrowstyle": "-|>",
+                "color": _FACING,
+                "lw": 0.7,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            },
+        )
     ax.plot(*seen(path[0]), "o", color=_TRUNK, markersize=3)
     bar = np.array([corner[0] - scale / 2, cell[1] + 0.2])
     ax.plot([bar[0], bar[0] + scale], [bar[1], bar[1]], color="black", lw=1.2)
@@ -132,13 +200,16 @@ def _plan(
 
 
 def sheet(
-    file: Path, rows: Sequence[Row], columns: int = 8, contacts: Sequence[np.ndarray | None] | None = None
+    file: Path,
+    rows: Sequence[Row],
+    columns: int = 8,
+    contacts: Sequence[np.ndarray | None] | None = None,
 ) -> None:
     """Draw a contact sheet into ``file`` (.png or .svg).
 
-    A row is a title, joints (T, 22, 3) at 30 fps in world metres, and furniture or None; it is shown at ``columns`` times
-    spread over its length. ``contacts`` holds (T, 5) booleans for each row (left foot, right foot, left hand, right hand,
-    pelvis), or None.
+    A row is a title, joints (T, 22, 3) at 30 fps in world metres, and furniture or None; it is
+    shown at ``columns`` times spread over its length. ``contacts`` holds (T, 5) booleans for each
+    row (left foot, right foot, left hand, right hand, pelvis), or None.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -158,10 +229,27 @@ def sheet(
         touching = None if contacts is None else contacts[r]
         for c, frame in enumerate(frames):
             cell = (c * _WIDTH, bottom, _WIDTH, _HEIGHT)
-            _figure(ax, joints[frame], float(yaw[frame]), room, None if touching is None else touching[frame], camera, cell)
-            ax.text((c + 0.5) * _WIDTH, bottom + 0.04, f"{frame / 30:.1f} s", ha="center", va="bottom", fontsize=6)
+            _figure(
+                ax,
+                joints[frame],
+                float(yaw[frame]),
+                room,
+                None if touching is None else touching[frame],
+                camera,
+                cell,
+            )
+            ax.text(
+                (c + 0.5) * _WIDTH,
+                bottom + 0.04,
+                f"{frame / 30:.1f} s",
+                ha="center",
+                va="bottom",
+                fontsize=6,
+            )
         _plan(ax, joints, yaw, room, frames, (columns * _WIDTH, bottom, _HEIGHT, _HEIGHT - 0.15))
-        ax.text(0.05, bottom + _HEIGHT - 0.03, title, ha="left", va="top", fontsize=8, weight="bold")
+        ax.text(
+            0.05, bottom + _HEIGHT - 0.03, title, ha="left", va="top", fontsize=8, weight="bold"
+        )
         ax.plot([0, across], [bottom, bottom], color=_FAINT, lw=0.8)
     with whole_file(file) as part:
         figure.savefig(part, format=file.suffix[1:])

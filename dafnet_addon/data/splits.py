@@ -1,7 +1,8 @@
-"""Who trains, who chooses weights, and who tells how good they are: whole bodies, and whole makers of furniture.
+"""Who trains, who chooses weights, and who tells how good they are: whole bodies, and whole makers
+of furniture.
 
-What is told must not have been chosen by, and what chooses must not have been trained on. A clip's own file says "train" or
-"test"; here stands what overrules it.
+What is told must not have been chosen by, and what chooses must not have been trained on. A clip's
+own file says "train" or "test"; here stands what overrules it.
 """
 
 from .mocap import Clip
@@ -11,7 +12,9 @@ __all__ = ["TRAINED_ON_PARTLY", "role_of_body", "role_of_clip", "role_of_maker"]
 _CHOOSING_BODIES = {("mhad", "MHAD_s09"), ("mhad", "MHAD_s10")}
 _NAMELESS = {"cmu_expmap"}  # whose people may be those of the test
 TRAINED_ON_PARTLY = {"cmu69", "snu_tiling/wd2(dir 1)", "snu_ys2010", "gazebo_actors"}
-"""Bodies with clips on both sides of the split: their test clips help to choose (who walks among those that do not train?)."""
+"""Bodies with clips on both sides of the split: their test clips help to choose (who walks among
+those that do not train?).
+"""
 
 _CHOOSING_MAKERS = {"Voodoc", "Jay-Artist", "MatBot", "TripleJ", "Aymanslman", "Derte21"}
 _TELLING_MAKERS = {"Kator Legaz"}
@@ -33,7 +36,9 @@ def role_of_body(source: str, subject: str) -> str:
 
 
 def role_of_maker(maker: str) -> str:
-    """ "train", "choose" or "tell": pieces of one maker resemble each other, so makers are held out whole."""
+    """ "train", "choose" or "tell": pieces of one maker resemble each other, so makers are held out
+    whole.
+    """
     if maker in _TELLING_MAKERS:
         return "tell"
     return "choose" if maker in _CHOOSING_MAKERS else "train"

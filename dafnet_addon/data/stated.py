@@ -1,8 +1,11 @@
-"""What a ``clips.json`` or ``clips.csv`` (columns ``file`` and the same words) in a folder of motion files says of them:
+"""What a ``clips.json`` or ``clips.csv`` (columns ``file`` and the same words) in a folder of
+motion files says of them:
 
-    {"*": {"licence": "CC0"}, "s2/*.bvh": {"subject": "s2", "split": "test", "category": "sit-stand"}}
+    {"*": {"licence": "CC0"}, "s2/*.bvh": {"subject": "s2", "split": "test", "category":
+    "sit-stand"}}
 
-Names are file names relative to the folder, in which ``*`` stands for any characters and ``?`` for one; later lines win.
+Names are file names relative to the folder, in which ``*`` stands for any characters and ``?`` for
+one; later lines win.
 """
 
 import csv
@@ -19,7 +22,8 @@ from ..core.errors import InputError
 __all__ = ["Stated"]
 
 _FIELDS = {"source", "subject", "description", "category", "split", "licence", "fps", "up"}
-_FORMS = {"split": "|train|test", "up": "|y|z", "fps": r"|[1-9]\d*(\.\d+)?"}  # nothing, or what else it may be
+# nothing, or what else it may be
+_FORMS = {"split": "|train|test", "up": "|y|z", "fps": r"|[1-9]\d*(\.\d+)?"}
 
 
 def _form(name: str) -> str:
@@ -28,7 +32,9 @@ def _form(name: str) -> str:
 
 
 def _name(path: PurePath) -> str:
-    """A file's name in that form; names on disks are UTF-8, whatever the locale that Python reads them in."""
+    """A file's name in that form; names on disks are UTF-8, whatever the locale that Python reads
+    them in.
+    """
     try:
         return _form(os.fsencode(path.as_posix()).decode("utf-8"))
     except UnicodeError:
@@ -38,7 +44,9 @@ def _name(path: PurePath) -> str:
 def _pattern(name: str) -> re.Pattern[str]:
     """Brackets, which downloads are often numbered with, stand for themselves."""
     wild = {"*": ".*", "?": "."}
-    return re.compile("".join(wild.get(c) or re.escape(c) for c in re.sub(r"\*+", "*", _form(name))), re.DOTALL)
+    return re.compile(
+        "".join(wild.get(c) or re.escape(c) for c in re.sub(r"\*+", "*", _form(name))), re.DOTALL
+    )
 
 
 def _csv_rows(text: str) -> list[tuple[str, dict[str, Any]]]:
@@ -69,21 +77,28 @@ class Stated:
         try:
             text = self.file.read_text(encoding="utf-8-sig") if self.file.exists() else ""
             if self.file == as_json:
-                rows = [(name, {k: str(v) for k, v in fields.items()}) for name, fields in json.loads(text).items()]
+                rows = [
+                    (name, {k: str(v) for k, v in fields.items()})
+                    for name, fields in json.loads(text).items()
+                ]
             elif text:
                 rows = _csv_rows(text)
         except (AttributeError, OSError, RecursionError, ValueError, csv.Error) as error:
             raise InputError(
-                f"The file '{self.file}' does not list clips by file name ({error}); write it in UTF-8 like "
-                """{"*.bvh": {"licence": "CC0", "subject": "s1"}}, or as CSV with a column 'file'."""
+                f"The file '{self.file}' does not list clips by file name ({error}); write it in "
+                "UTF-8 like "
+                """{"*.bvh": {"licence": "CC0", "subject": "s1"}}, or as CSV with a column 'file'.
+                """
             ) from None
         for pattern, fields in rows:
             wrong = sorted(set(fields) - _FIELDS)
             wrong += [k for k, form in _FORMS.items() if not re.fullmatch(form, fields.get(k, ""))]
             if wrong:
                 raise InputError(
-                    f"The file '{self.file}' states for '{pattern}' what cannot be used ({', '.join(wrong)}); give any of "
-                    f"{', '.join(sorted(_FIELDS))}, with split 'train' or 'test', up 'y' or 'z' and fps a number."
+                    f"The file '{self.file}' states for '{pattern}' what cannot be used "
+                    f"({', '.join(wrong)}); give any of "
+                    f"{', '.join(sorted(_FIELDS))}, with split 'train' or 'test', up 'y' or 'z' "
+                    "and fps a number."
                 )
         self.rows = [(name, _pattern(name), fields) for name, fields in rows]
 
@@ -100,6 +115,8 @@ class Stated:
         """A sentence for each line that is of none of the files."""
         names = [_name(path) for path in paths]
         return [
-            f"The file '{self.file}' states '{name}', which no motion file is called; only * and ? stand for other characters."
-            for name, pattern, _ in self.rows if not any(map(pattern.fullmatch, names))
+            f"The file '{self.file}' states '{name}', which no motion file is called; only * and "
+            "? stand for other characters."
+            for name, pattern, _ in self.rows
+            if not any(map(pattern.fullmatch, names))
         ]

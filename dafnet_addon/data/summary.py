@@ -1,4 +1,6 @@
-"""What a folder of motion capture holds: minutes, clips and cut frames by source, subject and activity."""
+"""What a folder of motion capture holds: minutes, clips and cut frames by source, subject and
+activity.
+"""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
@@ -16,10 +18,12 @@ _MINUTE = 30 * 60
 
 
 def summary(clips: Iterable[Clip], left_out: Sequence[str] = ()) -> str:
-    """A text table of clips, one line for each source, subject, activity, split and licence, and a line of sums.
+    """A text table of clips, one line for each source, subject, activity, split and licence, and a
+    line of sums.
 
-    Frames that are cut are counted by reason (see ``cuts``), once each under the first that holds. A line tells how many clips
-    are refused for training because nobody stated their licence; sentences about what was ``left_out`` follow.
+    Frames that are cut are counted by reason (see ``cuts``), once each under the first that holds.
+    A line tells how many clips are refused for training because nobody stated their licence;
+    sentences about what was ``left_out`` follow.
     """
     frames: Counter[_Key] = Counter()
     count: Counter[_Key] = Counter()
@@ -36,14 +40,19 @@ def summary(clips: Iterable[Clip], left_out: Sequence[str] = ()) -> str:
     def reasons(of: Counter[str]) -> str:
         return ", ".join(f"{of[reason]} {reason}" for reason in REASONS if of[reason]) or "-"
 
-    rows: list[tuple[str, ...]] = [("source", "subject", "activity", "split", "minutes", "clips", "frames cut", "licence")]
+    rows: list[tuple[str, ...]] = [
+        ("source", "subject", "activity", "split", "minutes", "clips", "frames cut", "licence")
+    ]
     for key in sorted(frames):
         minutes = f"{frames[key] / _MINUTE:.1f}"
         rows.append((*key[:4], minutes, str(count[key]), reasons(cut[key]), key[4]))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     right = {4, 5}
     lines = [
-        "  ".join(cell.rjust(w) if i in right else cell.ljust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True)))
+        "  ".join(
+            cell.rjust(w) if i in right else cell.ljust(w)
+            for i, (cell, w) in enumerate(zip(row, widths, strict=True))
+        )
         for row in rows
     ]
     bodies = {key[:2] for key in frames}
@@ -54,5 +63,7 @@ def summary(clips: Iterable[Clip], left_out: Sequence[str] = ()) -> str:
     )
     unstated = sum(clips_of for key, clips_of in count.items() if key[4] == UNSTATED)
     if unstated:
-        lines.append(f"{unstated} clips are not trained on: state their licence in clips.json or clips.csv")
+        lines.append(
+            f"{unstated} clips are not trained on: state their licence in clips.json or clips.csv"
+        )
     return "\n".join(line.rstrip() for line in (*lines, *left_out))

@@ -1,4 +1,5 @@
-"""What a body does to furniture that motion capture did not record: lies, works on a top, strokes a board, reaches.
+"""What a body does to furniture that motion capture did not record: lies, works on a top, strokes a
+board, reaches.
 
 Sitting is found by ``furniture.resting``. All joints are (T, 22, 3), world, metres, z up, 30 fps.
 """
@@ -17,7 +18,10 @@ _PELVIS, _CHEST, _NECK = joint("pelvis"), joint("spine3"), joint("neck")
 _SHOULDERS = [joint("left_shoulder"), joint("right_shoulder")]
 _ELBOWS = [joint("left_elbow"), joint("right_elbow")]
 _WRISTS = [joint("left_wrist"), joint("right_wrist")]
-_KNEES, _ANKLES = [joint("left_knee"), joint("right_knee")], [joint("left_ankle"), joint("right_ankle")]
+_KNEES, _ANKLES = (
+    [joint("left_knee"), joint("right_knee")],
+    [joint("left_ankle"), joint("right_ankle")],
+)
 _SECOND = 30
 _SHORT = 8
 _OFF_THE_FLOOR = 0.25
@@ -26,10 +30,12 @@ _ONE_TOP = 0.08  # hands at heights that differ by less may share a table
 
 @dataclass(frozen=True)
 class Use:
-    """In frames ``start`` to ``end`` (exclusive) the body uses a ``kind`` of furniture: bed, desk, board or shelf.
+    """In frames ``start`` to ``end`` (exclusive) the body uses a ``kind`` of furniture: bed, desk,
+    board or shelf.
 
-    ``points`` (N, 3): the line of pelvis and chest that lies, or the wrists that work. ``yaw``: where the piece's +y lies, seen
-    from the body: towards the head in a bed, away from the body elsewhere.
+    ``points`` (N, 3): the line of pelvis and chest that lies, or the wrists that work. ``yaw``:
+    where the piece's +y lies, seen from the body: towards the head in a bed, away from the body
+    elsewhere.
     """
 
     kind: str
@@ -40,9 +46,13 @@ class Use:
 
 
 def runs(flags: np.ndarray, shortest: int = 1) -> list[tuple[int, int]]:
-    """Start and end (exclusive) of every run of true frames that lasts ``shortest`` frames or more."""
+    """Start and end (exclusive) of every run of true frames that lasts ``shortest`` frames or
+    more.
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= shortest]
+    return [
+        (int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= shortest
+    ]
 
 
 def _speed(points: np.ndarray) -> np.ndarray:
@@ -76,11 +86,12 @@ def _away(rows: np.ndarray) -> float:
 
 
 def lying(joints: np.ndarray) -> list[Use]:
-    """Where the body lies off the floor, or is about to: the trunk within 30 degrees of level, the pelvis still, for 0.25 s.
+    """Where the body lies off the floor, or is about to: the trunk within 30 degrees of level, the
+    pelvis still, for 0.25 s.
 
-    Lying on the floor itself needs no bed; a body that bends down stands on feet far under its pelvis, and one that bows on a
-    seat has its chest over its knees. Places within half a metre and a hand's breadth in height are one bed: ``points`` are its
-    medians of pelvis and chest.
+    Lying on the floor itself needs no bed; a body that bends down stands on feet far under its
+    pelvis, and one that bows on a seat has its chest over its knees. Places within half a metre and
+    a hand's breadth in height are one bed: ``points`` are its medians of pelvis and chest.
     """
     trunk = joints[:, _NECK] - joints[:, _PELVIS]
     level = np.abs(trunk[:, 2]) < 0.5 * np.linalg.norm(trunk, axis=-1)
@@ -95,7 +106,9 @@ def lying(joints: np.ndarray) -> list[Use]:
         line = np.median(joints[lowest][:, [_PELVIS, _CHEST]], axis=0)
         line[1, 2] = min(line[1, 2], line[0, 2] + 0.05)  # a chest that is still on its way down
         known = any(
-            np.linalg.norm((u.points - line).mean(0)[:2]) < 0.5 and abs((u.points - line)[:, 2].mean()) < 0.1 for u in found
+            np.linalg.norm((u.points - line).mean(0)[:2]) < 0.5
+            and abs((u.points - line)[:, 2].mean()) < 0.1
+            for u in found
         )
         if not known:
             found.append(Use("bed", a, b, line, _away(normalised(trunk[a:b, :2]))))
@@ -103,7 +116,9 @@ def lying(joints: np.ndarray) -> list[Use]:
 
 
 def working(joints: np.ndarray, path: RootPath) -> list[Use]:
-    """Hands that rest or work in a horizontal plane before a body that stays, for a second or more: on a desk or table."""
+    """Hands that rest or work in a horizontal plane before a body that stays, for a second or more:
+    on a desk or table.
+    """
     frames = len(joints)
     if frames < _SECOND:
         return []
@@ -123,7 +138,8 @@ def working(joints: np.ndarray, path: RootPath) -> list[Use]:
             for top in tops:
                 _, _, other = top[0]
                 if abs(other[:, 2].min() - part[2][:, 2].min()) < _ONE_TOP and (
-                    np.linalg.norm((np.median(other, axis=0) - np.median(part[2], axis=0))[:2]) < 0.9
+                    np.linalg.norm((np.median(other, axis=0) - np.median(part[2], axis=0))[:2])
+                    < 0.9
                 ):
                     top.append(part)
                     break
@@ -134,13 +150,25 @@ def working(joints: np.ndarray, path: RootPath) -> list[Use]:
         wrists = np.concatenate([w for _, _, w in top])
         away = np.concatenate([w[:, :2] - joints[a:b, _PELVIS, :2] for a, b, w in top])
         # A table stands square to the body, not to the hand that reaches across it.
-        heading = np.concatenate([np.c_[-np.sin(path.yaw[a:b]), np.cos(path.yaw[a:b])] for a, b, _ in top])
-        found.append(Use("desk", min(a for a, _, _ in top), max(b for _, b, _ in top), wrists, _away(heading + 0.1 * away)))
+        heading = np.concatenate(
+            [np.c_[-np.sin(path.yaw[a:b]), np.cos(path.yaw[a:b])] for a, b, _ in top]
+        )
+        found.append(
+            Use(
+                "desk",
+                min(a for a, _, _ in top),
+                max(b for _, b, _ in top),
+                wrists,
+                _away(heading + 0.1 * away),
+            )
+        )
     return found
 
 
 def stroking(joints: np.ndarray, path: RootPath) -> list[Use]:
-    """A hand that moves over a vertical plane before the body, between waist and reach, for a second or more: on a board."""
+    """A hand that moves over a vertical plane before the body, between waist and reach, for a
+    second or more: on a board.
+    """
     frames = len(joints)
     if frames < _SECOND:
         return []
@@ -149,7 +177,12 @@ def stroking(joints: np.ndarray, path: RootPath) -> list[Use]:
     moves = _speed(joints[:, _WRISTS]) > 0.05
     found = []
     for hand, wrist in enumerate(_WRISTS):
-        high = (joints[:, wrist, 2] > 0.95) & (joints[:, wrist, 2] < 1.9) & (local[:, hand, 1] > 0.18) & stays
+        high = (
+            (joints[:, wrist, 2] > 0.95)
+            & (joints[:, wrist, 2] < 1.9)
+            & (local[:, hand, 1] > 0.18)
+            & stays
+        )
         seconds = _over_a_second(high).all(-1) & (_over_a_second(moves[:, hand]).mean(-1) > 0.5)
         for a, b in runs(_within(seconds, frames), _SECOND):
             points = joints[a:b, wrist]
@@ -158,13 +191,20 @@ def stroking(joints: np.ndarray, path: RootPath) -> list[Use]:
             if normal @ forward < 0:
                 normal = -normal
             reach = float(((points - joints[a:b, _SHOULDERS[hand]])[:, :2] @ normal).mean())
-            if thickness < 0.06 and extent > max(0.15, 3 * thickness) and normal @ forward > 0.7 and reach > 0.22:
+            if (
+                thickness < 0.06
+                and extent > max(0.15, 3 * thickness)
+                and normal @ forward > 0.7
+                and reach > 0.22
+            ):
                 found.append(Use("board", a, b, points, _away(normal[None])))
     return found
 
 
 def _vertical_plane(points: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """The upright plane nearest to points (N, 3): unit normal (2,), standard deviation along it, and extent within it."""
+    """The upright plane nearest to points (N, 3): unit normal (2,), standard deviation along it,
+    and extent within it.
+    """
     offset = points[:, :2] - points[:, :2].mean(0)
     values, vectors = np.linalg.eigh(offset.T @ offset / len(points))
     extent = max(float(np.ptp(offset @ vectors[:, 1])), float(np.ptp(points[:, 2])))
@@ -172,7 +212,9 @@ def _vertical_plane(points: np.ndarray) -> tuple[np.ndarray, float, float]:
 
 
 def reaching(joints: np.ndarray, path: RootPath) -> list[Use]:
-    """Hands that come, stop on a stretched arm for a quarter of a second or more, and were or will be moved: at a shelf."""
+    """Hands that come, stop on a stretched arm for a quarter of a second or more, and were or will
+    be moved: at a shelf.
+    """
     if len(joints) < _SHORT:
         return []
     wrists, shoulders = joints[:, _WRISTS], joints[:, _SHOULDERS]
@@ -181,7 +223,15 @@ def reaching(joints: np.ndarray, path: RootPath) -> list[Use]:
     out = np.linalg.norm(arm[..., :2], axis=-1) > 0.25
     height, speed = wrists[..., 2], _speed(wrists)
     stays = (_speed(path.position[:, :2]) < 0.5)[:, None]
-    stopped = stretched & out & (to_root(path, wrists)[..., 1] > 0.2) & (height > 0.35) & (height < 1.7) & (speed < 0.3) & stays
+    stopped = (
+        stretched
+        & out
+        & (to_root(path, wrists)[..., 1] > 0.2)
+        & (height > 0.35)
+        & (height < 1.7)
+        & (speed < 0.3)
+        & stays
+    )
     found = []
     for hand in (0, 1):
         for a, b in runs(stopped[:, hand], _SHORT):
@@ -190,5 +240,7 @@ def reaching(joints: np.ndarray, path: RootPath) -> list[Use]:
                 continue
             points = wrists[a:b, hand]
             heading = np.c_[-np.sin(path.yaw[a:b]), np.cos(path.yaw[a:b])]
-            found.append(Use("shelf", a, b, points, _away(heading + 0.5 * normalised(arm[a:b, hand, :2]))))
+            found.append(
+                Use("shelf", a, b, points, _away(heading + 0.5 * normalised(arm[a:b, hand, :2])))
+            )
     return found

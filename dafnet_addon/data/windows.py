@@ -1,7 +1,8 @@
-"""Draws training windows: a captured piece of motion, augmented, with furniture fitted to it and the sensor read.
+"""Draws training windows: a captured piece of motion, augmented, with furniture fitted to it and
+the sensor read.
 
-Paper, section 5.2. Each draw picks a clip, may move a seat's height, mirror, reverse or re-time it, may roughen or smooth its
-root path as an animator would, and furnishes the room anew.
+Paper, section 5.2. Each draw picks a clip, may move a seat's height, mirror, reverse or re-time it,
+may roughen or smooth its root path as an animator would, and furnishes the room anew.
 """
 
 from dataclasses import dataclass
@@ -34,7 +35,9 @@ _LOWERED = 0.3  # metres; from a high stool further down, every wave of the pelv
 
 @dataclass(frozen=True)
 class Motion:
-    """A clip on the canonical body: ``joints`` (T, 22, 3), frames that may be used, and its seated episodes."""
+    """A clip on the canonical body: ``joints`` (T, 22, 3), frames that may be used, and its seated
+    episodes.
+    """
 
     name: str
     source: str
@@ -47,9 +50,9 @@ class Motion:
 
 @dataclass(frozen=True)
 class Window:
-    """``poses`` (80, 66) in each frame's root, ``velocity`` (80, 3); of the last 70 frames: ``ahead`` (70, 18) and ``root``
-    (70, 3), its place x, y and yaw in the world of ``boxes`` (``boxes.MOST``, 7) and ``shapes`` (``shapes.SHAPES``, 5).
-    Metres, radians.
+    """``poses`` (80, 66) in each frame's root, ``velocity`` (80, 3); of the last 70 frames:
+    ``ahead`` (70, 18) and ``root`` (70, 3), its place x, y and yaw in the world of ``boxes``
+    (``boxes.MOST``, 7) and ``shapes`` (``shapes.SHAPES``, 5). Metres, radians.
     """
 
     poses: np.ndarray
@@ -61,14 +64,20 @@ class Window:
 
 
 def _usable(joints: np.ndarray) -> np.ndarray:
-    """False in frames of a T-pose, a flip or an impossible speed, and where an upright body has left the floor."""
-    airborne = np.minimum(joints[:, joint("left_foot"), 2], joints[:, joint("right_foot"), 2]) > 0.22
+    """False in frames of a T-pose, a flip or an impossible speed, and where an upright body has
+    left the floor.
+    """
+    airborne = (
+        np.minimum(joints[:, joint("left_foot"), 2], joints[:, joint("right_foot"), 2]) > 0.22
+    )
     airborne &= joints[:, joint("neck"), 2] - joints[:, 0, 2] > 0.35
     return ~np.any([airborne, *bad_frames(joints).values()], axis=0)
 
 
 def _held(joints: np.ndarray, valid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The clip with its first and last pose held for a while, where it is at rest there: stillness is otherwise rare."""
+    """The clip with its first and last pose held for a while, where it is at rest there: stillness
+    is otherwise rare.
+    """
     if len(joints) < 3:
         return joints, valid
     speed = np.linalg.norm(np.diff(joints, axis=0), axis=-1).max(1) * 30
@@ -98,11 +107,15 @@ def _retimed(joints: np.ndarray, speed: float) -> np.ndarray:
 
 
 def _animated_by_hand(rng: np.random.Generator, path: RootPath) -> RootPath:
-    """The root as an animator's curves give it: without the gait's sway, or smoothly a little wrong."""
+    """The root as an animator's curves give it: without the gait's sway, or smoothly a little
+    wrong.
+    """
     if rng.random() < 0.5:
         path = smoothed(path, rng.uniform(4, 12), rng.uniform(4, 12))
     if rng.random() < 0.5:
-        wobble = smoothed(RootPath(rng.normal(size=path.position.shape), rng.normal(size=len(path))), 12.0, 12.0)
+        wobble = smoothed(
+            RootPath(rng.normal(size=path.position.shape), rng.normal(size=len(path))), 12.0, 12.0
+        )
         position = path.position + wobble.position * (1, 1, 0) * rng.uniform(0, 0.09)
         path = RootPath(position, path.yaw + wobble.yaw * rng.uniform(0, 0.25))
     return path
@@ -118,7 +131,9 @@ def _farthest(valid: np.ndarray, frame: int, step: int) -> int:
 
 
 def _seat_height(rng: np.random.Generator, height: float) -> float:
-    """Where a pelvis that was captured at rest at this height (metres) shall rest: mostly where furniture carries one."""
+    """Where a pelvis that was captured at rest at this height (metres) shall rest: mostly where
+    furniture carries one.
+    """
     if rng.random() < 0.2:
         wanted = height + rng.normal(0, 0.02)
     else:
@@ -128,7 +143,9 @@ def _seat_height(rng: np.random.Generator, height: float) -> float:
 
 def _near_shapes(placed: np.ndarray, path: RootPath) -> np.ndarray:
     """The placed shapes nearest to a path, filled up or cut to (SHAPES, 5)."""
-    gap = np.linalg.norm(path.position[None, :, :2] - placed[:, None, 1:3], axis=-1).min(1, initial=np.inf)
+    gap = np.linalg.norm(path.position[None, :, :2] - placed[:, None, 1:3], axis=-1).min(
+        1, initial=np.inf
+    )
     kept = placed[np.argsort(gap)[:SHAPES]]
     return np.concatenate([kept, np.tile(ABSENT_SHAPE, (SHAPES - len(kept), 1))])
 
@@ -136,7 +153,8 @@ def _near_shapes(placed: np.ndarray, path: RootPath) -> np.ndarray:
 def draw(
     rng: np.random.Generator, motion: Motion, focus: int | None = None, bank: ShapeBank = NO_BANK
 ) -> Window | None:
-    """One augmented, furnished window, around frame ``focus`` where given; None where this draw cannot be used.
+    """One augmented, furnished window, around frame ``focus`` where given; None where this draw
+    cannot be used.
 
     Real pieces of ``bank`` stand among the furniture, where one is given.
     """
@@ -178,8 +196,10 @@ def draw(
     recent = RootPath(path.position[cut][HISTORY:], path.yaw[cut][HISTORY:])
     root = np.concatenate([recent.position[:, :2], recent.yaw[:, None]], axis=1)
     return Window(
-        poses, velocities(path)[cut], ahead(path)[cut][HISTORY:], root, near(room.boxes, recent),
+        poses,
+        velocities(path)[cut],
+        ahead(path)[cut][HISTORY:],
+        root,
+        near(room.boxes, recent),
         _near_shapes(room.shapes, recent),
     )
-
-

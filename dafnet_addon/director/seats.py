@@ -13,13 +13,19 @@ from .surfaces import HeightField, height_field, surface_points
 __all__ = ["SeatPlace", "on_a_seat", "seat_of"]
 
 _CELL = 0.03
-_LOWEST, _HIGHEST, _OVERHEAD = 0.22, 0.85, 1.5  # metres over the floor: of seats; what is higher is no part of one
+# metres over the floor: of seats; what is higher is no part of one
+_LOWEST, _HIGHEST, _OVERHEAD = 0.22, 0.85, 1.5
 _FLAT, _BACK = 0.05, 0.15  # metres over the seat: of what still is seat; of a back or an arm
 _LEAST = 0.035  # square metres
-_ROOM = 0.21  # metres: side of the square that a seat has room for; arms and the rims of backs have not
-_NEARLY = 0.5  # of the roomiest level's area, that a lower level needs to be the seat: cushions and backs lie higher
-_ONE_SIDED = 0.10  # metres between the middles of seat and of what stands up around it, where that is a back
-_BEFORE_BACK, _FROM_EDGE = 0.20, 0.22  # metres between the pelvis and the back; and the front edge, where there is no back
+# metres: side of the square that a seat has room for; arms and the rims of backs have not
+_ROOM = 0.21
+# of the roomiest level's area, that a lower level needs to be the seat: cushions and backs lie
+# higher
+_NEARLY = 0.5
+# metres between the middles of seat and of what stands up around it, where that is a back
+_ONE_SIDED = 0.10
+# metres between the pelvis and the back; and the front edge, where there is no back
+_BEFORE_BACK, _FROM_EDGE = 0.20, 0.22
 _SNAP = np.radians(30.0)
 _UNDER = 0.08  # metres around a root, in which its seat is looked for
 _SMALLEST, _LARGEST = 0.15, 15.0  # metres across, of furniture
@@ -28,8 +34,9 @@ _HALF_WIDTH = 0.28  # metres that a body needs to each side
 
 @dataclass(frozen=True)
 class SeatPlace:
-    """``position`` (2,) of the resting pelvis and ``yaw`` that it faces (``core.root``); ``height`` of the seat's top over the
-    world's zero, metres; whether there is a ``back``; ``aside``: metres to each side within which one may sit as well.
+    """``position`` (2,) of the resting pelvis and ``yaw`` that it faces (``core.root``); ``height``
+    of the seat's top over the world's zero, metres; whether there is a ``back``; ``aside``: metres
+    to each side within which one may sit as well.
     """
 
     position: np.ndarray
@@ -47,7 +54,9 @@ def _hull(points: np.ndarray) -> np.ndarray:
         out: list[list[float]] = []
         for p in chain:
             while len(out) > 1 and (
-                (out[-1][0] - out[-2][0]) * (p[1] - out[-2][1]) - (out[-1][1] - out[-2][1]) * (p[0] - out[-2][0]) <= 0
+                (out[-1][0] - out[-2][0]) * (p[1] - out[-2][1])
+                - (out[-1][1] - out[-2][1]) * (p[0] - out[-2][0])
+                <= 0
             ):
                 out.pop()
             out.append(p)
@@ -57,7 +66,9 @@ def _hull(points: np.ndarray) -> np.ndarray:
 
 
 def _axes(cells: np.ndarray) -> np.ndarray:
-    """The two directions (2, 2) of the smallest rectangle around points (N, 2), the longer side first."""
+    """The two directions (2, 2) of the smallest rectangle around points (N, 2), the longer side
+    first.
+    """
     hull = _hull(cells)
     best, found = np.inf, np.eye(2)
     edges = np.roll(hull, -1, axis=0) - hull
@@ -79,15 +90,19 @@ def _shrunk(mask: np.ndarray, reach: int) -> np.ndarray:
 
 
 def _roomy(mask: np.ndarray, reach: int) -> np.ndarray:
-    """The cells (X, Y) of squares that fit into the mask; slits of one or two cells in it, as between slats, are no gap."""
+    """The cells (X, Y) of squares that fit into the mask; slits of one or two cells in it, as
+    between slats, are no gap.
+    """
     closed = ~_shrunk(~np.pad(mask, 1), 1)[1:-1, 1:-1] if mask.any() else mask
     return ~_shrunk(~_shrunk(closed, reach), reach) & mask
 
 
 def _seat_level(field: HeightField, floor: float) -> tuple[float, np.ndarray] | None:
-    """Height and cells (N, 2) of the level that one sits on: the lowest one that has about as much room as any.
+    """Height and cells (N, 2) of the level that one sits on: the lowest one that has about as much
+    room as any.
 
-    Backs, arms and cushions are higher than the seat between them, and rims have no room for a body.
+    Backs, arms and cushions are higher than the seat between them, and rims have no room for a
+    body.
     """
     over = field.top - floor
     reach = max(1, round(0.5 * _ROOM / field.cell))
@@ -107,22 +122,30 @@ def _seat_level(field: HeightField, floor: float) -> tuple[float, np.ndarray] | 
 
 
 def on_a_seat(solids: Sequence[Box | Mesh], position: np.ndarray, floor: float = 0.0) -> bool:
-    """Whether a root that rests at ``position`` (2,) has a seat under it: something between 22 and 85 cm over ``floor``."""
+    """Whether a root that rests at ``position`` (2,) has a seat under it: something between 22 and
+    85 cm over ``floor``.
+    """
     points = surface_points(solids, _CELL, (position - _UNDER, position + _UNDER))
     height = points[np.linalg.norm(points[:, :2] - position, axis=-1) < _UNDER, 2] - floor
     return bool(((height > _LOWEST) & (height < _HIGHEST)).any())
 
 
 def seat_of(
-    solids: Sequence[Box | Mesh], towards: np.ndarray, floor: float = 0.0, name: str = "furniture",
-    near: np.ndarray | None = None, size: float = 1.0,
+    solids: Sequence[Box | Mesh],
+    towards: np.ndarray,
+    floor: float = 0.0,
+    name: str = "furniture",
+    near: np.ndarray | None = None,
+    size: float = 1.0,
 ) -> SeatPlace:
-    """Where one sits on one piece of furniture, made of ``solids``; world, metres, people of 1.75 m.
+    """Where one sits on one piece of furniture, made of ``solids``; world, metres, people of 1.75
+    m.
 
-    With a back on one side one sits before it and looks away from it; without, one looks along the seat's shorter side, to
-    where ``towards`` (2,) lies. On a wide seat one sits in the middle, or beside ``near`` (2,) where given. Raises InputError
-    where there is nothing to sit on: a level surface between 22 and 85 cm over ``floor``. ``size``: of the character, over
-    1.75 m, for what is said of the scene.
+    With a back on one side one sits before it and looks away from it; without, one looks along the
+    seat's shorter side, to where ``towards`` (2,) lies. On a wide seat one sits in the middle, or
+    beside ``near`` (2,) where given. Raises InputError where there is nothing to sit on: a level
+    surface between 22 and 85 cm over ``floor``. ``size``: of the character, over 1.75 m, for what
+    is said of the scene.
     """
     points = surface_points(solids, 0.6 * _CELL)
     points = points[(points[:, 2] < floor + _OVERHEAD) & (points[:, 2] > floor + 0.02)]
@@ -132,8 +155,14 @@ def seat_of(
         found = _seat_level(field, floor)
     if found is None:
         if not _SMALLEST < (across := extent(solids)) < _LARGEST:
-            raise InputError(f"'{name}' is {across * size:.2g} m across: is its unit right? Scale it to the character's size.")
-        raise InputError(f"'{name}' has no level surface between 22 and 85 cm over the floor to sit on; choose a seat.")
+            raise InputError(
+                f"'{name}' is {across * size:.2g} m across: is its unit right? Scale it to the "
+                "character's size."
+            )
+        raise InputError(
+            f"'{name}' has no level surface between 22 and 85 cm over the floor to sit on; choose "
+            "a seat."
+        )
     level, cells = found
     places = field.middles(cells)
     middle = places.mean(0)
@@ -161,4 +190,6 @@ def seat_of(
     if near is not None and room > 0.0:
         aside = float(np.clip(near @ sideways, aside - room, aside + room))
     position = min(at, high) * forward + aside * sideways
-    return SeatPlace(position, float(np.arctan2(-forward[0], forward[1])), floor + level, back, max(room, 0.0))
+    return SeatPlace(
+        position, float(np.arctan2(-forward[0], forward[1])), floor + level, back, max(room, 0.0)
+    )

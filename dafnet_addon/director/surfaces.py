@@ -1,4 +1,6 @@
-"""Furniture seen from above: points on its surfaces, and the height of what is highest over each cell of the floor."""
+"""Furniture seen from above: points on its surfaces, and the height of what is highest over each
+cell of the floor.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,10 +15,22 @@ __all__ = ["HeightField", "height_field", "surface_points"]
 
 _MOST = 4_000_000  # points; larger furniture is sampled more coarsely
 _CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-_FACES = np.array([
-    (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7),
-    (1, 7, 3),
-])
+_FACES = np.array(
+    [
+        (0, 1, 3),
+        (0, 3, 2),
+        (4, 6, 7),
+        (4, 7, 5),
+        (0, 4, 5),
+        (0, 5, 1),
+        (2, 3, 7),
+        (2, 7, 6),
+        (0, 2, 6),
+        (0, 6, 4),
+        (1, 5, 7),
+        (1, 7, 3),
+    ]
+)
 
 
 def _corners(solid: Box | Mesh) -> np.ndarray:
@@ -24,28 +38,42 @@ def _corners(solid: Box | Mesh) -> np.ndarray:
     if isinstance(solid, Box):
         vertices, triangles, matrix = _CORNERS * solid.half_size, _FACES, solid.matrices()
     else:
-        vertices, triangles, matrix = np.asarray(solid.vertices, float), np.asarray(solid.triangles), np.asarray(solid.matrix)
+        vertices, triangles, matrix = (
+            np.asarray(solid.vertices, float),
+            np.asarray(solid.triangles),
+            np.asarray(solid.matrix),
+        )
     matrix = matrix[0] if matrix.ndim == 3 else matrix
     world = rotate(matrix[:3, :3], vertices) + matrix[:3, 3]
     return np.asarray(world[triangles])
 
 
-def _reach_over(low: np.ndarray, high: np.ndarray, within: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+def _reach_over(
+    low: np.ndarray, high: np.ndarray, within: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
     """Which boxes (N,) between corners (N, 3) reach over the floor between two corners (2,)."""
     return np.asarray(((high[:, :2] >= within[0]) & (low[:, :2] <= within[1])).all(axis=1))
 
 
 def surface_points(
-    solids: Sequence[Box | Mesh], spacing: float, within: tuple[np.ndarray, np.ndarray] | None = None
+    solids: Sequence[Box | Mesh],
+    spacing: float,
+    within: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> np.ndarray:
-    """Points (N, 3) all over the surfaces, no two neighbours farther apart than about ``spacing`` metres.
+    """Points (N, 3) all over the surfaces, no two neighbours farther apart than about ``spacing``
+    metres.
 
-    ``within``: two corners (2,) of the floor; only of triangles that reach over what is between them, if they are given.
+    ``within``: two corners (2,) of the floor; only of triangles that reach over what is between
+    them, if they are given.
     """
     if within is not None:
         solids = [solid for solid in solids if isinstance(solid, Box) or len(solid.triangles)]
         boxes = [np.stack(bounds(solid)).reshape(2, -1, 3)[:, :1] for solid in solids]
-        solids = [solid for solid, (low, high) in zip(solids, boxes, strict=True) if _reach_over(low, high, within).any()]
+        solids = [
+            solid
+            for solid, (low, high) in zip(solids, boxes, strict=True)
+            if _reach_over(low, high, within).any()
+        ]
     triangles = np.concatenate([np.zeros((0, 3, 3)), *(_corners(solid) for solid in solids)])
     if within is not None:
         triangles = triangles[_reach_over(triangles.min(axis=1), triangles.max(axis=1), within)]
@@ -67,8 +95,8 @@ def surface_points(
 
 @dataclass(frozen=True)
 class HeightField:
-    """``top`` (X, Y): the highest point of each cell, −inf where there is none; ``origin`` (2,): the first cell's middle;
-    ``cell``: metres.
+    """``top`` (X, Y): the highest point of each cell, −inf where there is none; ``origin`` (2,):
+    the first cell's middle; ``cell``: metres.
     """
 
     origin: np.ndarray

@@ -3,25 +3,42 @@
 from dataclasses import asdict, dataclass
 
 __all__ = [
-    "ModelConfig", "PAPER", "SMALL", "UPPER_SIZE", "LOWER_SIZE", "POSE_SIZE", "VELOCITY_SIZE", "AHEAD_SIZE", "SENSOR_SIZE",
+    "ModelConfig",
+    "PAPER",
+    "SMALL",
+    "UPPER_SIZE",
+    "LOWER_SIZE",
+    "POSE_SIZE",
+    "VELOCITY_SIZE",
+    "AHEAD_SIZE",
+    "SENSOR_SIZE",
 ]
 
 POSE_SIZE, UPPER_SIZE, LOWER_SIZE, VELOCITY_SIZE, AHEAD_SIZE, SENSOR_SIZE = 66, 42, 24, 3, 18, 2640
-_MOST = {"steps_upper": 64, "steps_lower": 64, "steps_whole": 64, "layers": 16, "history": 70, "ahead": AHEAD_SIZE}
+_MOST = {
+    "steps_upper": 64,
+    "steps_lower": 64,
+    "steps_whole": 64,
+    "layers": 16,
+    "history": 70,
+    "ahead": AHEAD_SIZE,
+}
 
 
 @dataclass(frozen=True)
 class ModelConfig:
     """Sizes and switches.
 
-    ``system``: "dafnet", the two-part flow; or what it is compared with (``baselines.flows``): "ap-p" or "moglow", one flow
-    of ``steps_whole`` steps for the whole body, or "lower-first", the two parts in the opposite order. ``actions``: K of the
-    action predictor. ``predictor_code``, ``predictor_width``: its environment code and its layers. ``latent``: the GMVAE's.
-    ``steps_upper``, ``steps_lower``: flow steps of each part. ``width``, ``layers``: the coupling's LSTM. ``code``: the
-    flow's environment code. ``shared_encoder``: one environment encoder for all couplings of a part (else one each).
-    ``mask``: 22 values beside the observation say which joints are given. ``action_temperature``: softmax temperature after
-    training (paper, section 4.2). ``history``: past frames that the predictor (and MoGlow) sees. ``ahead``: numbers that tell
-    the flow where the root will be (``core.root.ahead``), or 0 as in the paper.
+    ``system``: "dafnet", the two-part flow; or what it is compared with (``baselines.flows``):
+    "ap-p" or "moglow", one flow of ``steps_whole`` steps for the whole body, or "lower-first", the
+    two parts in the opposite order. ``actions``: K of the action predictor. ``predictor_code``,
+    ``predictor_width``: its environment code and its layers. ``latent``: the GMVAE's.
+    ``steps_upper``, ``steps_lower``: flow steps of each part. ``width``, ``layers``: the coupling's
+    LSTM. ``code``: the flow's environment code. ``shared_encoder``: one environment encoder for all
+    couplings of a part (else one each). ``mask``: 22 values beside the observation say which joints
+    are given. ``action_temperature``: softmax temperature after training (paper, section 4.2).
+    ``history``: past frames that the predictor (and MoGlow) sees. ``ahead``: numbers that tell the
+    flow where the root will be (``core.root.ahead``), or 0 as in the paper.
 
     Raises ValueError where a size is out of its range.
     """
@@ -53,18 +70,24 @@ class ModelConfig:
 
     @property
     def predicts(self) -> bool:
-        """Whether the flow is told of actions by the predictor; MoGlow is told of past poses instead."""
+        """Whether the flow is told of actions by the predictor; MoGlow is told of past poses
+        instead.
+        """
         return self.system != "moglow"
 
     @property
     def condition_size(self) -> int:
-        """Action probabilities and root velocity (and way ahead), or all of s; environment code; observation (and its mask)."""
+        """Action probabilities and root velocity (and way ahead), or all of s; environment code;
+        observation (and its mask).
+        """
         told = self.actions + VELOCITY_SIZE + self.ahead if self.predicts else self.scene_size
         return told + self.code + POSE_SIZE + (22 if self.mask else 0)
 
     @property
     def scene_size(self) -> int:
-        """The predictor's input beside the environment: past poses, and velocities up to now (693 for ten frames)."""
+        """The predictor's input beside the environment: past poses, and velocities up to now (693
+        for ten frames).
+        """
         return self.history * POSE_SIZE + (self.history + 1) * VELOCITY_SIZE
 
     def as_dict(self) -> dict[str, int | float | bool]:

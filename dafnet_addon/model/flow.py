@@ -1,8 +1,10 @@
-"""The two-part normalizing flow (paper, sections 3 and 4.3, Appendix A; flow step after MoGlow and Glow).
+"""The two-part normalizing flow (paper, sections 3 and 4.3, Appendix A; flow step after MoGlow and
+Glow).
 
-Every transform keeps one small contract. ``forward(x, condition)`` goes from pose to noise and returns (y, log_det, state),
-``inverse(y, condition)`` from noise to pose and returns (x, state). Sequences are (batch, time, features); log_det is
-(batch, time); ``state`` is what the recurrent part must be given to go on with the next frames, None at the start.
+Every transform keeps one small contract. ``forward(x, condition)`` goes from pose to noise and
+returns (y, log_det, state), ``inverse(y, condition)`` from noise to pose and returns (x, state).
+Sequences are (batch, time, features); log_det is (batch, time); ``state`` is what the recurrent
+part must be given to go on with the next frames, None at the start.
 """
 
 import math
@@ -14,13 +16,23 @@ from torch import Tensor, nn
 from ..core.sampler import Sampler
 from .config import SENSOR_SIZE, ModelConfig
 
-__all__ = ["ActNorm", "InvertibleLinear", "Coupling", "PartFlow", "EnvironmentEncoder", "BodyFlow", "TwoPartFlow"]
+__all__ = [
+    "ActNorm",
+    "InvertibleLinear",
+    "Coupling",
+    "PartFlow",
+    "EnvironmentEncoder",
+    "BodyFlow",
+    "TwoPartFlow",
+]
 
 LSTMState = tuple[Tensor, Tensor]
 
 
 class ActNorm(nn.Module):
-    """y = (x + bias) · exp(log_scale), one pair for each feature, set by the first batch to whiten it."""
+    """y = (x + bias) · exp(log_scale), one pair for each feature, set by the first batch to whiten
+    it.
+    """
 
     def __init__(self, size: int) -> None:
         super().__init__()
@@ -29,7 +41,9 @@ class ActNorm(nn.Module):
 
     @torch.no_grad()
     def initialise(self, x: Tensor) -> None:
-        """Zero mean and unit deviation over batch and time; the deviation is floored, constant features must not explode."""
+        """Zero mean and unit deviation over batch and time; the deviation is floored, constant
+        features must not explode.
+        """
         flat = x.reshape(-1, x.shape[-1])
         self.bias.copy_(-flat.mean(0))
         self.log_scale.copy_(-flat.std(0).clamp_min(0.05).log())
@@ -43,7 +57,9 @@ class ActNorm(nn.Module):
 
 
 class InvertibleLinear(nn.Module):
-    """y = x Wᵀ with W = P L (U + diag(sign · exp(log_s))): Glow's invertible 1×1 convolution by LU."""
+    """y = x Wᵀ with W = P L (U + diag(sign · exp(log_s))): Glow's invertible 1×1 convolution by
+    LU.
+    """
 
     permutation: Tensor
     sign: Tensor
@@ -68,7 +84,9 @@ class InvertibleLinear(nn.Module):
 
     def factors(self) -> tuple[Tensor, Tensor]:
         eye = torch.eye(len(self.log_s), dtype=self.log_s.dtype, device=self.log_s.device)
-        return self.lower.tril(-1) + eye, self.upper.triu(1) + torch.diag(self.sign * self.log_s.exp())
+        return self.lower.tril(-1) + eye, self.upper.triu(1) + torch.diag(
+            self.sign * self.log_s.exp()
+        )
 
     def weight(self) -> Tensor:
         lower, upper = self.factors()
@@ -80,7 +98,9 @@ class InvertibleLinear(nn.Module):
     def inverse_weight(self) -> Tensor:
         """W⁻¹ by two triangular solves."""
         lower, upper = self.factors()
-        half = torch.linalg.solve_triangular(lower, self.permutation.T, upper=False, unitriangular=True)
+        half = torch.linalg.solve_triangular(
+            lower, self.permutation.T, upper=False, unitriangular=True
+        )
         return torch.linalg.solve_triangular(upper, half, upper=True)
 
     def inverse(self, y: Tensor) -> Tensor:
@@ -88,9 +108,11 @@ class InvertibleLinear(nn.Module):
 
 
 class Coupling(nn.Module):
-    """Affine coupling: the first half passes; an LSTM on it and the condition gives shift and scale of the second.
+    """Affine coupling: the first half passes; an LSTM on it and the condition gives shift and scale
+    of the second.
 
-    ``mixed``: the LSTM computes in bfloat16. What the flow itself computes, and inverts, stays single.
+    ``mixed``: the LSTM computes in bfloat16. What the flow itself computes, and inverts, stays
+    single.
     """
 
     mixed = False
@@ -103,19 +125,25 @@ class Coupling(nn.Module):
         nn.init.zeros_(self.out.weight)
         nn.init.zeros_(self.out.bias)
 
-    def _affine(self, passed: Tensor, condition: Tensor, state: LSTMState | None) -> tuple[Tensor, Tensor, LSTMState]:
+    def _affine(
+        self, passed: Tensor, condition: Tensor, state: LSTMState | None
+    ) -> tuple[Tensor, Tensor, LSTMState]:
         with torch.autocast(passed.device.type, torch.bfloat16, enabled=self.mixed):
             hidden, state = self.lstm(torch.cat([passed, condition], dim=-1), state)
             hidden = hidden.to(passed.dtype)
         shift, raw = self.out(hidden).chunk(2, dim=-1)
         return shift, torch.sigmoid(raw + 2.0) + 1e-6, state
 
-    def forward(self, x: Tensor, condition: Tensor, state: LSTMState | None = None) -> tuple[Tensor, Tensor, LSTMState]:
+    def forward(
+        self, x: Tensor, condition: Tensor, state: LSTMState | None = None
+    ) -> tuple[Tensor, Tensor, LSTMState]:
         passed, changed = x[..., : self.passes], x[..., self.passes :]
         shift, scale, state = self._affine(passed, condition, state)
         return torch.cat([passed, (changed + shift) * scale], dim=-1), scale.log().sum(-1), state
 
-    def inverse(self, y: Tensor, condition: Tensor, state: LSTMState | None = None) -> tuple[Tensor, LSTMState]:
+    def inverse(
+        self, y: Tensor, condition: Tensor, state: LSTMState | None = None
+    ) -> tuple[Tensor, LSTMState]:
         passed, changed = y[..., : self.passes], y[..., self.passes :]
         shift, scale, state = self._affine(passed, condition, state)
         return torch.cat([passed, changed / scale - shift], dim=-1), state
@@ -129,7 +157,9 @@ class PartFlow(nn.Module):
 
     def __init__(self, size: int, steps: int, config: ModelConfig) -> None:
         super().__init__()
-        self.encoders = nn.ModuleList(EnvironmentEncoder(config.code) for _ in range(1 if config.shared_encoder else steps))
+        self.encoders = nn.ModuleList(
+            EnvironmentEncoder(config.code) for _ in range(1 if config.shared_encoder else steps)
+        )
         self.norms = nn.ModuleList(ActNorm(size) for _ in range(steps))
         self.linears = nn.ModuleList(InvertibleLinear(size) for _ in range(steps))
         self.couplings = nn.ModuleList(
@@ -149,7 +179,11 @@ class PartFlow(nn.Module):
         return each * (len(self.norms) // len(each))
 
     def _to_noise(
-        self, x: Tensor, conditions: list[Tensor], states: list[LSTMState] | None, initialise: bool = False
+        self,
+        x: Tensor,
+        conditions: list[Tensor],
+        states: list[LSTMState] | None,
+        initialise: bool = False,
     ) -> tuple[Tensor, Tensor, list[LSTMState]]:
         total = x.new_zeros(x.shape[:-1])
         after = []
@@ -174,7 +208,11 @@ class PartFlow(nn.Module):
         return z, after
 
     def forward(
-        self, x: Tensor, condition: Tensor, occupancy: Tensor, states: list[LSTMState] | None = None,
+        self,
+        x: Tensor,
+        condition: Tensor,
+        occupancy: Tensor,
+        states: list[LSTMState] | None = None,
         initialise: bool = False,
     ) -> tuple[Tensor, Tensor, list[LSTMState]]:
         return self._to_noise(x, self._conditions(condition, occupancy), states, initialise)
@@ -184,7 +222,9 @@ class PartFlow(nn.Module):
     ) -> tuple[Tensor, list[LSTMState]]:
         return self._to_pose(z, self._conditions(condition, occupancy), states)
 
-    def log_likelihood(self, x: Tensor, condition: Tensor, occupancy: Tensor, initialise: bool = False) -> Tensor:
+    def log_likelihood(
+        self, x: Tensor, condition: Tensor, occupancy: Tensor, initialise: bool = False
+    ) -> Tensor:
         """Log density (B, T) in standardised units (equation 2)."""
         z, log_det, _ = self(x, condition, occupancy, initialise=initialise)
         return _log_density(z, log_det)
@@ -192,17 +232,21 @@ class PartFlow(nn.Module):
     def run_on(
         self, x: Tensor, condition: Tensor, occupancy: Tensor, z: Tensor, kept: int
     ) -> tuple[Tensor, Tensor]:
-        """Log density (B, T) of ``x``, and what the noise ``z`` (B, size), held constant, makes of the frames after the first
-        ``kept`` (B, T − kept, size), with the memory that those have left.
+        """Log density (B, T) of ``x``, and what the noise ``z`` (B, size), held constant, makes of
+        the frames after the first ``kept`` (B, T − kept, size), with the memory that those have
+        left.
 
-        No pose enters the flow but through its memory, so making all frames costs what measuring them does.
+        No pose enters the flow but through its memory, so making all frames costs what measuring
+        them does.
         """
         conditions = self._conditions(condition, occupancy)
         before, after = [c[:, :kept] for c in conditions], [c[:, kept:] for c in conditions]
         z_before, det_before, states = self._to_noise(x[:, :kept], before, None)
         z_after, det_after, _ = self._to_noise(x[:, kept:], after, states)
         made, _ = self._to_pose(z[:, None].expand(-1, x.shape[1] - kept, -1), after, states)
-        return torch.cat([_log_density(z_before, det_before), _log_density(z_after, det_after)], dim=1), made
+        return torch.cat(
+            [_log_density(z_before, det_before), _log_density(z_after, det_after)], dim=1
+        ), made
 
 
 def _log_density(z: Tensor, log_det: Tensor) -> Tensor:
@@ -210,7 +254,9 @@ def _log_density(z: Tensor, log_det: Tensor) -> Tensor:
 
 
 class EnvironmentEncoder(nn.Module):
-    """Occupancy (…, 2640) to a code: Linear, ReLU, Linear (paper, Table 4). ``mixed``: in bfloat16."""
+    """Occupancy (…, 2640) to a code: Linear, ReLU, Linear (paper, Table 4). ``mixed``: in
+    bfloat16.
+    """
 
     mixed = False
 
@@ -225,11 +271,13 @@ class EnvironmentEncoder(nn.Module):
 
 
 class BodyFlow(nn.Module):
-    """One flow for each part of the body, made one after another: a part's observation is updated by the parts before it.
+    """One flow for each part of the body, made one after another: a part's observation is updated
+    by the parts before it.
 
-    Everything here is standardised. ``pose`` (B, T, 66): the upper body first, in the order of ``skeleton.UPPER``; ``base``
-    (B, T, K + 3): action probabilities and root velocity; ``occupancy`` (B, T, 2640); ``observation`` (B, T, 66): in the order
-    of a pose, zero where free; ``given`` (B, T, 22): 1 where a joint of that order is given.
+    Everything here is standardised. ``pose`` (B, T, 66): the upper body first, in the order of
+    ``skeleton.UPPER``; ``base`` (B, T, K + 3): action probabilities and root velocity;
+    ``occupancy`` (B, T, 2640); ``observation`` (B, T, 66): in the order of a pose, zero where free;
+    ``given`` (B, T, 22): 1 where a joint of that order is given.
     """
 
     places: dict[str, slice]
@@ -246,9 +294,11 @@ class BodyFlow(nn.Module):
         """The flows by name, in the order of sampling."""
         return {name: getattr(self, name) for name in self.places}
 
-    def condition(self, part: str, base: Tensor, observation: Tensor, given: Tensor, pose: Tensor) -> Tensor:
-        """What a part is told beside the environment (B, T, K + 3 + 66 [+ 22]): the slots of the parts before it are those of
-        ``pose``, which is the true one, or the one being made.
+    def condition(
+        self, part: str, base: Tensor, observation: Tensor, given: Tensor, pose: Tensor
+    ) -> Tensor:
+        """What a part is told beside the environment (B, T, K + 3 + 66 [+ 22]): the slots of the
+        parts before it are those of ``pose``, which is the true one, or the one being made.
         """
         observation, given = observation.clone(), given.clone()
         for name, columns in self.places.items():
@@ -256,29 +306,51 @@ class BodyFlow(nn.Module):
                 break
             observation[..., columns] = pose[..., columns]
             given[..., columns.start // 3 : columns.stop // 3] = 1.0
-        return torch.cat([base, observation, given] if self.config.mask else [base, observation], dim=-1)
+        return torch.cat(
+            [base, observation, given] if self.config.mask else [base, observation], dim=-1
+        )
 
 
 class TwoPartFlow(BodyFlow):
-    """The upper body's flow, then the lower's, whose observation is updated by the upper body (paper, figure 5)."""
+    """The upper body's flow, then the lower's, whose observation is updated by the upper body
+    (paper, figure 5).
+    """
 
     places = Sampler.parts
     upper: PartFlow
     lower: PartFlow
 
     def forward(
-        self, upper: Tensor, lower: Tensor, base: Tensor, occupancy: Tensor, observation: Tensor, given: Tensor,
+        self,
+        upper: Tensor,
+        lower: Tensor,
+        base: Tensor,
+        occupancy: Tensor,
+        observation: Tensor,
+        given: Tensor,
     ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Noise of both parts (B, T, 42), (B, T, 24) and both log-determinants (B, T)."""
         pose = torch.cat([upper, lower], dim=-1)
-        z_upper, det_upper, _ = self.upper(upper, self.condition("upper", base, observation, given, pose), occupancy)
-        z_lower, det_lower, _ = self.lower(lower, self.condition("lower", base, observation, given, pose), occupancy)
+        z_upper, det_upper, _ = self.upper(
+            upper, self.condition("upper", base, observation, given, pose), occupancy
+        )
+        z_lower, det_lower, _ = self.lower(
+            lower, self.condition("lower", base, observation, given, pose), occupancy
+        )
         return z_upper, z_lower, det_upper, det_lower
 
     def inverse(
-        self, z_upper: Tensor, z_lower: Tensor, base: Tensor, occupancy: Tensor, observation: Tensor, given: Tensor
+        self,
+        z_upper: Tensor,
+        z_lower: Tensor,
+        base: Tensor,
+        occupancy: Tensor,
+        observation: Tensor,
+        given: Tensor,
     ) -> Tensor:
-        """Pose (B, T, 66), upper part first, of noise: one part, then the other under or over it."""
+        """Pose (B, T, 66), upper part first, of noise: one part, then the other under or over
+        it.
+        """
         noise = torch.cat([z_upper, z_lower], dim=-1)
         pose = torch.zeros_like(noise)
         for name, columns in self.places.items():

@@ -1,4 +1,6 @@
-"""The action predictor, learnt without labels inside a Gaussian-mixture VAE (paper, section 4.2, Table 3)."""
+"""The action predictor, learnt without labels inside a Gaussian-mixture VAE (paper, section 4.2,
+Table 3).
+"""
 
 import math
 from dataclasses import dataclass
@@ -55,36 +57,56 @@ class Losses:
 
 
 class GMVAE(nn.Module):
-    """Trains the predictor: q_α(π|s), the encoder q_s(z|s, π), the decoders p_β(z|π) and p_θ(s|z)."""
+    """Trains the predictor: q_α(π|s), the encoder q_s(z|s, π), the decoders p_β(z|π) and
+    p_θ(s|z).
+    """
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
         self.predictor = ActionPredictor(config)
         width, k = config.predictor_width, config.actions
-        self.encoder = nn.Sequential(*_mlp(config.scene_size + config.predictor_code + k, width, width), nn.ReLU())
+        self.encoder = nn.Sequential(
+            *_mlp(config.scene_size + config.predictor_code + k, width, width), nn.ReLU()
+        )
         self.mean, self.spread = nn.Linear(width, config.latent), nn.Linear(width, config.latent)
-        self.prior_mean, self.prior_spread = nn.Linear(k, config.latent), nn.Linear(k, config.latent)
+        self.prior_mean, self.prior_spread = (
+            nn.Linear(k, config.latent),
+            nn.Linear(k, config.latent),
+        )
         self.decoder = _mlp(config.latent, width, width, config.scene_size + SENSOR_SIZE)
 
     def losses(self, past: Tensor, seen: Tensor, occupancy: Tensor, temperature: float) -> Losses:
-        """Losses of a batch: ``seen`` (B, 693) is what the predictor is shown of ``past``, which is reconstructed."""
+        """Losses of a batch: ``seen`` (B, 693) is what the predictor is shown of ``past``, which is
+        reconstructed.
+        """
         code = self.predictor.encode(occupancy)
         logits = self.predictor.logits(seen, code)
         actions = F.gumbel_softmax(logits, tau=temperature, dim=-1)
         hidden = self.encoder(torch.cat([seen, code, actions], dim=-1))
         mean, variance = self.mean(hidden), F.softplus(self.spread(hidden)) + 1e-5
-        prior_mean, prior_variance = self.prior_mean(actions), F.softplus(self.prior_spread(actions)) + 1e-5
+        prior_mean, prior_variance = (
+            self.prior_mean(actions),
+            F.softplus(self.prior_spread(actions)) + 1e-5,
+        )
         z = mean + variance.sqrt() * torch.randn_like(mean)
         target = torch.cat([past, occupancy], dim=-1)
         reconstruction = (self.decoder(z) - target).square().sum(-1).mean()
         ratio = variance / prior_variance
-        kl = 0.5 * (ratio + (mean - prior_mean).square() / prior_variance - 1.0 - ratio.log()).sum(-1).mean()
-        # log K minus the entropy of the probabilities, as the authors code it: no action may swallow the rest.
+        kl = (
+            0.5
+            * (ratio + (mean - prior_mean).square() / prior_variance - 1.0 - ratio.log())
+            .sum(-1)
+            .mean()
+        )
+        # log K minus the entropy of the probabilities, as the authors code it: no action may
+        # swallow the rest.
         probabilities = F.log_softmax(logits, dim=-1)
         category = math.log(logits.shape[-1]) + (probabilities.exp() * probabilities).sum(-1).mean()
         return Losses(reconstruction, kl, category)
 
 
 def gumbel_temperature(progress: float) -> float:
-    """Annealing of the Gumbel-softmax: 1.0 at the first step, 0.5 at the last, falling exponentially."""
+    """Annealing of the Gumbel-softmax: 1.0 at the first step, 0.5 at the last, falling
+    exponentially.
+    """
     return 0.5**progress

@@ -1,4 +1,6 @@
-"""Training windows as standardised tensors: the pool they are drawn from, what the sensor sees, the modes drawn for each."""
+"""Training windows as standardised tensors: the pool they are drawn from, what the sensor sees, the
+modes drawn for each.
+"""
 
 import os
 from collections.abc import Callable, Sequence
@@ -31,7 +33,9 @@ _FREE, _EE, _FULL = range(3)
 
 @dataclass(frozen=True)
 class Statistics:
-    """Mean and deviation of poses (66, upper first), velocities (3) and the way ahead (18); deviations floored."""
+    """Mean and deviation of poses (66, upper first), velocities (3) and the way ahead (18);
+    deviations floored.
+    """
 
     pose_mean: np.ndarray
     pose_std: np.ndarray
@@ -46,15 +50,20 @@ class Statistics:
         flat = model_order(poses.reshape(-1, 66)).astype(float)
         speed, way = (a.reshape(-1, a.shape[-1]).astype(float) for a in (velocity, ahead))
         return Statistics(
-            flat.mean(0), np.maximum(flat.std(0), 0.01), speed.mean(0), np.maximum(speed.std(0), 1e-3),
-            way.mean(0), np.maximum(way.std(0), 1e-2),
+            flat.mean(0),
+            np.maximum(flat.std(0), 0.01),
+            speed.mean(0),
+            np.maximum(speed.std(0), 1e-3),
+            way.mean(0),
+            np.maximum(way.std(0), 1e-2),
         )
 
 
 @dataclass(frozen=True)
 class Batch:
-    """``past`` (B, T, 693); ``upper`` (B, T, 42), ``lower`` (B, T, 24); ``root`` (B, T, 3 [+ 18]): velocity and way ahead, all
-    standardised; ``occupancy`` (B, T, 2640); ``step`` (B, T, 3): the velocity in metres and radians.
+    """``past`` (B, T, 693); ``upper`` (B, T, 42), ``lower`` (B, T, 24); ``root`` (B, T, 3 [+ 18]):
+    velocity and way ahead, all standardised; ``occupancy`` (B, T, 2640); ``step`` (B, T, 3): the
+    velocity in metres and radians.
     """
 
     past: Tensor
@@ -66,7 +75,8 @@ class Batch:
 
 
 def past_of(poses: Tensor, velocity: Tensor, history: int) -> Tensor:
-    """c_history and c_vel (B, T, 693): ``history`` past poses, oldest first, then the velocities up to now.
+    """c_history and c_vel (B, T, 693): ``history`` past poses, oldest first, then the velocities up
+    to now.
 
     ``poses`` and ``velocity`` (B, history + T, …) are standardised.
     """
@@ -76,16 +86,22 @@ def past_of(poses: Tensor, velocity: Tensor, history: int) -> Tensor:
 
 
 def seen(file: Path, bank: DeviceBank) -> np.ndarray:
-    """Occupancy of a shard's windows (N, 70, 2640) in bytes, 255 of which are 1; made once and kept beside the shard."""
+    """Occupancy of a shard's windows (N, 70, 2640) in bytes, 255 of which are 1; made once and kept
+    beside the shard.
+    """
     kept = file.with_suffix(".seen.npy")
     if not kept.exists():
         shard = load_pool([file])
-        boxes, shapes, root = (torch.from_numpy(shard[name]) for name in ("boxes", "shapes", "root"))
+        boxes, shapes, root = (
+            torch.from_numpy(shard[name]) for name in ("boxes", "shapes", "root")
+        )
         part = file.with_suffix(f".{os.getpid()}.npy")
         out = np.lib.format.open_memmap(part, "w+", np.uint8, (*root.shape[:2], len(SPHERES)))
         for k in range(0, len(root), _AT_ONCE):
             some = slice(k, k + _AT_ONCE)
-            found = torch.maximum(occupancy_of(boxes[some], root[some]), bank.occupancy(shapes[some], root[some]))
+            found = torch.maximum(
+                occupancy_of(boxes[some], root[some]), bank.occupancy(shapes[some], root[some])
+            )
             out[some] = (255.0 * found).round().to(torch.uint8).numpy()
         out.flush()
         part.rename(kept)
@@ -93,12 +109,14 @@ def seen(file: Path, bank: DeviceBank) -> np.ndarray:
 
 
 class Pool:
-    """Windows of a dataset, sent to a device batch by batch. New shards may be written while training goes on: ``refresh``
-    takes them in. A CPU reads what the sensor sees from disk (see ``seen``), since making it costs as much as a step of
-    training; other devices make it.
+    """Windows of a dataset, sent to a device batch by batch. New shards may be written while
+    training goes on: ``refresh`` takes them in. A CPU reads what the sensor sees from disk (see
+    ``seen``), since making it costs as much as a step of training; other devices make it.
     """
 
-    def __init__(self, files: Callable[[], Sequence[Path]], device: torch.device, bank: ShapeBank = NO_BANK) -> None:
+    def __init__(
+        self, files: Callable[[], Sequence[Path]], device: torch.device, bank: ShapeBank = NO_BANK
+    ) -> None:
         self.files, self.device, self.bank = files, device, DeviceBank(bank, device)
         self.shards: dict[Path, dict[str, np.ndarray]] = {}
         self.refresh()
@@ -118,11 +136,16 @@ class Pool:
     def statistics(self, most: int = 20) -> Statistics:
         """Means and deviations over the windows of the first shards."""
         shards = list(self.shards.values())[:most]
-        poses, velocity, ahead = (np.concatenate([shard[name] for shard in shards]) for name in ("poses", "velocity", "ahead"))
+        poses, velocity, ahead = (
+            np.concatenate([shard[name] for shard in shards])
+            for name in ("poses", "velocity", "ahead")
+        )
         return Statistics.of(poses * np.float32(POSE_UNIT), velocity, ahead)
 
     def windows(self, rows: Tensor, names: Sequence[str]) -> dict[str, np.ndarray]:
-        """Fields of windows ``rows`` (whole numbers, on the CPU) as they are stored (see ``data.prepare.load_pool``)."""
+        """Fields of windows ``rows`` (whole numbers, on the CPU) as they are stored (see
+        ``data.prepare.load_pool``).
+        """
         shards = list(self.shards.values())
         which = np.searchsorted(self.ends, rows.numpy(), side="right")
         first = np.concatenate([[0], self.ends])[which]
@@ -131,13 +154,23 @@ class Pool:
 
     def _rows(self, rows: Tensor) -> dict[str, Tensor]:
         names = [name for name in next(iter(self.shards.values())) if name != "kinds"]
-        return {name: torch.from_numpy(a).to(self.device) for name, a in self.windows(rows, names).items()}
+        return {
+            name: torch.from_numpy(a).to(self.device)
+            for name, a in self.windows(rows, names).items()
+        }
 
     def batch(self, rows: Tensor, statistics: Statistics, config: ModelConfig) -> Batch:
         """Windows ``rows`` (whole numbers, on the CPU), poses with dequantisation noise."""
         mean, std, v_mean, v_std, a_mean, a_std = (
             torch.as_tensor(getattr(statistics, name), dtype=torch.float32, device=self.device)
-            for name in ("pose_mean", "pose_std", "velocity_mean", "velocity_std", "ahead_mean", "ahead_std")
+            for name in (
+                "pose_mean",
+                "pose_std",
+                "velocity_mean",
+                "velocity_std",
+                "ahead_mean",
+                "ahead_std",
+            )
         )
         a, history = self._rows(rows), config.history
         order = torch.as_tensor(model_order(np.arange(66)), device=self.device)
@@ -150,18 +183,25 @@ class Pool:
         if "seen" in a:
             occupancy = a["seen"].float() / 255.0
         else:
-            occupancy = torch.maximum(occupancy_of(a["boxes"], a["root"]), self.bank.occupancy(a["shapes"], a["root"]))
+            occupancy = torch.maximum(
+                occupancy_of(a["boxes"], a["root"]), self.bank.occupancy(a["shapes"], a["root"])
+            )
         return Batch(
-            past_of(poses, velocity, history), now[..., :UPPER_SIZE], now[..., UPPER_SIZE:],
-            torch.cat([velocity[:, history:], way], dim=-1), occupancy, step[:, history:],
+            past_of(poses, velocity, history),
+            now[..., :UPPER_SIZE],
+            now[..., UPPER_SIZE:],
+            torch.cat([velocity[:, history:], way], dim=-1),
+            occupancy,
+            step[:, history:],
         )
 
 
 def occupancy_of(boxes: Tensor, root: Tensor) -> Tensor:
-    """What the sensor sees of upright ``boxes`` (B, M, 7) from ``root`` (B, T, 3): x, y, yaw. Occupancy (B, T, 2640).
+    """What the sensor sees of upright ``boxes`` (B, M, 7) from ``root`` (B, T, 3): x, y, yaw.
+    Occupancy (B, T, 2640).
 
-    Equal to ``data.boxes.occupancy``. Boxes out of the sensor's reach cost nothing; both boxes and sensor being upright, the
-    distance is one in the plane and one in height.
+    Equal to ``data.boxes.occupancy``. Boxes out of the sensor's reach cost nothing; both boxes and
+    sensor being upright, the distance is one in the plane and one in height.
     """
     windows, frames, _ = root.shape
     spheres = torch.as_tensor(SPHERES, dtype=root.dtype, device=root.device)
@@ -174,25 +214,44 @@ def occupancy_of(boxes: Tensor, root: Tensor) -> Tensor:
     # Sensor points in each box's own frame, in the plane.
     turn, own = (seen[:, 6] - yaw)[:, None], seen[:, 6][:, None]
     offset = between[window, frame, which]
-    x = turn.cos() * disc[:, 0] + turn.sin() * disc[:, 1] - (own.cos() * offset[:, :1] + own.sin() * offset[:, 1:])
-    y = -turn.sin() * disc[:, 0] + turn.cos() * disc[:, 1] - (-own.sin() * offset[:, :1] + own.cos() * offset[:, 1:])
+    x = (
+        turn.cos() * disc[:, 0]
+        + turn.sin() * disc[:, 1]
+        - (own.cos() * offset[:, :1] + own.sin() * offset[:, 1:])
+    )
+    y = (
+        -turn.sin() * disc[:, 0]
+        + turn.cos() * disc[:, 1]
+        - (-own.sin() * offset[:, :1] + own.cos() * offset[:, 1:])
+    )
     qx, qy = x.abs() - seen[:, 3:4], y.abs() - seen[:, 4:5]
     outside = torch.hypot(qx.clamp_min(0), qy.clamp_min(0))
     row, spot = torch.nonzero(outside < RADIUS, as_tuple=True)
-    plane_out, plane_in = outside[row, spot][:, None], torch.maximum(qx, qy)[row, spot][:, None].clamp_max(0)
+    plane_out, plane_in = (
+        outside[row, spot][:, None],
+        torch.maximum(qx, qy)[row, spot][:, None].clamp_max(0),
+    )
     above = ((heights - seen[:, 2:3]).abs() - seen[:, 5:6])[row]
     distance = torch.hypot(plane_out, above.clamp_min(0))
-    distance = torch.where((plane_out == 0) & (above <= 0), torch.maximum(plane_in, above), distance)
+    distance = torch.where(
+        (plane_out == 0) & (above <= 0), torch.maximum(plane_in, above), distance
+    )
     value = (1 - distance / RADIUS).clamp(0, 1)
-    place = (window * frames + frame)[row][:, None] * len(spheres) + torch.arange(layers, device=root.device) * len(disc)
+    place = (window * frames + frame)[row][:, None] * len(spheres) + torch.arange(
+        layers, device=root.device
+    ) * len(disc)
     out = torch.zeros(windows * frames * len(spheres), dtype=root.dtype, device=root.device)
     out.scatter_reduce_(0, (place + spot[:, None]).reshape(-1), value.reshape(-1), "amax")
     return out.reshape(windows, frames, -1)
 
 
 def _modes(windows: int, device: torch.device) -> Tensor:
-    """The mode of each of four segments (B, 4): one throughout in 60 % of the windows, FREE foremost, else all of them."""
-    one = torch.multinomial(torch.tensor([0.55, 0.33, 0.12], device=device), windows, replacement=True)[:, None]
+    """The mode of each of four segments (B, 4): one throughout in 60 % of the windows, FREE
+    foremost, else all of them.
+    """
+    one = torch.multinomial(
+        torch.tensor([0.55, 0.33, 0.12], device=device), windows, replacement=True
+    )[:, None]
     order = torch.rand(windows, _SEGMENTS, device=device).argsort(1)
     fourth = torch.randint(_FREE, _FULL, (windows, 1), device=device)
     shuffled = torch.where(order == 3, fourth, order)
@@ -202,8 +261,8 @@ def _modes(windows: int, device: torch.device) -> Tensor:
 def observation_for(upper: Tensor) -> tuple[Tensor, Tensor]:
     """A random observation (B, T, 66) of the true upper bodies (B, T, 42), and its mask (B, T, 22).
 
-    In EE any subset of head and hands is given, in FULL the upper body with or without the pelvis. The mode may change
-    between four segments of a window, as the author's code has it.
+    In EE any subset of head and hands is given, in FULL the upper body with or without the pelvis.
+    The mode may change between four segments of a window, as the author's code has it.
     """
     windows, frames, _ = upper.shape
     device = upper.device

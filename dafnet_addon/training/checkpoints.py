@@ -1,8 +1,10 @@
-"""Checkpoints of a training: tensors and JSON, so that a stranger's run is gone on with and nothing of it is executed.
+"""Checkpoints of a training: tensors and JSON, so that a stranger's run is gone on with and nothing
+of it is executed.
 
-A checkpoint is a safetensors file: "network.NAME" and, of each parameter that has been moved, the optimiser's
-"optimiser.NAME.KEY"; "generator.DEVICE"; and what else its trainer keeps. The metadata's "state" is JSON with the numbers,
-words and settings beside them. Everything is checked against the network that the settings describe before it is used.
+A checkpoint is a safetensors file: "network.NAME" and, of each parameter that has been moved, the
+optimiser's "optimiser.NAME.KEY"; "generator.DEVICE"; and what else its trainer keeps. The
+metadata's "state" is JSON with the numbers, words and settings beside them. Everything is checked
+against the network that the settings describe before it is used.
 """
 
 import json
@@ -22,7 +24,13 @@ from ..core.files import whole_file
 from ..core.text import read_json
 
 __all__ = [
-    "Checkpoint", "checkpoint_file", "generators", "of_training", "set_generators", "typed", "write_checkpoint",
+    "Checkpoint",
+    "checkpoint_file",
+    "generators",
+    "of_training",
+    "set_generators",
+    "typed",
+    "write_checkpoint",
 ]
 
 _FORMAT, _PICKLED = "dafnet-training-1", ".pt"
@@ -32,7 +40,9 @@ Settings = TypeVar("Settings")
 
 
 def checkpoint_file(folder: Path, part: str) -> Path:
-    """Where the checkpoint of a part lies in a run's folder. Raises InputError where only one of an earlier version does."""
+    """Where the checkpoint of a part lies in a run's folder. Raises InputError where only one of an
+    earlier version does.
+    """
     file, earlier = folder / f"{part}.checkpoint", folder / f"{part}{_PICKLED}"
     if earlier.exists() and not file.exists():
         raise _pickled(earlier)
@@ -41,20 +51,27 @@ def checkpoint_file(folder: Path, part: str) -> Path:
 
 def _pickled(file: Path) -> InputError:
     return InputError(
-        f"'{file}' was saved by an earlier version as a pickle, which could execute code and is not read; train in another "
+        f"'{file}' was saved by an earlier version as a pickle, which could execute code and is "
+        "not read; train in another "
         "folder, beginning with that run's weights (--from)."
     )
 
 
 def _refused(path: Path, what: str) -> InputError:
-    return InputError(f"The checkpoint '{path}' cannot be used ({what}); restore a backup or train anew.")
+    return InputError(
+        f"The checkpoint '{path}' cannot be used ({what}); restore a backup or train anew."
+    )
 
 
 def of_training(network: nn.Module, optimiser: torch.optim.Optimizer) -> dict[str, Tensor]:
-    """The tensors of a network and of its Adam optimiser, by the names that ``Checkpoint.restore`` knows them by."""
+    """The tensors of a network and of its Adam optimiser, by the names that ``Checkpoint.restore``
+    knows them by.
+    """
     tensors = {f"network.{name}": tensor for name, tensor in network.state_dict().items()}
     for name, parameter in network.named_parameters():
-        tensors |= {f"optimiser.{name}.{key}": tensor for key, tensor in optimiser.state[parameter].items()}
+        tensors |= {
+            f"optimiser.{name}.{key}": tensor for key, tensor in optimiser.state[parameter].items()
+        }
     return tensors
 
 
@@ -67,7 +84,9 @@ def write_checkpoint(file: Path, tensors: Mapping[str, Tensor], state: Mapping[s
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """What a checkpoint holds, as it stands in the file ``path``: nothing of it is checked yet but that it can be read."""
+    """What a checkpoint holds, as it stands in the file ``path``: nothing of it is checked yet but
+    that it can be read.
+    """
 
     path: Path
     tensors: dict[str, Tensor]
@@ -75,14 +94,18 @@ class Checkpoint:
 
     @staticmethod
     def read(path: Path) -> "Checkpoint":
-        """Raises InputError where the file is missing, damaged, or something else than a checkpoint."""
+        """Raises InputError where the file is missing, damaged, or something else than a
+        checkpoint.
+        """
         if path.suffix == _PICKLED:
             raise _pickled(path)
         try:
             with safe_open(path, "pt") as file:
                 words = file.metadata() or {}
                 if words.get("format") != _FORMAT:
-                    raise InputError(f"'{path}' is no checkpoint of this version; train anew in another folder.")
+                    raise InputError(
+                        f"'{path}' is no checkpoint of this version; train anew in another folder."
+                    )
                 tensors = {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
         except (OSError, SafetensorError) as error:
             raise _refused(path, f"it cannot be read: {error}") from None
@@ -99,7 +122,9 @@ class Checkpoint:
         return _refused(self.path, what)
 
     def settings(self, kind: type[Settings], name: str) -> Settings:
-        """The settings kept under ``name``. Raises InputError where one is unknown, missing, or of another type."""
+        """The settings kept under ``name``. Raises InputError where one is unknown, missing, or of
+        another type.
+        """
         try:
             return typed(kind, self.state.get(name))
         except ValueError as error:
@@ -122,32 +147,54 @@ class Checkpoint:
         return text
 
     def tensor(self, name: str, like: Tensor) -> Tensor:
-        """A tensor of the same shape and type as ``like``. Raises InputError where it is missing or another."""
+        """A tensor of the same shape and type as ``like``. Raises InputError where it is missing or
+        another.
+        """
         tensor = self.tensors.get(name)
         if tensor is None or tensor.shape != like.shape or tensor.dtype != like.dtype:
             raise self.refused(f"'{name}' is missing, or of another shape or type")
         return tensor
 
     def fits(self, network: nn.Module) -> None:
-        """Raise InputError where the file's network is another than this one, whose tensors may be on the device 'meta'."""
+        """Raise InputError where the file's network is another than this one, whose tensors may be
+        on the device 'meta'.
+        """
         for name, like in network.state_dict().items():
             self.tensor(f"network.{name}", like)
 
     def restore(self, network: nn.Module, optimiser: torch.optim.Optimizer | None = None) -> None:
-        """Give a network, and its Adam optimiser, what the file holds. Raises InputError where it does not fit."""
-        network.load_state_dict({name: self.tensor(f"network.{name}", like) for name, like in network.state_dict().items()})
+        """Give a network, and its Adam optimiser, what the file holds. Raises InputError where it
+        does not fit.
+        """
+        network.load_state_dict(
+            {
+                name: self.tensor(f"network.{name}", like)
+                for name, like in network.state_dict().items()
+            }
+        )
         if optimiser is None:
             return
         state = {}
         for k, (name, parameter) in enumerate(network.named_parameters()):
             if f"optimiser.{name}.step" in self.tensors:
                 likes = torch.zeros(()), parameter, parameter
-                state[k] = {key: self.tensor(f"optimiser.{name}.{key}", like) for key, like in zip(_ADAM, likes, strict=True)}
-        optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})
+                state[k] = {
+                    key: self.tensor(f"optimiser.{name}.{key}", like)
+                    for key, like in zip(_ADAM, likes, strict=True)
+                }
+        optimiser.load_state_dict(
+            {"state": state, "param_groups": optimiser.state_dict()["param_groups"]}
+        )
 
     def set_generators(self, device: torch.device) -> None:
-        """Let the generators go on as they did when the checkpoint was written. Raises InputError where they cannot."""
-        states = {name: tensor for name in ("cpu", "cuda") if (tensor := self.tensors.get(f"generator.{name}")) is not None}
+        """Let the generators go on as they did when the checkpoint was written. Raises InputError
+        where they cannot.
+        """
+        states = {
+            name: tensor
+            for name in ("cpu", "cuda")
+            if (tensor := self.tensors.get(f"generator.{name}")) is not None
+        }
         try:
             set_generators(states, device)
         except (KeyError, RuntimeError, TypeError):
@@ -170,9 +217,11 @@ def set_generators(states: Mapping[str, Tensor], device: torch.device) -> None:
 
 
 def typed(kind: type[Settings], values: object) -> Settings:
-    """A dataclass of numbers, words and switches from what JSON or TOML gives for its fields; the others keep their defaults.
+    """A dataclass of numbers, words and switches from what JSON or TOML gives for its fields; the
+    others keep their defaults.
 
-    Raises ValueError, which names the field, where one is unknown or of another type, or the dataclass refuses it.
+    Raises ValueError, which names the field, where one is unknown or of another type, or the
+    dataclass refuses it.
     """
     known = {field.name: field.type for field in fields(kind)}  # type: ignore[arg-type]
     if not isinstance(values, dict):
@@ -183,10 +232,17 @@ def typed(kind: type[Settings], values: object) -> Settings:
     for name, value in values.items():
         if known[name] is float and type(value) is int and abs(value) < 1 << 53:
             value = float(value)
-        if type(value) is not known[name] or (isinstance(value, float) and not math.isfinite(value)):
+        if type(value) is not known[name] or (
+            isinstance(value, float) and not math.isfinite(value)
+        ):
             raise ValueError(f"'{name}' is not what it should be, {_NAMES[known[name]]}")
         found[name] = value
     return kind(**found)
 
 
-_NAMES: dict[Any, str] = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
+_NAMES: dict[Any, str] = {
+    int: "a whole number",
+    float: "a number",
+    bool: "true or false",
+    str: "a text",
+}

@@ -1,8 +1,10 @@
-"""Figures of a weights file on held-out clips, beside those of the clips themselves (paper, section 6.2).
+"""Figures of a weights file on held-out clips, beside those of the clips themselves (paper, section
+6.2).
 
-Each clip is made again in each mode, all noise vectors of a mode in one run. The true root is given in all modes, the true
-head and hands in EE, the true upper body in FULL; nothing is cleaned up after the model but in runs that say so. A figure is
-a ratio of sums over clips, its interval (95 %) a bootstrap over clips.
+Each clip is made again in each mode, all noise vectors of a mode in one run. The true root is given
+in all modes, the true head and hands in EE, the true upper body in FULL; nothing is cleaned up
+after the model but in runs that say so. A figure is a ratio of sums over clips, its interval (95 %)
+a bootstrap over clips.
 """
 
 from collections import defaultdict
@@ -43,30 +45,57 @@ from ..data.held_out import HeldClip
 from .processes import spread_out
 
 __all__ = [
-    "COLUMNS", "SEEDS", "Figures", "Measured", "beside", "captured", "figures", "in_processes", "made", "measured", "row",
-    "rows", "rows_of", "shot_of", "table",
+    "COLUMNS",
+    "SEEDS",
+    "Figures",
+    "Measured",
+    "beside",
+    "captured",
+    "figures",
+    "in_processes",
+    "made",
+    "measured",
+    "row",
+    "rows",
+    "rows_of",
+    "shot_of",
+    "table",
 ]
 
 SEEDS = 5
 """Takes at temperature 1."""
 _RUNS = (
-    "ground_truth", "free_t0", "free_t0_clean", "free_t1", "ee_t0", "ee_t0_clean", "ee_t1", "full_t0", "full_t0_clean",
+    "ground_truth",
+    "free_t0",
+    "free_t0_clean",
+    "free_t1",
+    "ee_t0",
+    "ee_t0_clean",
+    "ee_t1",
+    "full_t0",
+    "full_t0_clean",
     "full_t1",
 )
-_SITS_WITHIN = (2, 4, 6, 8)  # centimetres between the made and the real pelvis, the median over an episode
-_STANDING, _STANDS_ABOVE = 0.90, 0.86  # metres, the pelvis of one that stands: the real one's, and at least
+# centimetres between the made and the real pelvis, the median over an episode
+_SITS_WITHIN = (2, 4, 6, 8)
+# metres, the pelvis of one that stands: the real one's, and at least
+_STANDING, _STANDS_ABOVE = 0.90, 0.86
 _DEEP = 0.02  # metres inside furniture, from where on a body is seen to penetrate it
 _OFF_FLOOR = 0.07  # metres; under it the paper counts a toe base as low
 _DRAWS = 1000
 _LEGS = [1 + 4 * (j - 1) + k for j in LOWER for k in range(4)]  # of ``body_points``
 
 Sums = dict[str, tuple[float, float]]
-"""By the name of a figure: its total and its weight (frames, episodes), so that clips can be pooled."""
+"""By the name of a figure: its total and its weight (frames, episodes), so that clips can be
+pooled.
+"""
 
 
 @dataclass(frozen=True)
 class Figures:
-    """Figures of the takes of one clip under one setting; ``seats``: errors of the pelvis' height, metres, made minus real."""
+    """Figures of the takes of one clip under one setting; ``seats``: errors of the pelvis' height,
+    metres, made minus real.
+    """
 
     sums: Sums
     seats: list[float] = field(default_factory=list)
@@ -81,17 +110,26 @@ class Measured:
 
 
 def shot_of(clip: HeldClip, mode: str, scene: Scene | None = None) -> Shot:
-    """What the model is told of a clip in a mode; of another furniture where a ``scene`` is given."""
+    """What the model is told of a clip in a mode; of another furniture where a ``scene`` is
+    given.
+    """
     targets = {effector: clip.joints[:, j] for effector, j in END_EFFECTORS.items()}
     controls = Controls(
-        fps=30.0, root=clip.path.matrices(), mode=mode, head=targets["head"], hand_left=targets["hand_left"],
-        hand_right=targets["hand_right"], upper_body=clip.joints[:, list(UPPER)],
+        fps=30.0,
+        root=clip.path.matrices(),
+        mode=mode,
+        head=targets["head"],
+        hand_left=targets["hand_left"],
+        hand_right=targets["hand_right"],
+        upper_body=clip.joints[:, list(UPPER)],
     )
     return drained(shot_steps(clip.scene if scene is None else scene, controls))
 
 
 def made(sampler: Sampler, shot: Shot, noise: np.ndarray) -> np.ndarray:
-    """Takes (S, T, 22, 3) of noise vectors (S, 66): world joints on constant bones, as the model gives them."""
+    """Takes (S, T, 22, 3) of noise vectors (S, 66): world joints on constant bones, as the model
+    gives them.
+    """
     poses = drained(sampler.run(shot.conditions, noise)).poses
     takes = []
     for s in range(len(noise)):
@@ -101,7 +139,9 @@ def made(sampler: Sampler, shot: Shot, noise: np.ndarray) -> np.ndarray:
 
 def made_clean(takes: np.ndarray, shot: Shot) -> np.ndarray:
     """Takes (S, T, 22, 3) after the clean-up at full strength."""
-    return np.stack([on_bones(cleaned_up(joints, shot, CleanUp(1.0, 1.0, 1.0))) for joints in takes])
+    return np.stack(
+        [on_bones(cleaned_up(joints, shot, CleanUp(1.0, 1.0, 1.0))) for joints in takes]
+    )
 
 
 def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
@@ -121,15 +161,24 @@ def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
 
     sums = {
         "foot_sliding_per_frame": (each(lambda j: float(foot_sliding(j, 30.0).mean())), weight),
-        "foot_sliding_4mm_s": (each(lambda j: float(foot_sliding(j, 30.0, per_frame=False).mean())), weight),
+        "foot_sliding_4mm_s": (
+            each(lambda j: float(foot_sliding(j, 30.0, per_frame=False).mean())),
+            weight,
+        ),
         "skate_cm": (each(lambda j: skate(j, 30.0)), weight),
-        "bad_collisions_per_frame": (float(bad_collisions(reach(flat[:, list(BAD_COLLISION_JOINTS)])).sum()), weight),
+        "bad_collisions_per_frame": (
+            float(bad_collisions(reach(flat[:, list(BAD_COLLISION_JOINTS)])).sum()),
+            weight,
+        ),
         "penetration_mean": (penetration(points)[0] * weight, weight),
         "penetrates": (float((points < -_DEEP).any(1).sum()), weight),
         "penetration_deepest": (float(np.maximum(-points.min(1), 0.0).sum()), weight),
         "end_effector_error": (end_effector_distance(flat, targets) * weight, weight),
         "jerk": (each(lambda j: jerk(j, 30.0)), weight),
-        "stands_when_it_should": (float((takes[:, standing, 0, 2] > _STANDS_ABOVE).sum()), float(count * standing.sum())),
+        "stands_when_it_should": (
+            float((takes[:, standing, 0, 2] > _STANDS_ABOVE).sum()),
+            float(count * standing.sum()),
+        ),
         "feet_off_floor": (float((toes.min(1) > _OFF_FLOOR).sum()), weight),
         "toes_under_floor": (float(np.maximum(-toes, 0.0).mean()) * weight, weight),
         "legs_penetration_mean": (penetration(points[:, _LEGS])[0] * weight, weight),
@@ -140,34 +189,50 @@ def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
         sums["apd_upper"] = (diversity(takes[:, :, list(UPPER)]) * frames, float(frames))
         sums["apd_legs"] = (diversity(takes[:, :, list(LOWER)]) * frames, float(frames))
     seats = [
-        float(np.median(take[r.start : r.end, 0, 2]) - np.median(clip.joints[r.start : r.end, 0, 2]))
-        for take in takes for r in clip.rests
+        float(
+            np.median(take[r.start : r.end, 0, 2]) - np.median(clip.joints[r.start : r.end, 0, 2])
+        )
+        for take in takes
+        for r in clip.rests
     ]
     for within in _SITS_WITHIN:
-        sums[f"sits_within_{within}cm"] = (float(sum(abs(error) <= within / 100 for error in seats)), float(len(seats)))
+        sums[f"sits_within_{within}cm"] = (
+            float(sum(abs(error) <= within / 100 for error in seats)),
+            float(len(seats)),
+        )
     return Figures(sums | _life(clip, takes), seats)
 
 
 def _life(clip: HeldClip, takes: np.ndarray) -> Sums:
-    """How lively takes (S, T, 22, 3) are, how they sway, sit down and lean: means over takes and episodes that show it."""
+    """How lively takes (S, T, 22, 3) are, how they sway, sit down and lean: means over takes and
+    episodes that show it.
+    """
     found: dict[str, list[float]] = defaultdict(list)
     forward = np.stack([-np.sin(clip.path.yaw), np.cos(clip.path.yaw)], axis=-1)
     for take in takes:
         for name, joints in liveliness.LIVELY.items():
             found[f"speed_{name}"].append(liveliness.speed(take, 30.0, joints))
-        for band, value in liveliness.band_speeds(take, 30.0, liveliness.LIVELY["wrists"] + liveliness.LIVELY["head"]).items():
+        for band, value in liveliness.band_speeds(
+            take, 30.0, liveliness.LIVELY["wrists"] + liveliness.LIVELY["head"]
+        ).items():
             found[f"speed_{band}"].append(value)
         found["sway"].append(liveliness.sway(take, 30.0))
         leans = np.degrees(liveliness.lean(take, forward))
         for rest in clip.rests:
             found["descent_seconds"].append(liveliness.descent(take, 30.0, rest.start))
             found["lean_degrees"].append(float(np.median(leans[rest.start : rest.end])))
-    known = {name: [value for value in values if np.isfinite(value)] for name, values in found.items()}
+    known = {
+        name: [value for value in values if np.isfinite(value)] for name, values in found.items()
+    }
     return {name: (float(np.sum(values)), float(len(values))) for name, values in known.items()}
 
 
-def _noise(sampler: Sampler, seed: int, seeds: int, mode: str) -> tuple[np.ndarray, dict[str, list[int]]]:
-    """Noise vectors (S, 66), and which of them each run is of: calm; lively; in FREE one upper body over different legs."""
+def _noise(
+    sampler: Sampler, seed: int, seeds: int, mode: str
+) -> tuple[np.ndarray, dict[str, list[int]]]:
+    """Noise vectors (S, 66), and which of them each run is of: calm; lively; in FREE one upper body
+    over different legs.
+    """
     lively = list(range(1, 1 + seeds))
     noise = [sampler.noise(seed, temperature=0.0), *(sampler.noise(seed + s) for s in range(seeds))]
     runs = {f"{mode.lower()}_t0": [0], f"{mode.lower()}_t1": lively}
@@ -178,10 +243,15 @@ def _noise(sampler: Sampler, seed: int, seeds: int, mode: str) -> tuple[np.ndarr
 
 
 def beside(
-    sampler: Sampler, clip: HeldClip, seed: int = 0, seeds: int = SEEDS, modes: Sequence[str] = MODES, clean: bool = True
+    sampler: Sampler,
+    clip: HeldClip,
+    seed: int = 0,
+    seeds: int = SEEDS,
+    modes: Sequence[str] = MODES,
+    clean: bool = True,
 ) -> Measured:
-    """One clip made again in these modes, ``seeds`` times at temperature 1, and measured beside itself; calm takes also after
-    the clean-up where it is asked for.
+    """One clip made again in these modes, ``seeds`` times at temperature 1, and measured beside
+    itself; calm takes also after the clean-up where it is asked for.
     """
     shots = {"EE": shot_of(clip, "EE")}
     known = shots["EE"].conditions
@@ -196,7 +266,9 @@ def beside(
         runs |= {run: figures(clip, takes[chosen], mode) for run, chosen in takes_of.items()}
         calm = f"{mode.lower()}_t0"
         if clean:
-            runs[f"{calm}_clean"] = figures(clip, made_clean(takes[takes_of[calm]], shots[mode]), mode)
+            runs[f"{calm}_clean"] = figures(
+                clip, made_clean(takes[takes_of[calm]], shots[mode]), mode
+            )
     return Measured(clip, runs)
 
 
@@ -215,15 +287,27 @@ def _call(task: Callable[..., Any], item: Any) -> Any:
 
 
 def in_processes(
-    weights: Weights, task: Callable[[Sampler, Any], Any], items: Sequence[Any], progress: Callable[[float], None],
+    weights: Weights,
+    task: Callable[[Sampler, Any], Any],
+    items: Sequence[Any],
+    progress: Callable[[float], None],
 ) -> Iterator[Any]:
-    """``task`` of each item with a sampler of these weights, in as many processes as there are cores; in order."""
-    yield from spread_out(partial(_call, task), items, progress=progress, start=partial(_start, weights))
+    """``task`` of each item with a sampler of these weights, in as many processes as there are
+    cores; in order.
+    """
+    yield from spread_out(
+        partial(_call, task), items, progress=progress, start=partial(_start, weights)
+    )
 
 
 def measured(
-    weights: Weights, clips: Sequence[HeldClip], progress: Callable[[float], None] = lambda share: None, seed: int = 0,
-    seeds: int = SEEDS, modes: Sequence[str] = MODES, clean: bool = True,
+    weights: Weights,
+    clips: Sequence[HeldClip],
+    progress: Callable[[float], None] = lambda share: None,
+    seed: int = 0,
+    seeds: int = SEEDS,
+    modes: Sequence[str] = MODES,
+    clean: bool = True,
 ) -> list[Measured]:
     """Every clip beside itself (see ``beside``), in processes."""
     task = partial(beside, seed=seed, seeds=seeds, modes=modes, clean=clean)
@@ -239,7 +323,9 @@ def _interval(totals: np.ndarray, weights: np.ndarray) -> list[float]:
 
 
 def row(chosen: Sequence[Figures]) -> dict[str, Any]:
-    """One setting over clips: each figure, the 95 % intervals, and how many clips and seat episodes they are of."""
+    """One setting over clips: each figure, the 95 % intervals, and how many clips and seat episodes
+    they are of.
+    """
     seats = [error for each in chosen for error in each.seats]
     out: dict[str, Any] = {"clips": len(chosen), "seat_episodes": len(seats)}
     intervals = {}
@@ -260,17 +346,21 @@ def rows_of(clips: Sequence[Measured], runs: Sequence[str]) -> dict[str, dict[st
 
 
 def captured(clips: Sequence[HeldClip]) -> list[HeldClip]:
-    """Those of unseen bodies that were captured as they are, among seats and chance furniture: the headline figures' clips."""
+    """Those of unseen bodies that were captured as they are, among seats and chance furniture: the
+    headline figures' clips.
+    """
     return [clip for clip in clips if clip.unseen and not clip.composed and not clip.room]
 
 
 def rows(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
-    """Ground truth and all runs on unseen bodies, captured as they are; then at desks and shelves, raised onto beds, on
-    composed clips, and on bodies that are also in training.
+    """Ground truth and all runs on unseen bodies, captured as they are; then at desks and shelves,
+    raised onto beds, on composed clips, and on bodies that are also in training.
     """
     groups = {
         "": [m for m in clips if captured([m.clip])],
-        "_at_desks_and_shelves": [m for m in clips if m.clip.unseen and m.clip.room not in ("", "bed")],
+        "_at_desks_and_shelves": [
+            m for m in clips if m.clip.unseen and m.clip.room not in ("", "bed")
+        ],
         "_on_beds": [m for m in clips if m.clip.unseen and m.clip.room == "bed"],
         "_composed": [m for m in clips if m.clip.unseen and m.clip.composed and not m.clip.room],
         "_bodies_in_training": [m for m in clips if not m.clip.unseen],
@@ -283,9 +373,25 @@ def rows(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
 
 
 COLUMNS = (
-    "clips", "seat_episodes", "sits_within_6cm", "seat_error_median", "stands_when_it_should", "end_effector_error",
-    "upper_body_error", "foot_sliding_per_frame", "foot_sliding_4mm_s", "skate_cm", "bad_collisions_per_frame",
-    "penetration_mean", "jerk", "apd_upper", "apd_legs", "over_ee", "over_full", "feet_off_floor", "toes_under_floor",
+    "clips",
+    "seat_episodes",
+    "sits_within_6cm",
+    "seat_error_median",
+    "stands_when_it_should",
+    "end_effector_error",
+    "upper_body_error",
+    "foot_sliding_per_frame",
+    "foot_sliding_4mm_s",
+    "skate_cm",
+    "bad_collisions_per_frame",
+    "penetration_mean",
+    "jerk",
+    "apd_upper",
+    "apd_legs",
+    "over_ee",
+    "over_full",
+    "feet_off_floor",
+    "toes_under_floor",
     "legs_penetration_mean",
 )
 """The figures of a table, in order."""
@@ -293,7 +399,9 @@ COLUMNS = (
 
 def table(rows: dict[str, dict[str, Any]], columns: Sequence[str] = COLUMNS) -> str:
     """The rows as a Markdown table, intervals in brackets."""
-    names = [name for name in columns if any(values.get(name) is not None for values in rows.values())]
+    names = [
+        name for name in columns if any(values.get(name) is not None for values in rows.values())
+    ]
 
     def cell(values: dict[str, Any], name: str) -> str:
         if values.get(name) is None:
@@ -301,7 +409,14 @@ def table(rows: dict[str, dict[str, Any]], columns: Sequence[str] = COLUMNS) -> 
         between = values.get("intervals", {}).get(name)
         return f"{values[name]:g}" + (f" ({between[0]:g} to {between[1]:g})" if between else "")
 
-    lines = ["| | " + " | ".join(name.replace("_", " ") for name in names) + " |", "|---" * (len(names) + 1) + "|"]
+    lines = [
+        "| | " + " | ".join(name.replace("_", " ") for name in names) + " |",
+        "|---" * (len(names) + 1) + "|",
+    ]
     for label, values in rows.items():
-        lines.append(f"| {label.replace('_', ' ')} | " + " | ".join(cell(values, name) for name in names) + " |")
+        lines.append(
+            f"| {label.replace('_', ' ')} | "
+            + " | ".join(cell(values, name) for name in names)
+            + " |"
+        )
     return "\n".join(lines)

@@ -1,4 +1,6 @@
-"""From a training run to the weights file that ships, plain matrices in 8 bits, everything said in its metadata; and back."""
+"""From a training run to the weights file that ships, plain matrices in 8 bits, everything said in
+its metadata; and back.
+"""
 
 import json
 from collections.abc import Mapping
@@ -17,12 +19,23 @@ from ..model.flow import BodyFlow, PartFlow
 from ..model.predictor import ActionPredictor
 from .batches import NOISE, Statistics
 
-__all__ = ["tensors_of", "adopt_predictor", "adopt_part", "adopted_statistics", "export", "annotate"]
+__all__ = [
+    "tensors_of",
+    "adopt_predictor",
+    "adopt_part",
+    "adopted_statistics",
+    "export",
+    "annotate",
+]
 
 
-def tensors_of(flow: BodyFlow, predictor: ActionPredictor | None, statistics: Statistics) -> dict[str, np.ndarray]:
+def tensors_of(
+    flow: BodyFlow, predictor: ActionPredictor | None, statistics: Statistics
+) -> dict[str, np.ndarray]:
     """Every array that the sampler needs, by the names that it knows them by."""
-    out: dict[str, np.ndarray] = {name: value.astype(np.float32) for name, value in asdict(statistics).items()}
+    out: dict[str, np.ndarray] = {
+        name: value.astype(np.float32) for name, value in asdict(statistics).items()
+    }
     for name, tensor in predictor.state_dict().items() if predictor is not None else ():
         out[f"predictor.{name}"] = tensor.numpy()
     for part_name, part in flow.parts().items():
@@ -30,7 +43,10 @@ def tensors_of(flow: BodyFlow, predictor: ActionPredictor | None, statistics: St
             out[f"{part_name}.encoders.{name}"] = tensor.numpy()
         for k, (norm, linear, coupling) in enumerate(part.steps()):
             prefix = f"{part_name}.{k}"
-            out[f"{prefix}.bias"], out[f"{prefix}.log_scale"] = norm.bias.detach().numpy(), norm.log_scale.detach().numpy()
+            out[f"{prefix}.bias"], out[f"{prefix}.log_scale"] = (
+                norm.bias.detach().numpy(),
+                norm.log_scale.detach().numpy(),
+            )
             out[f"{prefix}.weight"] = linear.weight().detach().numpy()
             for name, tensor in coupling.state_dict().items():
                 out[f"{prefix}.{name}"] = tensor.numpy()
@@ -38,16 +54,19 @@ def tensors_of(flow: BodyFlow, predictor: ActionPredictor | None, statistics: St
 
 
 def _grown(weights: Weights, name: str, array: np.ndarray, target: torch.Tensor) -> None:
-    """Give ``target`` what ``array`` holds, a matrix or vector of a narrower network of the same kind.
+    """Give ``target`` what ``array`` holds, a matrix or vector of a narrower network of the same
+    kind.
 
-    Rows of an LSTM are those of its four gates. Units that are new keep what they begin with, but nothing that was there before
-    hears them: so a wider network begins as the very function that the narrower one is.
+    Rows of an LSTM are those of its four gates. Units that are new keep what they begin with, but
+    nothing that was there before hears them: so a wider network begins as the very function that
+    the narrower one is.
     """
     gates = 4 if ".lstm." in name else 1
     old, new = array.shape, tuple(target.shape)
     if len(old) != len(new) or any(a > b for a, b in zip(old, new, strict=True)) or old[0] % gates:
         raise WeightsError(
-            f"The weights '{weights.path}' do not fit this model ('{name}' is {old}, not {new}); choose others to begin with."
+            f"The weights '{weights.path}' do not fit this model ('{name}' is {old}, not {new}); "
+            "choose others to begin with."
         )
     rows = target.view(gates, new[0] // gates, *new[1:])
     kept = torch.from_numpy(np.array(array)).view(gates, old[0] // gates, *old[1:])
@@ -60,68 +79,107 @@ def _grown(weights: Weights, name: str, array: np.ndarray, target: torch.Tensor)
 
 @torch.no_grad()
 def adopt_predictor(predictor: ActionPredictor, weights: Weights) -> None:
-    """Give a predictor what a weights file of the same or smaller sizes holds. Raises WeightsError where they do not fit."""
+    """Give a predictor what a weights file of the same or smaller sizes holds. Raises WeightsError
+    where they do not fit.
+    """
     for name, target in predictor.state_dict().items():
         _grown(weights, name, weights.require(f"predictor.{name}"), target)
 
 
 @torch.no_grad()
 def adopt_part(part: PartFlow, name: str, weights: Weights, config: ModelConfig) -> None:
-    """Give the flow's part ``name`` what a weights file of the same or smaller sizes holds. Raises WeightsError where they do
-    not fit.
+    """Give the flow's part ``name`` what a weights file of the same or smaller sizes holds. Raises
+    WeightsError where they do not fit.
 
-    A file that was not told of the root's way ahead serves a model that is: what weighs it starts at zero.
+    A file that was not told of the root's way ahead serves a model that is: what weighs it starts
+    at zero.
     """
     for key, target in part.encoders.state_dict().items():
         _grown(weights, key, weights.require(f"{name}.encoders.{key}"), target)
     told = int(weights.config["model"].get("ahead", 0))
     if told not in (0, config.ahead):
-        raise WeightsError(f"The weights '{weights.path}' are told of the root's way in another manner; choose another file.")
+        raise WeightsError(
+            f"The weights '{weights.path}' are told of the root's way in another manner; choose "
+            "another file."
+        )
     for k, (norm, linear, coupling) in enumerate(part.steps()):
         prefix = f"{name}.{k}"
         for key, target in (("bias", norm.bias), ("log_scale", norm.log_scale)):
-            target.copy_(torch.from_numpy(np.array(weights.require(f"{prefix}.{key}", tuple(target.shape)))))
-        linear.adopt(torch.from_numpy(np.array(weights.require(f"{prefix}.weight", tuple(linear.weight().shape)))))
+            target.copy_(
+                torch.from_numpy(np.array(weights.require(f"{prefix}.{key}", tuple(target.shape))))
+            )
+        linear.adopt(
+            torch.from_numpy(
+                np.array(weights.require(f"{prefix}.weight", tuple(linear.weight().shape)))
+            )
+        )
         for key, target in coupling.state_dict().items():
             array = weights.require(f"{prefix}.{key}")
             if key == "lstm.weight_ih_l0" and told < config.ahead:
-                array = np.insert(array, [coupling.passes + config.actions + VELOCITY_SIZE] * config.ahead, 0.0, axis=1)
+                array = np.insert(
+                    array,
+                    [coupling.passes + config.actions + VELOCITY_SIZE] * config.ahead,
+                    0.0,
+                    axis=1,
+                )
             _grown(weights, f"{prefix}.{key}", array, target)
 
 
 def adopted_statistics(weights: Weights, found: Statistics) -> Statistics:
-    """What a weights file standardises with; of the way ahead, where it is not told of it, what was ``found``."""
-    return Statistics(**{name: weights.tensors.get(name, value) for name, value in asdict(found).items()})
+    """What a weights file standardises with; of the way ahead, where it is not told of it, what was
+    ``found``.
+    """
+    return Statistics(
+        **{name: weights.tensors.get(name, value) for name, value in asdict(found).items()}
+    )
 
 
 def export(
-    file: Path, flow: BodyFlow, predictor: ActionPredictor | None, statistics: Statistics,
-    words: Mapping[str, str], spread: Mapping[str, np.ndarray] | None = None,
+    file: Path,
+    flow: BodyFlow,
+    predictor: ActionPredictor | None,
+    statistics: Statistics,
+    words: Mapping[str, str],
+    spread: Mapping[str, np.ndarray] | None = None,
 ) -> None:
-    """Write the weights file; ``words`` are its metadata (licence, provenance, metrics), texts or JSON texts; ``spread`` (see
-    ``take_spread``) what its takes' noise is drawn from, N(0, I) without it.
+    """Write the weights file; ``words`` are its metadata (licence, provenance, metrics), texts or
+    JSON texts; ``spread`` (see ``take_spread``) what its takes' noise is drawn from, N(0, I)
+    without it.
 
-    Matrices of a thousand values or more are stored in 8 bits with a scale for each row, which changes no figure that was
-    measured; what the flow inverts and what it standardises with stays single.
+    Matrices of a thousand values or more are stored in 8 bits with a scale for each row, which
+    changes no figure that was measured; what the flow inverts and what it standardises with stays
+    single.
     """
     config: ModelConfig = flow.config
     description = {
-        "model": config.as_dict(), "fps": 30, "joints": list(JOINTS), "offsets": OFFSETS.tolist(), "noise_metres": NOISE,
+        "model": config.as_dict(),
+        "fps": 30,
+        "joints": list(JOINTS),
+        "offsets": OFFSETS.tolist(),
+        "noise_metres": NOISE,
     }
     tensors = {}
     for name, array in tensors_of(flow, predictor, statistics).items():
-        inverted = name.count(".") == 2 and name.endswith(".weight") and name[:5] in ("upper", "lower", "whole")
+        inverted = (
+            name.count(".") == 2
+            and name.endswith(".weight")
+            and name[:5] in ("upper", "lower", "whole")
+        )
         if array.ndim < 2 or array.size < 1000 or inverted:
             tensors[name] = array
         else:
             tensors[name], tensors[f"{name}.scale"] = quantised(array)
     tensors |= {f"{part}.spread": matrix for part, matrix in (spread or {}).items()}
     with whole_file(file) as part:
-        write_safetensors(part, tensors, {"format": FORMAT, "config": json.dumps(description), **words})
+        write_safetensors(
+            part, tensors, {"format": FORMAT, "config": json.dumps(description), **words}
+        )
 
 
 def annotate(file: Path, words: Mapping[str, str]) -> None:
-    """Add to, or replace, words of a weights file's metadata; its tensors stay as they are, to the bit."""
+    """Add to, or replace, words of a weights file's metadata; its tensors stay as they are, to the
+    bit.
+    """
     tensors, metadata = read_safetensors(file)
     with whole_file(file) as part:
         write_safetensors(part, tensors, {**metadata, **words})

@@ -1,9 +1,11 @@
 """What motion that the flow makes by itself is held to, beside the likelihood.
 
-The likelihood is learnt along captured poses; sampling walks along the model's own, with one noise vector for all frames. These
-losses are of the poses that such a vector makes after some captured frames (the memory knows the phase of the gait from them):
-at z = 0 they should be the captured ones; with any noise targets are met, the pelvis is as high as floor or seat asks, bones
-keep their length and planted feet stay (the paper's section 7 asks for a foot-velocity loss). Metres and seconds.
+The likelihood is learnt along captured poses; sampling walks along the model's own, with one noise
+vector for all frames. These losses are of the poses that such a vector makes after some captured
+frames (the memory knows the phase of the gait from them): at z = 0 they should be the captured
+ones; with any noise targets are met, the pelvis is as high as floor or seat asks, bones keep their
+length and planted feet stay (the paper's section 7 asks for a foot-velocity loss). Metres and
+seconds.
 """
 
 import torch
@@ -13,13 +15,16 @@ from ..core.skeleton import LOWER, OFFSETS, PARENTS, TOE_HEIGHT, UPPER
 
 __all__ = ["upper_loss", "lower_loss", "sliding"]
 
-_POSE, _GIVEN, _HEIGHT, _BONE, _SPEED, _SLIDE = 100.0, 200.0, 150.0, 100.0, 3.0, 40.0  # nats for each metre, or metre a second
+# nats for each metre, or metre a second
+_POSE, _GIVEN, _HEIGHT, _BONE, _SPEED, _SLIDE = 100.0, 200.0, 150.0, 100.0, 3.0, 40.0
 _FPS = 30.0
 _PLANTED = 0.15  # metres a second
 _LOW = 0.03  # metres over where a planted toe base is
 
 
-def _bones(joints: tuple[int, ...], known: tuple[int, ...]) -> tuple[list[int], list[int], list[float]]:
+def _bones(
+    joints: tuple[int, ...], known: tuple[int, ...]
+) -> tuple[list[int], list[int], list[float]]:
     """Rows (in ``known`` + ``joints``) of the bones' far and near ends, and their lengths."""
     order = list(known) + list(joints)
     pairs = [(order.index(j), order.index(PARENTS[j])) for j in joints if PARENTS[j] in order]
@@ -47,33 +52,46 @@ def _followed(made: Tensor, true: Tensor, calm: Tensor) -> Tensor:
 
 
 def upper_loss(made: Tensor, true: Tensor, calm: Tensor, given: Tensor) -> Tensor:
-    """Loss of made upper bodies (B, T, 14, 3) beside the captured; ``calm`` (B,) where z = 0; ``given`` (B, T, 14)."""
+    """Loss of made upper bodies (B, T, 14, 3) beside the captured; ``calm`` (B,) where z = 0;
+    ``given`` (B, T, 14).
+    """
     missed = ((made - true).norm(dim=-1) * given).sum() / given.sum().clamp_min(1.0)
     height = (made[..., 0, 2] - true[..., 0, 2]).abs().mean()
-    return _followed(made, true, calm) + _GIVEN * missed + _HEIGHT * height + _BONE * _bone_error(made, _UPPER_BONES)
+    return (
+        _followed(made, true, calm)
+        + _GIVEN * missed
+        + _HEIGHT * height
+        + _BONE * _bone_error(made, _UPPER_BONES)
+    )
 
 
 def sliding(feet: Tensor, step: Tensor) -> Tensor:
-    """Horizontal speed over the floor (B, T − 1, J), metres a second, of points (B, T, J, 3) in the root's frames.
+    """Horizontal speed over the floor (B, T − 1, J), metres a second, of points (B, T, J, 3) in the
+    root's frames.
 
     ``step`` (B, T, 3): the root's displacement and turn to each frame, in the frame before it.
     """
     before = feet[:, :-1, :, :2] - step[:, 1:, None, :2]
     c, s = step[:, 1:, None, 2].cos(), step[:, 1:, None, 2].sin()
-    moved = torch.stack([c * before[..., 0] + s * before[..., 1], c * before[..., 1] - s * before[..., 0]], dim=-1)
+    moved = torch.stack(
+        [c * before[..., 0] + s * before[..., 1], c * before[..., 1] - s * before[..., 0]], dim=-1
+    )
     # A square root of nothing has no gradient.
     return _FPS * ((feet[:, 1:, :, :2] - moved).square().sum(-1) + 1e-8).sqrt()
 
 
 def lower_loss(made: Tensor, true: Tensor, calm: Tensor, pelvis: Tensor, step: Tensor) -> Tensor:
-    """Loss of made lower bodies (B, T, 8, 3) under the captured ``pelvis`` (B, T, 3); the rest as above.
+    """Loss of made lower bodies (B, T, 8, 3) under the captured ``pelvis`` (B, T, 3); the rest as
+    above.
 
     Calm feet stay where the captured ones do; others where they themselves are low.
     """
     bones = _bone_error(torch.cat([pelvis[:, :, None], made], dim=2), _LOWER_BONES)
     still = sliding(true[:, :, _FEET], step) < _PLANTED
     planted = still & (true[:, 1:, _TOES, 2] < TOE_HEIGHT + _LOW)
-    low = (2.0 - 2.0 ** ((made[:, 1:, _TOES, 2].detach() - TOE_HEIGHT).clamp_min(0.0) / 0.025)).clamp_min(0.0)
+    low = (
+        2.0 - 2.0 ** ((made[:, 1:, _TOES, 2].detach() - TOE_HEIGHT).clamp_min(0.0) / 0.025)
+    ).clamp_min(0.0)
     weight = torch.where(calm[:, None, None], planted.float(), low)
     slid = (sliding(made[:, :, _FEET], step) * weight).sum() / weight.sum().clamp_min(1.0)
     return _followed(made, true, calm) + _BONE * bones + _SLIDE * slid

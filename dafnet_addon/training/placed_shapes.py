@@ -1,4 +1,6 @@
-"""What the sensor sees of real pieces, on any device: a bank of shapes as tensors. Equal to ``data.shapes.ShapeBank``."""
+"""What the sensor sees of real pieces, on any device: a bank of shapes as tensors. Equal to
+``data.shapes.ShapeBank``.
+"""
 
 import numpy as np
 import torch
@@ -23,11 +25,20 @@ class DeviceBank:
         sizes = np.array([shape.values.shape for shape in bank.shapes])
         first = np.concatenate([[0], np.cumsum(sizes.prod(1))[:-1]])
         reach = [
-            np.linalg.norm(np.maximum(np.abs(s.origin), np.abs(s.origin + s.spacing * np.array(s.values.shape)))[:2])
+            np.linalg.norm(
+                np.maximum(
+                    np.abs(s.origin), np.abs(s.origin + s.spacing * np.array(s.values.shape))
+                )[:2]
+            )
             for s in bank.shapes
         ]
-        self.values = torch.from_numpy(np.concatenate([shape.values.ravel() for shape in bank.shapes])).to(device)
-        self.sizes, self.first = torch.as_tensor(sizes, device=device), torch.as_tensor(first, device=device)
+        self.values = torch.from_numpy(
+            np.concatenate([shape.values.ravel() for shape in bank.shapes])
+        ).to(device)
+        self.sizes, self.first = (
+            torch.as_tensor(sizes, device=device),
+            torch.as_tensor(first, device=device),
+        )
 
         def single(values: np.ndarray) -> Tensor:
             return torch.as_tensor(np.asarray(values), dtype=torch.float32, device=device)
@@ -38,7 +49,9 @@ class DeviceBank:
         self.spheres = single(SPHERES)
 
     def occupancy(self, placed: Tensor, root: Tensor) -> Tensor:
-        """Occupancy (B, T, 2640) of ``placed`` shapes (B, S, 5), number −1 for none, seen from ``root`` (B, T, 3)."""
+        """Occupancy (B, T, 2640) of ``placed`` shapes (B, S, 5), number −1 for none, seen from
+        ``root`` (B, T, 3).
+        """
         windows, frames, _ = root.shape
         out = torch.zeros(windows * frames, len(SPHERES), device=self.device)
         if not self.count:
@@ -64,13 +77,20 @@ class DeviceBank:
         x = x0 + turn.cos() * self.spheres[:, 0] - turn.sin() * self.spheres[:, 1]
         y = y0 + turn.sin() * self.spheres[:, 0] + turn.cos() * self.spheres[:, 1]
         z = self.spheres[:, 2] / placed[:, 4:5]
-        at = (torch.stack([x, y, z], -1) - self.origins[number][:, None]) / self.spacings[number][:, None, None]
+        at = (torch.stack([x, y, z], -1) - self.origins[number][:, None]) / self.spacings[number][
+            :, None, None
+        ]
         size = self.sizes[number][:, None]
         within = ((at > 0) & (at < size - 1)).all(-1)
         cell = torch.minimum(at.clamp_min(0).long(), size - 2)
         share = at - cell
         stride_y, stride_x = size[..., 2], size[..., 1] * size[..., 2]
-        node = self.first[number][:, None] + cell[..., 0] * stride_x + cell[..., 1] * stride_y + cell[..., 2]
+        node = (
+            self.first[number][:, None]
+            + cell[..., 0] * stride_x
+            + cell[..., 1] * stride_y
+            + cell[..., 2]
+        )
 
         def along_z(n: Tensor) -> Tensor:
             below = self.values[n].float()

@@ -1,4 +1,6 @@
-"""Mixed precision only where a device has it, found by trying: processors differ in which operations know bfloat16."""
+"""Mixed precision only where a device has it, found by trying: processors differ in which
+operations know bfloat16.
+"""
 
 import sys
 from functools import cache
@@ -11,9 +13,11 @@ __all__ = ["announce", "mixes"]
 
 @cache
 def mixes(device: str) -> bool:
-    """Whether LSTMs compute in bfloat16 on a device, there and back: one of two layers is run once, on a few numbers.
+    """Whether LSTMs compute in bfloat16 on a device, there and back: one of two layers is run once,
+    on a few numbers.
 
-    Without AVX-512 a processor has no such LSTM, and what else of bfloat16 it has is slower there than single precision.
+    Without AVX-512 a processor has no such LSTM, and what else of bfloat16 it has is slower there
+    than single precision.
     """
     kind = torch.device(device).type
     with torch.random.fork_rng(devices=[]):
@@ -29,6 +33,12 @@ def mixes(device: str) -> bool:
 
 
 def announce(mixed: bool, device: str = "cpu") -> None:
-    """Tell the user, in one line on standard error, where the mixed precision that was asked for is not to be had."""
+    """Tell the user, in one line on standard error, where the mixed precision that was asked for is
+    not to be had.
+    """
     if mixed and not mixes(device):
-        print("This device has no LSTM in bfloat16: it trains in single precision, in more time a step.", file=sys.stderr)
+        print(
+            "This device has no LSTM in bfloat16: it trains in single precision, in more time a "
+            "step.",
+            file=sys.stderr,
+        )

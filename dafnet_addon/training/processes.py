@@ -15,10 +15,14 @@ def _nothing() -> None:
 
 
 def spread_out(
-    task: Callable[[Any], Any], items: Sequence[Any], processes: int | None = None,
-    progress: Callable[[float], None] = lambda share: None, start: Callable[[], None] = _nothing,
+    task: Callable[[Any], Any],
+    items: Sequence[Any],
+    processes: int | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+    start: Callable[[], None] = _nothing,
 ) -> Iterator[Any]:
-    """``task`` of each item, in order, in ``processes`` (None: one for each core), each of which first calls ``start``.
+    """``task`` of each item, in order, in ``processes`` (None: one for each core), each of which
+    first calls ``start``.
 
     Where one is enough it is this one, without what a new process costs.
     """

@@ -1,4 +1,6 @@
-"""Training on several devices: each rank of ``torchrun`` draws its own windows; gradients are averaged, rank 0 saves."""
+"""Training on several devices: each rank of ``torchrun`` draws its own windows; gradients are
+averaged, rank 0 saves.
+"""
 
 import os
 
@@ -27,7 +29,8 @@ def rank() -> int:
 
 
 def device_of(device: str) -> str:
-    """The device of this rank: the one asked for, where that is 'cuda' the one that ``torchrun`` gave it.
+    """The device of this rank: the one asked for, where that is 'cuda' the one that ``torchrun``
+    gave it.
 
     Raises InputError where it is not there.
     """
@@ -36,7 +39,9 @@ def device_of(device: str) -> str:
         torch.zeros(1, device=device)
     except (RuntimeError, AssertionError) as error:  # torch asserts that it was built for a device
         reason = str(error).split("\n")[0].rstrip(".")
-        raise InputError(f"The device '{device}' cannot be used ({reason}); name another, 'cpu' for one.") from None
+        raise InputError(
+            f"The device '{device}' cannot be used ({reason}); name another, 'cpu' for one."
+        ) from None
     return device
 
 
@@ -58,7 +63,9 @@ def mean(value: float, device: torch.device) -> float:
 
 
 def from_first(network: nn.Module) -> None:
-    """Give every rank rank 0's parameters: the first batch, which sets activation norms, is another one on each."""
+    """Give every rank rank 0's parameters: the first batch, which sets activation norms, is another
+    one on each.
+    """
     if joined():
         for parameter in network.parameters():
             dist.broadcast(parameter.data, 0)

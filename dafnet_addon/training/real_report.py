@@ -1,4 +1,6 @@
-"""How weights do among real furniture: body by body, maker by maker and kind by kind, beside the captured motion itself."""
+"""How weights do among real furniture: body by body, maker by maker and kind by kind, beside the
+captured motion itself.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -11,20 +13,45 @@ __all__ = ["real_report", "real_text"]
 
 _RUNS = ("ground_truth", "free_t0", "free_t0_clean", "free_t1", "ee_t0", "ee_t0_clean")
 _COLUMNS = (
-    "clips", "seat_episodes", "sits_within_2cm", "sits_within_4cm", "sits_within_8cm", "seat_error_median",
-    "end_effector_error", "foot_sliding_per_frame", "skate_cm", "bad_collisions_per_frame", "penetrates",
-    "penetration_deepest", "jerk", "speed_wrists", "speed_head", "speed_chest", "speed_slow", "speed_middle", "speed_quick",
-    "sway", "descent_seconds", "lean_degrees",
+    "clips",
+    "seat_episodes",
+    "sits_within_2cm",
+    "sits_within_4cm",
+    "sits_within_8cm",
+    "seat_error_median",
+    "end_effector_error",
+    "foot_sliding_per_frame",
+    "skate_cm",
+    "bad_collisions_per_frame",
+    "penetrates",
+    "penetration_deepest",
+    "jerk",
+    "speed_wrists",
+    "speed_head",
+    "speed_chest",
+    "speed_slow",
+    "speed_middle",
+    "speed_quick",
+    "sway",
+    "descent_seconds",
+    "lean_degrees",
 )
 _GROUPS: dict[str, Callable[[HeldClip], str]] = {
-    "kind": lambda clip: clip.kind, "maker": lambda clip: clip.maker, "body": lambda clip: clip.body,
+    "kind": lambda clip: clip.kind,
+    "maker": lambda clip: clip.maker,
+    "body": lambda clip: clip.body,
 }
 
 
 def real_report(
-    weights: Weights, clips: Sequence[HeldClip], progress: Callable[[float], None] = lambda share: None, seeds: int = 3,
+    weights: Weights,
+    clips: Sequence[HeldClip],
+    progress: Callable[[float], None] = lambda share: None,
+    seeds: int = 3,
 ) -> dict[str, Any]:
-    """Rows (``evaluate.row``) over all clips of ``real_test``, and over those of each kind of piece, maker and body."""
+    """Rows (``evaluate.row``) over all clips of ``real_test``, and over those of each kind of
+    piece, maker and body.
+    """
     found = measured(weights, clips, progress, seeds=seeds, modes=("FREE", "EE"))
     seated = [each for each in found if each.clip.room != "bed"]
     lying = [each for each in found if each.clip.room == "bed"]

@@ -1,6 +1,8 @@
-"""All that weights have to show on bodies they never saw: clips beside themselves, drift, seats, actions, likelihood.
+"""All that weights have to show on bodies they never saw: clips beside themselves, drift, seats,
+actions, likelihood.
 
-One dictionary, JSON all through; every figure stands beside the number of clips, takes or episodes that it is of.
+One dictionary, JSON all through; every figure stands beside the number of clips, takes or episodes
+that it is of.
 """
 
 from collections import defaultdict
@@ -62,13 +64,24 @@ _HEIGHTS = {"low": 0.35, "medium": 0.45, "high": 0.60}
 _RIGHT_HEIGHT, _SITS_WITHIN, _STANDS_ABOVE = 0.05, 0.06, 0.86  # metres
 _AWAY = 0.8  # metres from a seat's middle, beyond which one stands
 _LIKELY = 0.02  # share of frames in which an action has to be the likeliest
-_SHEETS_OF = {"sit down or up": 4, "composed": 3, "desk or shelf": 3, "bed": 2, "sit": 2, "walk": 3, "reach": 1, "stand": 2}
+_SHEETS_OF = {
+    "sit down or up": 4,
+    "composed": 3,
+    "desk or shelf": 3,
+    "bed": 2,
+    "sit": 2,
+    "walk": 3,
+    "reach": 1,
+    "stand": 2,
+}
 _A_SHEET, _COLOURS = 4, 48  # clips on a sheet; colours that it is reduced to
 
 
 @dataclass(frozen=True)
 class Room:
-    """A root path among seats: ``boxes`` (B, 7); ``heights`` of the seats by the names of the route's stops."""
+    """A root path among seats: ``boxes`` (B, 7); ``heights`` of the seats by the names of the
+    route's stops.
+    """
 
     name: str
     boxes: np.ndarray
@@ -79,7 +92,11 @@ class Room:
 def _seat(stop: Stop, height: float, back: bool) -> np.ndarray:
     """A seat of boxes at a stop: a slab on four legs, and a back where asked for."""
     rows = [box((0.0, 0.01, height - 0.025), (0.44, 0.44, 0.05))]
-    rows += [box((x, 0.01 + y, height / 2 - 0.025), (0.04, 0.04, height - 0.05)) for x in (-0.2, 0.2) for y in (-0.2, 0.2)]
+    rows += [
+        box((x, 0.01 + y, height / 2 - 0.025), (0.04, 0.04, height - 0.05))
+        for x in (-0.2, 0.2)
+        for y in (-0.2, 0.2)
+    ]
     if back:
         rows.append(box((0.0, -0.23, height + 0.185), (0.44, 0.04, 0.47)))
     return placed(np.array(rows), np.array(stop.position), stop.yaw)
@@ -90,19 +107,42 @@ def _round_walk(mirror: float, seconds: float) -> Route:
     stand = Stop((mirror * 1.2, 3.4), facing((0.0, -1.0)), seconds)
     chair = Stop((0.0, 0.0), 0.0, seconds, seated=True, name="chair")
     stool = Stop((mirror * 3.0, 2.0), facing((-mirror, 0.0)), seconds, seated=True, name="stool")
-    once: tuple[Point | Stop, ...] = ((mirror * 0.12, 1.5), chair, (mirror * 1.2, 1.3), stool, stand)
+    once: tuple[Point | Stop, ...] = (
+        (mirror * 0.12, 1.5),
+        chair,
+        (mirror * 1.2, 1.3),
+        stool,
+        stand,
+    )
     return route(stand, *(once * _LOOPS))
 
 
 def long_rooms() -> list[Room]:
-    """Rooms walked round three times in a minute, each round the same: what differs between rounds is drift."""
+    """Rooms walked round three times in a minute, each round the same: what differs between rounds
+    is drift.
+    """
     rooms = []
-    for mirror, chair, stool in ((1.0, 0.45, 0.40), (-1.0, 0.50, 0.45), (1.0, 0.42, 0.55), (-1.0, 0.45, 0.60)):
+    for mirror, chair, stool in (
+        (1.0, 0.45, 0.40),
+        (-1.0, 0.50, 0.45),
+        (1.0, 0.42, 0.55),
+        (-1.0, 0.45, 0.60),
+    ):
         # A round is to last 600 frames: what it lacks is shared out among its three rests.
         brief = _round_walk(mirror, 1.0)
         walked = _round_walk(mirror, 1.0 + (_MINUTE / _LOOPS - brief.rests[3].first) / 90.0)
-        seats = [_seat(walked.rests[k].stop, height, back) for k, height, back in ((1, chair, True), (2, stool, False))]
-        rooms.append(Room(f"{chair:.2f}, {stool:.2f} m", np.concatenate(seats), walked, {"chair": chair, "stool": stool}))
+        seats = [
+            _seat(walked.rests[k].stop, height, back)
+            for k, height, back in ((1, chair, True), (2, stool, False))
+        ]
+        rooms.append(
+            Room(
+                f"{chair:.2f}, {stool:.2f} m",
+                np.concatenate(seats),
+                walked,
+                {"chair": chair, "stool": stool},
+            )
+        )
     return rooms
 
 
@@ -116,7 +156,8 @@ def seat_rooms() -> list[Room]:
     }
     return [
         Room(f"{way}, {name}", _seat(stop, height, back=True), walked, {"seat": height})
-        for way, walked in ways.items() for name, height in _HEIGHTS.items()
+        for way, walked in ways.items()
+        for name, height in _HEIGHTS.items()
     ]
 
 
@@ -124,30 +165,58 @@ def _walk(sampler: Sampler, room: Room, seeds: int) -> np.ndarray:
     """Takes (1 + seeds, T, 22, 3) in a room: temperature 0 first, then 1."""
     controls = Controls(fps=30.0, root=room.walked.path.matrices())
     shot = drained(shot_steps(Furnishing(room.boxes).scene(), controls))
-    return made(sampler, shot, np.concatenate([sampler.noise(0, temperature=0.0), *(sampler.noise(s) for s in range(seeds))]))
+    return made(
+        sampler,
+        shot,
+        np.concatenate(
+            [sampler.noise(0, temperature=0.0), *(sampler.noise(s) for s in range(seeds))]
+        ),
+    )
 
 
 def _round(room: Room, takes: np.ndarray, first: int, last: int) -> Figures:
-    """Figures of takes (S, T, 22, 3) in frames ``first`` to ``last``; a seat's right height is that of its top plus 0.12 m."""
+    """Figures of takes (S, T, 22, 3) in frames ``first`` to ``last``; a seat's right height is that
+    of its top plus 0.12 m.
+    """
     walked, scene = room.walked, Furnishing(room.boxes).scene()
     cut = takes[:, first:last]
     flat, weight = cut.reshape(-1, 22, 3), float(cut.shape[0] * cut.shape[1])
     reach = partial(distance, scene, floor=0.0)
     places = np.array([rest.stop.position for rest in walked.rests if rest.stop.seated])
-    away = np.linalg.norm(walked.path.position[first:last, None, :2] - places, axis=-1).min(1) > _AWAY
+    away = (
+        np.linalg.norm(walked.path.position[first:last, None, :2] - places, axis=-1).min(1) > _AWAY
+    )
     seats = [
-        float(np.median(take[r.first : r.last + 1, 0, 2]) - room.heights[r.stop.name] - SEAT_TO_PELVIS)
-        for take in takes for r in walked.rests if r.stop.seated and first <= r.first < last
+        float(
+            np.median(take[r.first : r.last + 1, 0, 2]) - room.heights[r.stop.name] - SEAT_TO_PELVIS
+        )
+        for take in takes
+        for r in walked.rests
+        if r.stop.seated and first <= r.first < last
     ]
     each = [(foot_sliding(j, 30.0).mean(), skate(j, 30.0), jerk(j, 30.0)) for j in cut]
     sliding, skating, jerking = (np.array(each).mean(0) * weight).tolist()
-    return Figures({
-        "foot_sliding_per_frame": (sliding, weight), "skate_cm": (skating, weight), "jerk": (jerking, weight),
-        "bad_collisions_per_frame": (float(bad_collisions(reach(flat[:, list(BAD_COLLISION_JOINTS)])).sum()), weight),
-        "penetration_mean": (penetration(reach(body_points(flat)))[0] * weight, weight),
-        "sits_within_6cm": (float(sum(abs(error) <= _SITS_WITHIN for error in seats)), float(len(seats))),
-        "stands_when_it_should": (float((cut[:, away, 0, 2] > _STANDS_ABOVE).sum()), float(cut.shape[0] * away.sum())),
-    }, seats)
+    return Figures(
+        {
+            "foot_sliding_per_frame": (sliding, weight),
+            "skate_cm": (skating, weight),
+            "jerk": (jerking, weight),
+            "bad_collisions_per_frame": (
+                float(bad_collisions(reach(flat[:, list(BAD_COLLISION_JOINTS)])).sum()),
+                weight,
+            ),
+            "penetration_mean": (penetration(reach(body_points(flat)))[0] * weight, weight),
+            "sits_within_6cm": (
+                float(sum(abs(error) <= _SITS_WITHIN for error in seats)),
+                float(len(seats)),
+            ),
+            "stands_when_it_should": (
+                float((cut[:, away, 0, 2] > _STANDS_ABOVE).sum()),
+                float(cut.shape[0] * away.sum()),
+            ),
+        },
+        seats,
+    )
 
 
 def _rounds(sampler: Sampler, room: Room) -> dict[str, Figures]:
@@ -165,7 +234,9 @@ def _rounds(sampler: Sampler, room: Room) -> dict[str, Figures]:
 def _heights(sampler: Sampler, room: Room) -> list[float]:
     """Height of the pelvis of every take while the root rests on the seat."""
     seat = Seat("seat", np.array([0.0, 0.0, room.heights["seat"]]))
-    reports = [seat_report(take, room.walked.path, 30.0, [seat])[0] for take in _walk(sampler, room, SEEDS)]
+    reports = [
+        seat_report(take, room.walked.path, 30.0, [seat])[0] for take in _walk(sampler, room, SEEDS)
+    ]
     return [float(report["pelvis_height"] or np.nan) for report in reports]
 
 
@@ -175,7 +246,9 @@ def _drift(weights: Weights, progress: Callable[[float], None]) -> dict[str, dic
 
 
 def _seats(weights: Weights, progress: Callable[[float], None]) -> dict[str, Any]:
-    """Pelvis over seats of three heights on the same root path, and how often all three are right."""
+    """Pelvis over seats of three heights on the same root path, and how often all three are
+    right.
+    """
     rooms = seat_rooms()
     found = np.array(list(in_processes(weights, _heights, rooms, progress)))
     found = found.reshape(-1, len(_HEIGHTS), found.shape[1])  # way, height, take
@@ -188,7 +261,8 @@ def _seats(weights: Weights, progress: Callable[[float], None]) -> dict[str, Any
             "all_three_right": round(float(right[:, :, takes].all(1).mean()), 4),
             **{
                 name: {
-                    "seat": _HEIGHTS[name], "wanted": round(float(wanted[k, 0]), 4),
+                    "seat": _HEIGHTS[name],
+                    "wanted": round(float(wanted[k, 0]), 4),
                     "pelvis_median": round(float(np.median(found[:, k, takes])), 4),
                     "right": round(float(right[:, k, takes].mean()), 4),
                 }
@@ -200,7 +274,9 @@ def _seats(weights: Weights, progress: Callable[[float], None]) -> dict[str, Any
 
 @dataclass(frozen=True)
 class _Followed:
-    """The model led along a real clip: actions (T, K), and nats a frame (T,) of negative log-likelihood."""
+    """The model led along a real clip: actions (T, K), and nats a frame (T,) of negative
+    log-likelihood.
+    """
 
     clip: HeldClip
     actions: np.ndarray
@@ -208,7 +284,9 @@ class _Followed:
 
 
 def _followed(sampler: Sampler, task: tuple[HeldClip, np.ndarray | None]) -> _Followed:
-    """Actions and likelihood of a clip's true poses, FREE, in metres, with the noise of training; of other actions if given."""
+    """Actions and likelihood of a clip's true poses, FREE, in metres, with the noise of training;
+    of other actions if given.
+    """
     clip, actions = task
     shot = shot_of(clip, "FREE")
     rng = np.random.default_rng(len(clip.joints))
@@ -226,22 +304,34 @@ def _followed(sampler: Sampler, task: tuple[HeldClip, np.ndarray | None]) -> _Fo
     return _Followed(clip, np.array(seen[PREROLL:]), np.array(nats[PREROLL:]))
 
 
-def _actions(weights: Weights, clips: Sequence[HeldClip], progress: Callable[[float], None]) -> dict[str, Any]:
-    """What the action predictor, if there is one, says along real clips, and what its word is worth to the likelihood."""
-    first: list[_Followed] = list(in_processes(weights, _followed, [(c, None) for c in clips], lambda p: progress(p / 2)))
+def _actions(
+    weights: Weights, clips: Sequence[HeldClip], progress: Callable[[float], None]
+) -> dict[str, Any]:
+    """What the action predictor, if there is one, says along real clips, and what its word is worth
+    to the likelihood.
+    """
+    first: list[_Followed] = list(
+        in_processes(weights, _followed, [(c, None) for c in clips], lambda p: progress(p / 2))
+    )
     actions = np.concatenate([each.actions for each in first])
     activity = np.repeat([c.activity for c in clips], [len(c.joints) for c in clips])
     present = [name for name in ACTIVITIES if (activity == name).any()]
 
-    def over(chosen: Sequence[str], values: Sequence[np.ndarray]) -> tuple[dict[str, Any], list[float]]:
+    def over(
+        chosen: Sequence[str], values: Sequence[np.ndarray]
+    ) -> tuple[dict[str, Any], list[float]]:
         """Row and clip means of nats (one array for each clip) in clips of these activities."""
         of_them = [n for each, n in zip(first, values, strict=True) if each.clip.activity in chosen]
-        return row([Figures({"nats": (float(n.sum()), float(len(n)))}) for n in of_them]), [float(n.mean()) for n in of_them]
+        return row([Figures({"nats": (float(n.sum()), float(len(n)))}) for n in of_them]), [
+            float(n.mean()) for n in of_them
+        ]
 
     def plain(chosen: Sequence[str]) -> dict[str, Any]:
         own, means = over(chosen, [each.nats for each in first])
         return {
-            "clips": len(means), "nll": own["nats"], "nll_interval": own["intervals"]["nats"],
+            "clips": len(means),
+            "nll": own["nats"],
+            "nll_interval": own["intervals"]["nats"],
             "nll_median_clip": round(float(np.median(means)), 3),
         }
 
@@ -252,15 +342,21 @@ def _actions(weights: Weights, clips: Sequence[HeldClip], progress: Callable[[fl
     mixed = actions[np.random.default_rng(0).permutation(len(actions))].astype(np.float32)
     cuts = np.cumsum([len(c.joints) for c in clips])[:-1]
     tasks = list(zip(clips, np.split(mixed, cuts), strict=True))
-    second: list[_Followed] = list(in_processes(weights, _followed, tasks, lambda p: progress(0.5 + p / 2)))
+    second: list[_Followed] = list(
+        in_processes(weights, _followed, tasks, lambda p: progress(0.5 + p / 2))
+    )
     likeliest = actions.argmax(1)
     share = np.bincount(likeliest, minlength=actions.shape[1]) / len(likeliest)
 
     def nats(chosen: Sequence[str]) -> dict[str, Any]:
-        """Of clips of these activities: mean and median clip, and what mixed actions add to the mean."""
+        """Of clips of these activities: mean and median clip, and what mixed actions add to the
+        mean.
+        """
         rise, means = over(chosen, [b.nats - a.nats for a, b in zip(first, second, strict=True)])
         return {
-            **plain(chosen), "shuffled_adds": rise["nats"], "shuffled_adds_interval": rise["intervals"]["nats"],
+            **plain(chosen),
+            "shuffled_adds": rise["nats"],
+            "shuffled_adds_interval": rise["intervals"]["nats"],
             "shuffled_adds_median_clip": round(float(np.median(means)), 3),
             "shuffled_worse_in_clips": round(float(np.mean(np.array(means) > 0)), 4),
         }
@@ -273,7 +369,10 @@ def _actions(weights: Weights, clips: Sequence[HeldClip], progress: Callable[[fl
         "shares": {
             "all": [round(float(s), 3) for s in share],
             **{
-                name: [round(float((likeliest[activity == name] == k).mean()), 3) for k in range(len(share))]
+                name: [
+                    round(float((likeliest[activity == name] == k).mean()), 3)
+                    for k in range(len(share))
+                ]
                 for name in present
             },
         },
@@ -282,29 +381,51 @@ def _actions(weights: Weights, clips: Sequence[HeldClip], progress: Callable[[fl
 
 
 def _diversity(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
-    """APD of the upper body by mode; of the legs under one upper body, and whether those stand on the floor and in nothing."""
+    """APD of the upper body by mode; of the legs under one upper body, and whether those stand on
+    the floor and in nothing.
+    """
     lively = rows_of(clips, ["free_t1", "ee_t1", "full_t1"])
     legs = rows_of(clips, ["ground_truth", "free_t0", "legs"])
-    fit = ("feet_off_floor", "toes_under_floor", "legs_penetration_mean", "foot_sliding_per_frame", "sits_within_6cm")
+    fit = (
+        "feet_off_floor",
+        "toes_under_floor",
+        "legs_penetration_mean",
+        "foot_sliding_per_frame",
+        "sits_within_6cm",
+    )
 
     def kept(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
         names = [name for name in names if name in values]
         return {
-            "clips": values["clips"], "seat_episodes": values["seat_episodes"], **{name: values[name] for name in names},
+            "clips": values["clips"],
+            "seat_episodes": values["seat_episodes"],
+            **{name: values[name] for name in names},
             "intervals": {name: values["intervals"][name] for name in names},
         }
 
     out = {run: kept(values, ["apd_upper", "apd_legs"]) for run, values in lively.items()}
-    out["free_t1"]["over_ee"] = round(lively["free_t1"]["apd_upper"] / lively["ee_t1"]["apd_upper"], 3)
-    out["ee_t1"]["over_full"] = round(lively["ee_t1"]["apd_upper"] / lively["full_t1"]["apd_upper"], 3)
-    out |= {run if run != "legs" else "legs_vary_t1": kept(v, ["apd_upper", "apd_legs", *fit]) for run, v in legs.items()}
+    out["free_t1"]["over_ee"] = round(
+        lively["free_t1"]["apd_upper"] / lively["ee_t1"]["apd_upper"], 3
+    )
+    out["ee_t1"]["over_full"] = round(
+        lively["ee_t1"]["apd_upper"] / lively["full_t1"]["apd_upper"], 3
+    )
+    out |= {
+        run if run != "legs" else "legs_vary_t1": kept(v, ["apd_upper", "apd_legs", *fit])
+        for run, v in legs.items()
+    }
     return out
 
 
 def report(
-    weights: Weights, clips: Sequence[HeldClip], progress: Callable[[float], None] = lambda share: None, seed: int = 0
+    weights: Weights,
+    clips: Sequence[HeldClip],
+    progress: Callable[[float], None] = lambda share: None,
+    seed: int = 0,
 ) -> dict[str, Any]:
-    """Everything that is measured, by section: ``rows``, ``by_activity``, ``drift``, ``diversity``, ``seats``, ``actions``."""
+    """Everything that is measured, by section: ``rows``, ``by_activity``, ``drift``, ``diversity``,
+    ``seats``, ``actions``.
+    """
     shares = (0.7, 0.1, 0.1, 0.1)
 
     def part(k: int) -> Callable[[float], None]:
@@ -320,7 +441,8 @@ def report(
         "rows": rows(found),
         "by_activity": {
             name: rows_of(groups[name], ["ground_truth", "free_t0", "ee_t0", "free_t1", "ee_t1"])
-            for name in ACTIVITIES if name in groups
+            for name in ACTIVITIES
+            if name in groups
         },
         "drift": _drift(weights, part(1)),
         "diversity": _diversity(plain),
@@ -331,7 +453,9 @@ def report(
 
 @dataclass(frozen=True)
 class Criterion:
-    """What was asked for and found: ``value`` is to be at least ``must``, better ``goal``; at most, where ``most`` is True."""
+    """What was asked for and found: ``value`` is to be at least ``must``, better ``goal``; at most,
+    where ``most`` is True.
+    """
 
     name: str
     value: float
@@ -342,25 +466,55 @@ class Criterion:
 
     @property
     def met(self) -> str:
-        """"goal", "must" or "no"."""
+        """ "goal", "must" or "no"."""
         sign = -1.0 if self.most else 1.0
-        return "goal" if sign * self.value >= sign * self.goal else "must" if sign * self.value >= sign * self.must else "no"
+        return (
+            "goal"
+            if sign * self.value >= sign * self.goal
+            else "must"
+            if sign * self.value >= sign * self.must
+            else "no"
+        )
 
 
 def criteria(values: dict[str, Any]) -> list[Criterion]:
-    """The figures of a report that weights are judged by, and their bounds: FS within 2, better 1.5 times the real motion's."""
+    """The figures of a report that weights are judged by, and their bounds: FS within 2, better 1.5
+    times the real motion's.
+    """
     found: list[Criterion] = []
 
-    def add(name: str, value: float, must: float, goal: float | None = None, most: bool = False, count: str = "") -> None:
+    def add(
+        name: str,
+        value: float,
+        must: float,
+        goal: float | None = None,
+        most: bool = False,
+        count: str = "",
+    ) -> None:
         found.append(Criterion(name, value, must, must if goal is None else goal, most, count))
 
     rows = values["rows"]
 
     def against_real(real: dict[str, Any], run: dict[str, Any], label: str) -> None:
         clips = f"{run['clips']} clips"
-        slides, collides = (real[f"{name}_per_frame"] for name in ("foot_sliding", "bad_collisions"))
-        add(f"{label}: FS", run["foot_sliding_per_frame"], 2.0 * slides, 1.5 * slides, most=True, count=clips)
-        add(f"{label}: BCC", run["bad_collisions_per_frame"], max(1.2 * collides, collides + 0.02), most=True, count=clips)
+        slides, collides = (
+            real[f"{name}_per_frame"] for name in ("foot_sliding", "bad_collisions")
+        )
+        add(
+            f"{label}: FS",
+            run["foot_sliding_per_frame"],
+            2.0 * slides,
+            1.5 * slides,
+            most=True,
+            count=clips,
+        )
+        add(
+            f"{label}: BCC",
+            run["bad_collisions_per_frame"],
+            max(1.2 * collides, collides + 0.02),
+            most=True,
+            count=clips,
+        )
 
     for suffix in ("", "_at_desks_and_shelves", "_on_beds", "_composed"):
         for run in ("free_t0", "free_t1", "ee_t0", "ee_t1", "full_t0", "full_t1"):
@@ -368,35 +522,93 @@ def criteria(values: dict[str, Any]) -> list[Criterion]:
                 continue
             row_, label = rows[run + suffix], (run + suffix).replace("_", " ")
             if "sits_within_6cm" in row_:
-                add(f"{label}: sits", row_["sits_within_6cm"], 0.85, 0.95, count=f"{row_['seat_episodes']} episodes")
+                add(
+                    f"{label}: sits",
+                    row_["sits_within_6cm"],
+                    0.85,
+                    0.95,
+                    count=f"{row_['seat_episodes']} episodes",
+                )
             if "stands_when_it_should" in row_:
-                add(f"{label}: stands", row_["stands_when_it_should"], 0.98, count=f"{row_['clips']} clips")
+                add(
+                    f"{label}: stands",
+                    row_["stands_when_it_should"],
+                    0.98,
+                    count=f"{row_['clips']} clips",
+                )
             if run.startswith("ee"):
-                add(f"{label}: EED", row_["end_effector_error"], 0.04, 0.026, most=True, count=f"{row_['clips']} clips")
+                add(
+                    f"{label}: EED",
+                    row_["end_effector_error"],
+                    0.04,
+                    0.026,
+                    most=True,
+                    count=f"{row_['clips']} clips",
+                )
             if run.startswith("full"):
-                add(f"{label}: upper body error", row_["upper_body_error"], 0.02, most=True, count=f"{row_['clips']} clips")
+                add(
+                    f"{label}: upper body error",
+                    row_["upper_body_error"],
+                    0.02,
+                    most=True,
+                    count=f"{row_['clips']} clips",
+                )
             else:
                 against_real(rows["ground_truth" + suffix], row_, label)
     for name, by_run in values["by_activity"].items():
         for run in ("free_t0", "ee_t0"):
             against_real(by_run["ground_truth"], by_run[run], f"{name}, {run.replace('_', ' ')}")
     for temperature in ("t0", "t1"):
-        first, last = (values["drift"][f"{which}_third_{temperature}"] for which in ("first", "last"))
+        first, last = (
+            values["drift"][f"{which}_third_{temperature}"] for which in ("first", "last")
+        )
         takes = f"{last['seat_episodes']} episodes"
         slides = last["foot_sliding_per_frame"] / first["foot_sliding_per_frame"]
-        add(f"drift {temperature}: foot sliding, last over first third", slides, 1.1, most=True, count=takes)
+        add(
+            f"drift {temperature}: foot sliding, last over first third",
+            slides,
+            1.1,
+            most=True,
+            count=takes,
+        )
         lost = first["sits_within_6cm"] - last["sits_within_6cm"]
         add(f"drift {temperature}: sits, first less last third", lost, 0.05, most=True, count=takes)
         seats = values["seats"][temperature]
         right = seats["all_three_right"]
-        add(f"three seats on one path {temperature}: all right", right, 1.0, count=f"{seats['paths_and_seeds']} trios")
+        add(
+            f"three seats on one path {temperature}: all right",
+            right,
+            1.0,
+            count=f"{seats['paths_and_seeds']} trios",
+        )
     diversity, told = values["diversity"], values["actions"]
     clips = f"{told['clips']} clips"
-    add("diversity of the upper body: FREE over EE", diversity["free_t1"]["over_ee"], 2.0, count=clips)
-    add("diversity of the upper body: EE over FULL", diversity["ee_t1"]["over_full"], 2.0, count=clips)
+    add(
+        "diversity of the upper body: FREE over EE",
+        diversity["free_t1"]["over_ee"],
+        2.0,
+        count=clips,
+    )
+    add(
+        "diversity of the upper body: EE over FULL",
+        diversity["ee_t1"]["over_full"],
+        2.0,
+        count=clips,
+    )
     legs, real = diversity["legs_vary_t1"], diversity["ground_truth"]
-    add("legs under one upper body: their diversity over its", legs["apd_legs"] / legs["apd_upper"], 2.0, count=clips)
-    add("legs under one upper body: sits", legs["sits_within_6cm"], 0.85, 0.95, count=f"{legs['seat_episodes']} episodes")
+    add(
+        "legs under one upper body: their diversity over its",
+        legs["apd_legs"] / legs["apd_upper"],
+        2.0,
+        count=clips,
+    )
+    add(
+        "legs under one upper body: sits",
+        legs["sits_within_6cm"],
+        0.85,
+        0.95,
+        count=f"{legs['seat_episodes']} episodes",
+    )
     for name in ("feet_off_floor", "legs_penetration_mean"):
         label = f"legs under one upper body: {name.replace('_', ' ')}"
         add(label, legs[name], max(2.0 * real[name], real[name] + 0.002), most=True, count=clips)
@@ -404,43 +616,87 @@ def criteria(values: dict[str, Any]) -> list[Criterion]:
         return found  # a system without an action predictor
     add("actions: information, nats", told["information_nats"], 1.0, count=clips)
     add("actions: likeliest in 2 % of frames", told["likeliest_in_2_percent"], 6.0, count=clips)
-    add("actions: mutual information with activities", told["normalised_mutual_information"], 0.3, count=clips)
+    add(
+        "actions: mutual information with activities",
+        told["normalised_mutual_information"],
+        0.3,
+        count=clips,
+    )
     shuffled = told["likelihood"]["all"]
     add("actions: nats lost by shuffling them", shuffled["shuffled_adds"], 0.0, count=clips)
-    add("actions: clips that lose by shuffling them", shuffled["shuffled_worse_in_clips"], 0.5, count=clips)
+    add(
+        "actions: clips that lose by shuffling them",
+        shuffled["shuffled_worse_in_clips"],
+        0.5,
+        count=clips,
+    )
     return found
 
 
 def text(values: dict[str, Any]) -> str:
     """A report in Markdown."""
     judged = [
-        f"| {c.name} | {c.value:.3g} | {'≤' if c.most else '≥'} {c.must:.3g} | {c.goal:.3g} | {c.met} | {c.count} |"
+        f"| {c.name} | {c.value:.3g} | {'≤' if c.most else '≥'} {c.must:.3g} | {c.goal:.3g} | "
+        f"{c.met} | {c.count} |"
         for c in criteria(values)
     ]
     head = "| | found | must | goal | met | of |\n|---|---|---|---|---|---|"
-    parts = ["## What has to be seen", "\n".join([head, *judged]), "## Clips", table(values["rows"])]
+    parts = [
+        "## What has to be seen",
+        "\n".join([head, *judged]),
+        "## Clips",
+        table(values["rows"]),
+    ]
     for name, found in values["by_activity"].items():
         parts += [f"### {name[0].upper()}{name[1:]}", table(found)]
     parts += ["## Drift: first and last third of a minute", table(values["drift"])]
     parts += ["## Diversity", table(values["diversity"])]
     seats = [
-        f"| {name}, {way} | {each['seat']:.2f} | {each['wanted']:.2f} | {each['pelvis_median']:.3f} "
+        f"| {name}, {way} | {each['seat']:.2f} | {each['wanted']:.2f} | "
+        f"{each['pelvis_median']:.3f} "
         f"| {100 * each['right']:.0f} % | {found['paths_and_seeds']} |"
-        for way, found in values["seats"].items() for name, each in found.items() if isinstance(each, dict)
+        for way, found in values["seats"].items()
+        for name, each in found.items()
+        if isinstance(each, dict)
     ]
     parts += [
         "## Low, medium and high seats on the same root path",
-        "\n".join(["| | seat, m | pelvis wanted, m | median, m | within 5 cm | takes |", "|---|---|---|---|---|---|", *seats]),
-        ", ".join(f"all three right, {way}: {100 * found['all_three_right']:.0f} %" for way, found in values["seats"].items()),
+        "\n".join(
+            [
+                "| | seat, m | pelvis wanted, m | median, m | within 5 cm | takes |",
+                "|---|---|---|---|---|---|",
+                *seats,
+            ]
+        ),
+        ", ".join(
+            f"all three right, {way}: {100 * found['all_three_right']:.0f} %"
+            for way, found in values["seats"].items()
+        ),
     ]
     told = values["actions"]
-    lines = [f"- {name.replace('_', ' ')}: {value}" for name, value in told.items() if not isinstance(value, dict)]
-    lines += [f"- likeliest action, {name}: {shares}" for name, shares in told.get("shares", {}).items()]
-    parts += ["## Action predictor and likelihood (nats a frame, poses in metres, 3 mm of noise)", "\n".join(lines)]
+    lines = [
+        f"- {name.replace('_', ' ')}: {value}"
+        for name, value in told.items()
+        if not isinstance(value, dict)
+    ]
+    lines += [
+        f"- likeliest action, {name}: {shares}" for name, shares in told.get("shares", {}).items()
+    ]
+    parts += [
+        "## Action predictor and likelihood (nats a frame, poses in metres, 3 mm of noise)",
+        "\n".join(lines),
+    ]
     names = list(told["likelihood"]["all"])
-    head = "| | " + " | ".join(name.replace("_", " ") for name in names) + " |\n" + "|---" * (len(names) + 1) + "|"
+    head = (
+        "| | "
+        + " | ".join(name.replace("_", " ") for name in names)
+        + " |\n"
+        + "|---" * (len(names) + 1)
+        + "|"
+    )
     body = [
-        f"| {label} | " + " | ".join(str(found[name]) for name in names) + " |" for label, found in told["likelihood"].items()
+        f"| {label} | " + " | ".join(str(found[name]) for name in names) + " |"
+        for label, found in told["likelihood"].items()
     ]
     return "\n\n".join([*parts, "\n".join([head, *body])])
 
@@ -452,25 +708,35 @@ def _kind(clip: HeldClip) -> str:
 
 
 def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) -> list[Path]:
-    """Twenty held-out clips of unseen bodies, real above FREE at temperature 0, drawn into ``folder``; the files."""
+    """Twenty held-out clips of unseen bodies, real above FREE at temperature 0, drawn into
+    ``folder``; the files.
+    """
     from PIL import Image
 
     chosen: list[HeldClip] = []
     for kind, count in _SHEETS_OF.items():
         of_it = [clip for clip in clips if clip.unseen and _kind(clip) == kind]
-        chosen += [of_it[i] for i in np.unique(np.linspace(0, len(of_it) - 1, min(count, len(of_it))).astype(int))]
+        chosen += [
+            of_it[i]
+            for i in np.unique(np.linspace(0, len(of_it) - 1, min(count, len(of_it))).astype(int))
+        ]
     takes = in_processes(weights, _calm, chosen, lambda share: None)
     drawn: list[Row] = [
         (f"{clip.name}, {kind}", joints, clip.furniture)
         for clip, take in zip(chosen, takes, strict=True)
-        for kind, joints in (("composed" if clip.composed else "real", clip.joints), ("generated", take))
+        for kind, joints in (
+            ("composed" if clip.composed else "real", clip.joints),
+            ("generated", take),
+        )
     ]
     files = []
     for k in range(0, len(drawn), 2 * _A_SHEET):
         files.append(folder / f"held_out_{k // (2 * _A_SHEET) + 1}.png")
         sheet(files[-1], drawn[k : k + 2 * _A_SHEET])
         with Image.open(files[-1]) as picture:
-            flat = picture.convert("RGB").quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+            flat = picture.convert("RGB").quantize(
+                _COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
+            )
         with whole_file(files[-1]) as part:
             flat.save(part, format="PNG", optimize=True)
     return files

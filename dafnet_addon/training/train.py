@@ -1,9 +1,10 @@
 """Trains the action predictor, then the two-part flow on top of it (paper, section 5.1, figure 7).
 
-A run lives in a folder: ``predictor.checkpoint``, ``upper.checkpoint``, ``lower.checkpoint`` (each resumes exactly where it
-was saved), ``log.jsonl``, and ``tensorboard``.
-Time, not steps, is the budget: the learning rate stays, and falls as the last of the minutes are spent. A run that gets more of
-them goes on from before it fell, so that a training may run for days and give weights at any time.
+A run lives in a folder: ``predictor.checkpoint``, ``upper.checkpoint``, ``lower.checkpoint`` (each
+resumes exactly where it was saved), ``log.jsonl``, and ``tensorboard``. Time, not steps, is the
+budget: the learning rate stays, and falls as the last of the minutes are spent. A run that gets
+more of them goes on from before it fell, so that a training may run for days and give weights at
+any time.
 """
 
 import json
@@ -55,26 +56,40 @@ from .export import adopt_part, adopt_predictor, adopted_statistics
 from .free_run import lower_loss, upper_loss
 
 __all__ = [
-    "TrainingConfig", "read_config", "Run", "account", "clock_of", "dataset_pool", "descend", "train", "train_part", "trained",
+    "TrainingConfig",
+    "read_config",
+    "Run",
+    "account",
+    "clock_of",
+    "dataset_pool",
+    "descend",
+    "train",
+    "train_part",
+    "trained",
 ]
 
 _MOST_NUMBERS = 1 << 28
 _HELD = "-held"  # behind the name of a part: its checkpoint from before its rate fell
-"""Of the networks that a checkpoint's settings describe: a GB; the paper's sizes are a seventh of it."""
+"""Of the networks that a checkpoint's settings describe: a GB; the paper's sizes are a seventh of
+it.
+"""
 
 
 @dataclass(frozen=True)
 class TrainingConfig:
-    """``minutes_predictor``, ``minutes_flow``: time budgets; ``steps_flow``, where not 0, is the flow's instead. Learning rates
-    rise over ``warmup`` steps to ``peak``, stay there, and fall straight to ``final`` over the last ``cool_down`` share of the
-    budget: a run that gets a larger budget goes on from before it cooled. What a run is worth are its weights averaged over
-    about 1 / (1 - ``average``) steps. ``slot_dropout``: share of past-pose slots
-    hidden from the predictor while it learns, and of past poses hidden from MoGlow. ``environment_dropout``: share of sensor
-    values hidden from all, in a share ``dropout_windows`` of the windows (the paper hides them in all; then only whole layers
-    of spheres are told apart, and seats are met to 12 cm). ``clip_norm``: largest gradient norm. ``free_run``: weight of the
-    losses of motion that the flow makes by itself (see ``free_run``; 0 as in the paper), which begins after ``captured``
-    frames of a window, in a share ``cold`` of the batches after the first, with an empty memory, as a take begins; ``calm`` of
-    the windows make it from z = 0. ``mixed``: LSTMs and environment encoders compute in bfloat16, where the device can.
+    """``minutes_predictor``, ``minutes_flow``: time budgets; ``steps_flow``, where not 0, is the
+    flow's instead. Learning rates rise over ``warmup`` steps to ``peak``, stay there, and fall
+    straight to ``final`` over the last ``cool_down`` share of the budget: a run that gets a larger
+    budget goes on from before it cooled. What a run is worth are its weights averaged over about 1
+    / (1 - ``average``) steps. ``slot_dropout``: share of past-pose slots hidden from the predictor
+    while it learns, and of past poses hidden from MoGlow. ``environment_dropout``: share of sensor
+    values hidden from all, in a share ``dropout_windows`` of the windows (the paper hides them in
+    all; then only whole layers of spheres are told apart, and seats are met to 12 cm).
+    ``clip_norm``: largest gradient norm. ``free_run``: weight of the losses of motion that the flow
+    makes by itself (see ``free_run``; 0 as in the paper), which begins after ``captured`` frames of
+    a window, in a share ``cold`` of the batches after the first, with an empty memory, as a take
+    begins; ``calm`` of the windows make it from z = 0. ``mixed``: LSTMs and environment encoders
+    compute in bfloat16, where the device can.
     """
 
     minutes_predictor: float = 5.0
@@ -108,7 +123,12 @@ class TrainingConfig:
 
     def share(self, step: int, seconds: float) -> float:
         """Share of the flow's budget that is spent."""
-        return min(1.0, step / self.steps_flow if self.steps_flow else seconds / max(60.0 * self.minutes_flow, 1e-9))
+        return min(
+            1.0,
+            step / self.steps_flow
+            if self.steps_flow
+            else seconds / max(60.0 * self.minutes_flow, 1e-9),
+        )
 
     def rate(self, step: int, share: float) -> float:
         """Learning rate of the step after ``step`` steps, ``share`` of the budget being spent."""
@@ -118,35 +138,54 @@ class TrainingConfig:
 
 
 def read_config(file: Path) -> tuple[ModelConfig, TrainingConfig]:
-    """Model and training configuration of a TOML file: ``preset``, ``[model]`` and ``[training]`` override the defaults.
+    """Model and training configuration of a TOML file: ``preset``, ``[model]`` and ``[training]``
+    override the defaults.
 
-    Raises InputError where the file cannot be read, or a setting is unknown, of another type or out of range.
+    Raises InputError where the file cannot be read, or a setting is unknown, of another type or out
+    of range.
     """
     try:
         table = tomllib.loads(Path(file).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise InputError(f"The configuration '{file}' cannot be read ({error}); check the path and its TOML.") from error
+        raise InputError(
+            f"The configuration '{file}' cannot be read ({error}); check the path and its TOML."
+        ) from error
     presets = {"paper": PAPER.as_dict(), "small": SMALL.as_dict()}
-    preset, given, training = table.pop("preset", "small"), table.pop("model", {}), table.pop("training", {})
+    preset, given, training = (
+        table.pop("preset", "small"),
+        table.pop("model", {}),
+        table.pop("training", {}),
+    )
     if not isinstance(preset, str) or preset not in presets:
         raise InputError(f"The preset '{preset}' is unknown; use one of {', '.join(presets)}.")
     try:
         if table or not isinstance(given, dict):
-            raise ValueError(f"unknown setting '{min(table, default='model')}' outside of [model] and [training]")
+            raise ValueError(
+                f"unknown setting '{min(table, default='model')}' outside of [model] and [training]"
+            )
         return typed(ModelConfig, {**presets[preset], **given}), typed(TrainingConfig, training)
     except ValueError as error:
-        raise InputError(f"The configuration '{file}' cannot be used ({error}); change it there.") from None
+        raise InputError(
+            f"The configuration '{file}' cannot be used ({error}); change it there."
+        ) from None
 
 
 class Run:
-    """One network in training: 'predictor' (within its GMVAE), the flow's 'upper' or 'lower' part, or a baseline's 'whole'.
+    """One network in training: 'predictor' (within its GMVAE), the flow's 'upper' or 'lower' part,
+    or a baseline's 'whole'.
 
-    The likelihood is a sum of the two parts', and the second is trained under the true first: given the predictor they have
-    nothing in common, and are trained as two runs, side by side where there are two cores.
+    The likelihood is a sum of the two parts', and the second is trained under the true first: given
+    the predictor they have nothing in common, and are trained as two runs, side by side where there
+    are two cores.
     """
 
     def __init__(
-        self, part: str, folder: Path, model: ModelConfig, config: TrainingConfig, statistics: Statistics,
+        self,
+        part: str,
+        folder: Path,
+        model: ModelConfig,
+        config: TrainingConfig,
+        statistics: Statistics,
         device: str = "cpu",
     ) -> None:
         torch.manual_seed(config.seed)
@@ -164,10 +203,14 @@ class Run:
         """The parameters, averaged over the last steps."""
         self.step, self.seconds = 0, 0.0
         self.adopted = ""
-        """How the weights that the run began with were trained, in their own words; nothing where it began anew."""
+        """How the weights that the run began with were trained, in their own words; nothing where
+        it began anew.
+        """
 
     def adopt(self, weights: Weights) -> None:
-        """Begin with what these weights have learnt. Raises WeightsError where they do not fit into this model."""
+        """Begin with what these weights have learnt. Raises WeightsError where they do not fit into
+        this model.
+        """
         if self.part == "predictor":
             adopt_predictor(self.gmvae.predictor, weights)
         else:
@@ -177,10 +220,16 @@ class Run:
 
     @torch.no_grad()
     def average(self) -> None:
-        """Take the parameters after a step into their average: at first all alike, then the older the less."""
+        """Take the parameters after a step into their average: at first all alike, then the older
+        the less.
+        """
         keep = min(self.config.average, self.step / (self.step + 10.0))
         parameters = dict(self.network.named_parameters())
-        torch._foreach_lerp_(list(self.averaged.values()), [parameters[name].data for name in self.averaged], 1.0 - keep)
+        torch._foreach_lerp_(
+            list(self.averaged.values()),
+            [parameters[name].data for name in self.averaged],
+            1.0 - keep,
+        )
 
     @contextmanager
     def with_average(self) -> Iterator[nn.Module]:
@@ -215,26 +264,44 @@ class Run:
         return self.config.share(self.step, self.seconds)
 
     def save(self, name: str = "") -> None:
-        """Keep the run as it is, to be gone on with exactly from here; under another ``name`` than its part's, where given."""
-        statistics = {name: torch.from_numpy(value.astype(float)) for name, value in asdict(self.statistics).items()}
+        """Keep the run as it is, to be gone on with exactly from here; under another ``name`` than
+        its part's, where given.
+        """
+        statistics = {
+            name: torch.from_numpy(value.astype(float))
+            for name, value in asdict(self.statistics).items()
+        }
         tensors = {
             **of_training(self.network, self.optimiser),
             **{f"averaged.{name}": value for name, value in self.averaged.items()},
             **{f"generator.{name}": state for name, state in generators(self.device).items()},
             **{f"statistics.{name}": values for name, values in statistics.items()},
         }
-        write_checkpoint(checkpoint_file(self.folder, name or self.part), tensors, {
-            "model": self.model.as_dict(), "config": asdict(self.config), "step": self.step, "seconds": self.seconds,
-            "adopted": self.adopted,
-        })
+        write_checkpoint(
+            checkpoint_file(self.folder, name or self.part),
+            tensors,
+            {
+                "model": self.model.as_dict(),
+                "config": asdict(self.config),
+                "step": self.step,
+                "seconds": self.seconds,
+                "adopted": self.adopted,
+            },
+        )
 
     @staticmethod
     def load(
-        part: str, folder: Path, config: TrainingConfig | None = None, device: str = "cpu", name: str = ""
+        part: str,
+        folder: Path,
+        config: TrainingConfig | None = None,
+        device: str = "cpu",
+        name: str = "",
     ) -> "Run":
-        """The run saved in ``folder``; ``config`` replaces its settings, a longer budget for example; ``name`` as in ``save``.
+        """The run saved in ``folder``; ``config`` replaces its settings, a longer budget for
+        example; ``name`` as in ``save``.
 
-        Raises InputError where the checkpoint is missing, damaged, of an earlier version, or does not fit itself.
+        Raises InputError where the checkpoint is missing, damaged, of an earlier version, or does
+        not fit itself.
         """
         kept = Checkpoint.read(checkpoint_file(folder, name or part))
         model = kept.settings(ModelConfig, "model")
@@ -242,32 +309,55 @@ class Run:
             raise kept.refused(f"its model has no part '{part}'")
         with torch.device("meta"):
             gmvae, flow = GMVAE(model), flow_of(model)
-            if sum(p.numel() for network in (gmvae, flow) for p in network.parameters()) > _MOST_NUMBERS:
+            if (
+                sum(p.numel() for network in (gmvae, flow) for p in network.parameters())
+                > _MOST_NUMBERS
+            ):
                 raise kept.refused("its model is too large")
             kept.fits(gmvae if part == "predictor" else flow.parts()[part])
         settings = config or kept.settings(TrainingConfig, "config")
         run = Run(part, folder, model, settings, _statistics_of(kept), device)
         kept.restore(run.network, run.optimiser)
-        run.averaged = {key: kept.tensor(f"averaged.{key}", like).to(run.device) for key, like in run.averaged.items()}
+        run.averaged = {
+            key: kept.tensor(f"averaged.{key}", like).to(run.device)
+            for key, like in run.averaged.items()
+        }
         run.step, run.seconds = kept.progress()
         run.adopted = kept.text("adopted")
         kept.set_generators(run.device)
         return run
 
     def hidden(self, occupancy: torch.Tensor) -> torch.Tensor:
-        """Occupancy (B, …, 2640) with a share of its values dropped (paper, Appendix A); nothing is rescaled."""
-        spared = torch.rand(len(occupancy), *[1] * (occupancy.ndim - 1), device=self.device) >= self.config.dropout_windows
-        return occupancy * (spared | (torch.rand_like(occupancy) >= self.config.environment_dropout))
+        """Occupancy (B, …, 2640) with a share of its values dropped (paper, Appendix A); nothing is
+        rescaled.
+        """
+        spared = (
+            torch.rand(len(occupancy), *[1] * (occupancy.ndim - 1), device=self.device)
+            >= self.config.dropout_windows
+        )
+        return occupancy * (
+            spared | (torch.rand_like(occupancy) >= self.config.environment_dropout)
+        )
 
     def loss(self, batch: Batch, initialise: bool = False) -> torch.Tensor:
-        """The GMVAE's loss, or the part's negative log-likelihood a frame with the predictor frozen, and its free run's."""
+        """The GMVAE's loss, or the part's negative log-likelihood a frame with the predictor
+        frozen, and its free run's.
+        """
         if self.part == "predictor":
-            # Neighbouring frames say nearly the same: every fifth is plenty for a network without memory.
-            past, occupancy = batch.past[:, ::5].flatten(0, 1), batch.occupancy[:, ::5].flatten(0, 1)
+            # Neighbouring frames say nearly the same: every fifth is plenty for a network without
+            # memory.
+            past, occupancy = (
+                batch.past[:, ::5].flatten(0, 1),
+                batch.occupancy[:, ::5].flatten(0, 1),
+            )
             poses = self.model.history * POSE_SIZE
             seen = past.clone()
-            seen[:, :poses] *= torch.rand(len(past), poses, device=self.device) >= self.config.slot_dropout
-            return self.gmvae.losses(past, seen, self.hidden(occupancy), gumbel_temperature(self.share)).total
+            seen[:, :poses] *= (
+                torch.rand(len(past), poses, device=self.device) >= self.config.slot_dropout
+            )
+            return self.gmvae.losses(
+                past, seen, self.hidden(occupancy), gumbel_temperature(self.share)
+            ).total
         occupancy = self.hidden(batch.occupancy)
         observation, given = observation_for(batch.upper)
         x, condition = self._told(batch, occupancy, observation, given)
@@ -292,12 +382,22 @@ class Run:
             # MoGlow's data dropout: whole past poses are hidden, so that it heeds what it is told.
             base = batch.past.clone()
             poses = base[..., : self.model.history * POSE_SIZE].unflatten(-1, (-1, POSE_SIZE))
-            poses *= torch.rand(*poses.shape[:-1], 1, device=self.device) >= self.config.slot_dropout
+            poses *= (
+                torch.rand(*poses.shape[:-1], 1, device=self.device) >= self.config.slot_dropout
+            )
         pose = torch.cat([batch.upper, batch.lower], dim=-1)
-        return pose[..., self.flow.places[self.part]], self.flow.condition(self.part, base, observation, given, pose)
+        return pose[..., self.flow.places[self.part]], self.flow.condition(
+            self.part, base, observation, given, pose
+        )
 
     def _free_run(
-        self, made: torch.Tensor, true: torch.Tensor, calm: torch.Tensor, batch: Batch, given: torch.Tensor, kept: int
+        self,
+        made: torch.Tensor,
+        true: torch.Tensor,
+        calm: torch.Tensor,
+        batch: Batch,
+        given: torch.Tensor,
+        kept: int,
     ) -> torch.Tensor:
         joints = UPPER_SIZE // 3
         statistics = self.statistics.pose_mean, self.statistics.pose_std
@@ -315,7 +415,13 @@ class Run:
         if self.part != "upper":
             legs = (..., slice(-LOWER_SIZE, None))
             pelvis = metres(batch.upper[:, kept:, :3], slice(0, 3))[..., 0, :]
-            loss = loss + lower_loss(metres(made[legs], lower), metres(true[legs], lower), calm, pelvis, batch.step[:, kept:])
+            loss = loss + lower_loss(
+                metres(made[legs], lower),
+                metres(true[legs], lower),
+                calm,
+                pelvis,
+                batch.step[:, kept:],
+            )
         return loss
 
     @torch.no_grad()
@@ -330,11 +436,15 @@ class Run:
 
 
 def _statistics_of(kept: Checkpoint) -> Statistics:
-    """What a checkpoint's run standardises with. Raises InputError where it is nothing to standardise with."""
+    """What a checkpoint's run standardises with. Raises InputError where it is nothing to
+    standardise with.
+    """
     found = {}
     for what, size in (("pose", POSE_SIZE), ("velocity", VELOCITY_SIZE), ("ahead", AHEAD_SIZE)):
         for name in (f"{what}_mean", f"{what}_std"):
-            values = kept.tensor(f"statistics.{name}", torch.empty(size, dtype=torch.double)).numpy()
+            values = kept.tensor(
+                f"statistics.{name}", torch.empty(size, dtype=torch.double)
+            ).numpy()
             if not np.isfinite(values).all() or (name.endswith("std") and (values <= 0.0).any()):
                 raise kept.refused(f"'statistics.{name}' cannot be divided by or added")
             found[name] = values
@@ -343,21 +453,40 @@ def _statistics_of(kept: Checkpoint) -> Statistics:
 
 def dataset_pool(dataset: Path, device: str = "cpu") -> Pool:
     """The training windows of a dataset. Raises InputError where there are none."""
-    pool = Pool(lambda: sorted(Path(dataset).glob("pool-????.npz")), torch.device(device), bank_in(Path(dataset)))
+    pool = Pool(
+        lambda: sorted(Path(dataset).glob("pool-????.npz")),
+        torch.device(device),
+        bank_in(Path(dataset)),
+    )
     if not len(pool):
-        raise InputError(f"The dataset '{dataset}' holds no windows; make it with 'dafnet prepare'.")
+        raise InputError(
+            f"The dataset '{dataset}' holds no windows; make it with 'dafnet prepare'."
+        )
     return pool
 
 
 def clock_of(device: torch.device) -> Callable[[], float]:
-    """Seconds that count: a processor's own, so that other work takes nothing from the training; else the clock's."""
-    return time.monotonic if device.type != "cpu" else lambda: time.process_time() / torch.get_num_threads()
+    """Seconds that count: a processor's own, so that other work takes nothing from the training;
+    else the clock's.
+    """
+    return (
+        time.monotonic
+        if device.type != "cpu"
+        else lambda: time.process_time() / torch.get_num_threads()
+    )
 
 
 def descend(
-    network: nn.Module, optimiser: torch.optim.Optimizer, loss: torch.Tensor, config: TrainingConfig, step: int, share: float
+    network: nn.Module,
+    optimiser: torch.optim.Optimizer,
+    loss: torch.Tensor,
+    config: TrainingConfig,
+    step: int,
+    share: float,
 ) -> None:
-    """One step down a loss, after ``step`` others, ``share`` of the budget being spent; the same on all ranks."""
+    """One step down a loss, after ``step`` others, ``share`` of the budget being spent; the same on
+    all ranks.
+    """
     for group in optimiser.param_groups:
         group["lr"] = config.rate(step, share)
     optimiser.zero_grad()
@@ -370,16 +499,24 @@ def descend(
 
 
 def train_part(
-    part: str, dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig, threads: int | None = None,
-    progress: Callable[[str, float, float], None] = lambda part, share, loss: None, device: str = "cpu",
+    part: str,
+    dataset: Path,
+    folder: Path,
+    model: ModelConfig,
+    config: TrainingConfig,
+    threads: int | None = None,
+    progress: Callable[[str, float, float], None] = lambda part, share, loss: None,
+    device: str = "cpu",
     begin_with: Weights | None = None,
 ) -> Run:
     """Train one part, or go on with it, until its budget is spent.
 
-    Raises InputError without a dataset, for a device that is not there, and where a part of other sizes was begun there.
+    Raises InputError without a dataset, for a device that is not there, and where a part of other
+    sizes was begun there.
 
-    A new run begins with what ``begin_with`` has learnt, where given: weights of the same or smaller sizes. A loss that is not
-    a number stops the run with the last good checkpoint kept. Shards that 'prepare' is still writing are taken in as they come.
+    A new run begins with what ``begin_with`` has learnt, where given: weights of the same or
+    smaller sizes. A loss that is not a number stops the run with the last good checkpoint kept.
+    Shards that 'prepare' is still writing are taken in as they come.
     """
     from torch.utils.tensorboard import SummaryWriter
 
@@ -389,13 +526,24 @@ def train_part(
     torch.backends.cuda.matmul.allow_tf32 = True
     pool = dataset_pool(dataset, device)
     held = Pool(lambda: [Path(dataset) / "held.npz"], torch.device(device), bank_in(Path(dataset)))
-    predictor = None if part == "predictor" or not model.predicts else Run.load("predictor", folder, device=device)
+    predictor = (
+        None
+        if part == "predictor" or not model.predicts
+        else Run.load("predictor", folder, device=device)
+    )
     if checkpoint_file(folder, part).exists():
         run = _resumed(part, folder, config, device)
         if run.model != model:
             own = run.model.as_dict()
-            other = [f"{name} {own[name]}, not {value}" for name, value in model.as_dict().items() if own[name] != value]
-            raise InputError(f"The run '{folder}' was begun with other settings ({'; '.join(other)}); train in another folder.")
+            other = [
+                f"{name} {own[name]}, not {value}"
+                for name, value in model.as_dict().items()
+                if own[name] != value
+            ]
+            raise InputError(
+                f"The run '{folder}' was begun with other settings ({'; '.join(other)}); train in "
+                "another folder."
+            )
     else:
         # All parts are standardised alike, whatever shards there were when each began.
         statistics = predictor.statistics if predictor is not None else pool.statistics()
@@ -418,7 +566,10 @@ def train_part(
     while run.share < 1.0:
         begin, held_its_rate = clock(), not run.cools
         rows = torch.randint(len(pool), (config.batch,))
-        loss = run.loss(pool.batch(rows, run.statistics, run.model), initialise=run.step == 0 and not run.adopted)
+        loss = run.loss(
+            pool.batch(rows, run.statistics, run.model),
+            initialise=run.step == 0 and not run.adopted,
+        )
         descend(run.network, run.optimiser, loss, run.config, run.step, run.share)
         recent.append(loss.detach())
         run.step += 1
@@ -431,17 +582,25 @@ def train_part(
         if run.step % config.save_every == 0 or run.share >= 1.0:
             mean = ranks.mean(float(torch.stack(recent).mean()), run.device)
             if not math.isfinite(mean):
-                raise InputError(f"The loss of '{part}' is no number by step {run.step}; resume with a lower peak rate.")
+                raise InputError(
+                    f"The loss of '{part}' is no number by step {run.step}; resume with a lower "
+                    "peak rate."
+                )
             with run.with_average():
                 held_out = run.held_loss(held)
             if writer is not None:
                 values = {
-                    "part": part, "step": run.step, "minutes": run.seconds / 60, "loss": mean, "held_out": held_out,
+                    "part": part,
+                    "step": run.step,
+                    "minutes": run.seconds / 60,
+                    "loss": mean,
+                    "held_out": held_out,
                     "windows": len(pool),
                 }
                 progress(part, run.share, mean)
                 run.save()
-                # The log comes after what it tells of: what a killed process had not saved is told once, by the next one.
+                # The log comes after what it tells of: what a killed process had not saved is told
+                # once, by the next one.
                 with (folder / "log.jsonl").open("a", encoding="utf-8") as f:
                     f.write(json.dumps(values) + "\n")
                 for name in ("loss", "held_out", "windows"):
@@ -463,10 +622,16 @@ def _resumed(part: str, folder: Path, config: TrainingConfig, device: str) -> Ru
 
 
 def train(
-    dataset: Path, folder: Path, model: ModelConfig, config: TrainingConfig,
-    progress: Callable[[float], None] = lambda share: None, device: str = "cpu", begin_with: Weights | None = None,
+    dataset: Path,
+    folder: Path,
+    model: ModelConfig,
+    config: TrainingConfig,
+    progress: Callable[[float], None] = lambda share: None,
+    device: str = "cpu",
+    begin_with: Weights | None = None,
 ) -> None:
-    """Train the predictor, then both parts of the flow in two processes; what a folder holds is gone on with.
+    """Train the predictor, then both parts of the flow in two processes; what a folder holds is
+    gone on with.
 
     What is new begins with what the weights ``begin_with`` have learnt, where given.
 
@@ -477,7 +642,16 @@ def train(
     report = lambda part, share, loss: progress(first * share)  # noqa: E731
     names = parts_of(model)
     if model.predicts:
-        train_part("predictor", dataset, folder, model, config, progress=report, device=device, begin_with=begin_with)
+        train_part(
+            "predictor",
+            dataset,
+            folder,
+            model,
+            config,
+            progress=report,
+            device=device,
+            begin_with=begin_with,
+        )
     if ranks.joined():
         for part in names:
             train_part(part, dataset, folder, model, config, device=device, begin_with=begin_with)
@@ -486,24 +660,41 @@ def train(
     with ProcessPoolExecutor(len(names), mp_context=multiprocessing.get_context("spawn")) as pool:
         begin = time.monotonic()
         parts = [
-            pool.submit(train_part, part, dataset, folder, model, config, threads, device=device, begin_with=begin_with)
+            pool.submit(
+                train_part,
+                part,
+                dataset,
+                folder,
+                model,
+                config,
+                threads,
+                device=device,
+                begin_with=begin_with,
+            )
             for part in names
         ]
         while wait(parts, timeout=2.0).not_done:
-            spent = 0.0 if config.steps_flow else (time.monotonic() - begin) / max(60.0 * config.minutes_flow, 1e-9)
+            spent = (
+                0.0
+                if config.steps_flow
+                else (time.monotonic() - begin) / max(60.0 * config.minutes_flow, 1e-9)
+            )
             progress(first + (1.0 - first) * min(1.0, spent))
         try:
             for done in parts:
                 done.result()
         except BrokenProcessPool:
             raise InputError(
-                "A process of the training was ended from outside, for want of memory perhaps; give the same command again, "
+                "A process of the training was ended from outside, for want of memory perhaps; "
+                "give the same command again, "
                 "and it goes on from its last checkpoint."
             ) from None
 
 
 def trained(folder: Path) -> tuple[BodyFlow, ActionPredictor | None, Statistics]:
-    """The flow, the predictor (of MoGlow none) and the statistics of a run's latest checkpoints, their weights averaged."""
+    """The flow, the predictor (of MoGlow none) and the statistics of a run's latest checkpoints,
+    their weights averaged.
+    """
     runs = _checkpoints(folder)
     flow = next(run.flow for part, run in runs.items() if part != "predictor")
     for part, run in runs.items():
@@ -517,13 +708,18 @@ def trained(folder: Path) -> tuple[BodyFlow, ActionPredictor | None, Statistics]
 def _checkpoints(folder: Path) -> dict[str, Run]:
     """The latest checkpoints of a run's folder, the predictor's first."""
     parts = ("predictor", "upper", "lower", "whole")
-    return {part: Run.load(part, folder) for part in parts if checkpoint_file(folder, part).exists()}
+    return {
+        part: Run.load(part, folder) for part in parts if checkpoint_file(folder, part).exists()
+    }
 
 
 def account(folder: Path, dataset: Path) -> dict[str, str]:
     """What a weights file says of its making, as metadata: licence, data, and training."""
     runs = _checkpoints(folder)
-    training: dict[str, Any] = {part: {"steps": run.step, "minutes": round(run.seconds / 60, 1)} for part, run in runs.items()}
+    training: dict[str, Any] = {
+        part: {"steps": run.step, "minutes": round(run.seconds / 60, 1)}
+        for part, run in runs.items()
+    }
     last = list(runs.values())[-1]
     if last.adopted:
         training["begun_with"] = last.adopted

@@ -1,6 +1,8 @@
-"""What scripts/window.sh plays: what may come between while a take is made, then a first shot with the mouse.
+"""What scripts/window.sh plays: what may come between while a take is made, then a first shot with
+the mouse.
 
-In this order, since Blender 4.3 crashes by itself when it opens a new file after another scene was made with Rigify on.
+In this order, since Blender 4.3 crashes by itself when it opens a new file after another scene was
+made with Rigify on.
 """
 
 import sys

@@ -1,7 +1,8 @@
-"""A user with mouse and keys in a real Blender window, driven by a script: buttons are found by what they do.
+"""A user with mouse and keys in a real Blender window, driven by a script: buttons are found by
+what they do.
 
-The script is a generator that yields the seconds to wait; what needs a wait itself is used with ``yield from``. Blender has to
-run with ``--enable-event-simulate``.
+The script is a generator that yields the seconds to wait; what needs a wait itself is used with
+``yield from``. Blender has to run with ``--enable-event-simulate``.
 """
 
 import subprocess
@@ -38,7 +39,9 @@ class Driver:
 
     def override(self, kind: str = "WINDOW"):
         """Context of the 3D view, for operators that are not what is tried out here."""
-        return bpy.context.temp_override(window=self.window, area=self.view, region=self.region(kind))
+        return bpy.context.temp_override(
+            window=self.window, area=self.view, region=self.region(kind)
+        )
 
     def move(self, x: int, y: int) -> None:
         """The mouse, in pixels of the window from its lower left."""
@@ -62,10 +65,13 @@ class Driver:
         yield 0.4
 
     def find(self, action: str, across: float = 0.6) -> Generator[float, None, tuple[int, int]]:
-        """Where the sidebar's button is whose Python command or data path holds ``action``; scrolls down to it."""
+        """Where the sidebar's button is whose Python command or data path holds ``action``; scrolls
+        down to it.
+        """
         for _page in range(6):
             region = self.region("UI")
-            self.move(region.x - 200, region.y + 100)  # so that no button is taken for under the mouse still
+            # so that no button is taken for under the mouse still
+            self.move(region.x - 200, region.y + 100)
             yield 0.2
             x = region.x + int(across * (region.width - 20))
             for y in range(region.y + region.height - 30, region.y + 4, -_STEP):
@@ -79,7 +85,9 @@ class Driver:
         raise AssertionError(f"no button in the sidebar does '{action}'")
 
     def _under_mouse(self) -> str:
-        """Python command and data path of the button under the mouse, as its context menu would copy them."""
+        """Python command and data path of the button under the mouse, as its context menu would
+        copy them.
+        """
         manager = bpy.context.window_manager
         said = ""
         with self.override("UI"):
@@ -128,7 +136,9 @@ class Driver:
         bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
         yield 0.3
         small = ["-resize", "1280x", "-colors", "160"]
-        subprocess.run(["import", "-window", "root", *small, f"png8:{self.pictures / name}.png"], check=True)
+        subprocess.run(
+            ["import", "-window", "root", *small, f"png8:{self.pictures / name}.png"], check=True
+        )
 
 
 def play(script: Callable[[], Waits]) -> None:

@@ -1,4 +1,6 @@
-"""An animator's first shot, with mouse and keys: from an empty scene to a take on rigs of one's own."""
+"""An animator's first shot, with mouse and keys: from an empty scene to a take on rigs of one's
+own.
+"""
 
 import sys
 from pathlib import Path
@@ -45,7 +47,9 @@ def _only(*selected: bpy.types.Object) -> None:
 
 
 def first_shot(pictures: Path, builders: Any) -> Waits:
-    """Every step by its button, with a picture of each; ``builders``: rigs by script (tests/rig_builders.py)."""
+    """Every step by its button, with a picture of each; ``builders``: rigs by script
+    (tests/rig_builders.py).
+    """
     user = Driver(pictures)
     scene = bpy.context.scene
     yield from user.press("ESC")  # the splash screen
@@ -67,7 +71,9 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
     yield from user.click("dafnet.walk_to(goal='SEAT')")
     keys = ann.dafnet.root.animation_data.action
     assert keys is not None and ann.dafnet.furniture.name == "Studio"
-    assert scene.frame_end > 100, "the scene's end follows the walk" if scene.frame_end == 250 else ""
+    assert scene.frame_end > 100, (
+        "the scene's end follows the walk" if scene.frame_end == 250 else ""
+    )
     _only(ann)
     scene.frame_end = int(keys.frame_range[1])
     yield from user.picture("path_and_furniture")
@@ -97,7 +103,9 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
 
     ann.dafnet.take_count = 3
     yield from user.click("dafnet.generate(task='NEW')")
-    yield from user.until(lambda: progress() is None and len(ann.dafnet.takes) == 4, "three more takes")
+    yield from user.until(
+        lambda: progress() is None and len(ann.dafnet.takes) == 4, "three more takes"
+    )
     yield from user.click("dafnet.play_take(index=2)", 0.1)
     assert ann.animation_data.action == ann.dafnet.takes[2].action
     chosen = ann.animation_data.action
@@ -118,7 +126,9 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
     scene.frame_set(2)
     assert ann.dafnet.mode == "FREE", "the mode is keyed"
     yield from user.click("dafnet.generate(task='NEW')")
-    yield from user.until(lambda: progress() is None and len(ann.dafnet.takes) == 5, "the take with two modes")
+    yield from user.until(
+        lambda: progress() is None and len(ann.dafnet.takes) == 5, "the take with two modes"
+    )
     scene.frame_set(scene.frame_end - 10)
     wrist = ann.matrix_world @ ann.pose.bones["right_wrist"].head
     assert (wrist - ann.dafnet.hand_right.location).length < 0.02, "the hand is at its target"
@@ -131,7 +141,9 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
         yield 0.3
         yield from user.click("dafnet.detect_rig")
         yield from user.click("dafnet.bake_to_rig")
-        yield from user.until(lambda rig=rig: bool(rig.animation_data and rig.animation_data.action), name, 120)
+        yield from user.until(
+            lambda rig=rig: bool(rig.animation_data and rig.animation_data.action), name, 120
+        )
         scene.frame_set(scene.frame_end - 10)
         yield 0.3
         yield from user.picture(f"rig_{name}")

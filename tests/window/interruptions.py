@@ -1,4 +1,6 @@
-"""What a user may do to Blender while a take is made: each time the job ends by itself or goes on, and nothing breaks."""
+"""What a user may do to Blender while a take is made: each time the job ends by itself or goes on,
+and nothing breaks.
+"""
 
 from collections.abc import Callable, Generator
 from pathlib import Path
@@ -8,8 +10,6 @@ from driver import Driver, Waits
 from first_shot import progress
 
 __all__ = ["interruptions"]
-
-
 
 
 def _new_shot(user: Driver) -> None:
@@ -67,7 +67,12 @@ def _started(folder: Path) -> Generator[float, None, Driver]:
 def interruptions(folder: Path) -> Waits:
     """Run through them, one after the other."""
     done: list[tuple[Callable[[Path], None], bool]] = [
-        (_save, True), (_new_scene, True), (_undo, False), (_delete_character, False), (_delete_root, False), (_open, False),
+        (_save, True),
+        (_new_scene, True),
+        (_undo, False),
+        (_delete_character, False),
+        (_delete_root, False),
+        (_open, False),
         (_close, False),
     ]
     for interrupt, finishes in done:
@@ -75,7 +80,9 @@ def interruptions(folder: Path) -> Waits:
         yield from user.until(lambda: (progress() or 0.0) > 0.2, "progress")
         with user.override():
             interrupt(folder)
-        yield from user.until(lambda: progress() is None, f"the end of the job after {interrupt.__name__}")
+        yield from user.until(
+            lambda: progress() is None, f"the end of the job after {interrupt.__name__}"
+        )
         yield 0.3
         made = [action for action in bpy.data.actions if "take" in action.name]
         print(f"{interrupt.__name__}: {len(made)} takes", flush=True)
