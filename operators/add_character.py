@@ -5,12 +5,12 @@ from bpy.props import FloatProperty, StringProperty
 
 from ..dafnet_addon.blender.armature import create_character
 from ..dafnet_addon.core.skeleton import STATURE
-from .reporting import reported
+from .base import DafnetOperator
 
 __all__ = ["DAFNET_OT_add_character"]
 
 
-class DAFNET_OT_add_character(bpy.types.Operator):
+class DAFNET_OT_add_character(DafnetOperator, bpy.types.Operator):
     """Add a character at the 3D cursor: an armature with a body, and the empties that direct it"""
 
     bl_idname = "dafnet.add_character"
@@ -46,9 +46,6 @@ class DAFNET_OT_add_character(bpy.types.Operator):
         cls.poll_message_set("Leave the current mode for object mode first")
         return context.mode == "OBJECT"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Add it."""
-        with reported(self):
-            create_character(context, self.name, self.height, self.build)
-            return {"FINISHED"}
-        return {"CANCELLED"}
+        create_character(context, self.name, self.height, self.build)

@@ -6,13 +6,13 @@ import bpy
 from bpy.props import EnumProperty
 
 from ..dafnet_addon.blender.examples import EXAMPLES, add_example
+from .base import DafnetOperator
 from .generate import idle
-from .reporting import reported
 
 __all__ = ["DAFNET_OT_add_example"]
 
 
-class DAFNET_OT_add_example(bpy.types.Operator):
+class DAFNET_OT_add_example(DafnetOperator, bpy.types.Operator):
     """Add furniture at the 3D cursor and a character that uses it, keyed and ready to generate"""
 
     bl_idname = "dafnet.add_example"
@@ -40,12 +40,9 @@ class DAFNET_OT_add_example(bpy.types.Operator):
         cls.poll_message_set("Leave the current mode for object mode first")
         return context.mode == "OBJECT"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Add it."""
-        with reported(self):
-            made = add_example(context, self.kind)
-            self.report(
-                {"INFO"}, f"'{made.name}' is ready: press Generate in the sidebar's tab DAFNet."
-            )
-            return {"FINISHED"}
-        return {"CANCELLED"}
+        made = add_example(context, self.kind)
+        self.report(
+            {"INFO"}, f"'{made.name}' is ready: press Generate in the sidebar's tab DAFNet."
+        )

@@ -4,13 +4,13 @@ import bpy
 
 from ..dafnet_addon.blender.armature import character_of
 from ..dafnet_addon.blender.targets import add_root, lacks_root
+from .base import DafnetOperator
 from .generate import idle
-from .reporting import reported
 
 __all__ = ["DAFNET_OT_add_root"]
 
 
-class DAFNET_OT_add_root(bpy.types.Operator):
+class DAFNET_OT_add_root(DafnetOperator, bpy.types.Operator):
     """Add the empty that leads the character, where it stands now"""
 
     bl_idname = "dafnet.add_root"
@@ -26,9 +26,6 @@ class DAFNET_OT_add_root(bpy.types.Operator):
         cls.poll_message_set("Select a character that has no root")
         return context.mode == "OBJECT" and character is not None and lacks_root(context, character)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Add it."""
-        with reported(self):
-            add_root(context, character_of(context))
-            return {"FINISHED"}
-        return {"CANCELLED"}
+        add_root(context, character_of(context))

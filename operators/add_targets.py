@@ -4,13 +4,13 @@ import bpy
 
 from ..dafnet_addon.blender.armature import sent
 from ..dafnet_addon.blender.targets import add_targets, missing_targets
+from .base import DafnetOperator
 from .follow_path import may_direct
-from .reporting import reported
 
 __all__ = ["DAFNET_OT_add_targets"]
 
 
-class DAFNET_OT_add_targets(bpy.types.Operator):
+class DAFNET_OT_add_targets(DafnetOperator, bpy.types.Operator):
     """Add empties for head and hands where the character has none, where they are now; mode EE
     follows them
     """
@@ -27,10 +27,7 @@ class DAFNET_OT_add_targets(bpy.types.Operator):
         cls.poll_message_set("Head and hands have their targets already")
         return bool(missing_targets(context, sent(context)[0]))
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Add them."""
-        with reported(self):
-            made = add_targets(context, sent(context)[0])
-            self.report({"INFO"}, f"Added {', '.join(each.name for each in made)}.")
-            return {"FINISHED"}
-        return {"CANCELLED"}
+        made = add_targets(context, sent(context)[0])
+        self.report({"INFO"}, f"Added {', '.join(each.name for each in made)}.")

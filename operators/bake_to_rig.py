@@ -6,8 +6,8 @@ import bpy
 
 from ..dafnet_addon.blender.onto_rig import Baked, bake_onto_rig
 from ..dafnet_addon.blender.rig_properties import character_for, map_of, rig_of
+from .base import DafnetOperator
 from .generate import idle
-from .reporting import reported
 
 __all__ = ["DAFNET_OT_bake_to_rig"]
 
@@ -15,7 +15,7 @@ _FAR, _TURNED = 0.02, 8.0
 """Mean error above which the user is warned: metres, degrees."""
 
 
-class DAFNET_OT_bake_to_rig(bpy.types.Operator):
+class DAFNET_OT_bake_to_rig(DafnetOperator, bpy.types.Operator):
     """Bake the motion that the character plays, your edits included, into a new action on this
     armature
     """
@@ -32,39 +32,36 @@ class DAFNET_OT_bake_to_rig(bpy.types.Operator):
         cls.poll_message_set("Select the armature of your rig, in object or pose mode")
         return rig_of(context) is not None and context.mode in {"OBJECT", "POSE"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Bake, and say how near the result is."""
         rig: Any = rig_of(context)
         own = rig.dafnet_rig
-        with reported(self):
-            baked = bake_onto_rig(
-                context,
-                character_for(context, rig),
-                rig,
-                map_of(rig),
-                root_motion=own.root_motion,
-                limbs=own.limbs,
+        baked = bake_onto_rig(
+            context,
+            character_for(context, rig),
+            rig,
+            map_of(rig),
+            root_motion=own.root_motion,
+            limbs=own.limbs,
+        )
+        if off := _off(baked):
+            bones = ", ".join(f"'{bone}'" for bone in baked.overruled[:3])
+            why = (
+                f"mute the constraints and drivers of {bones} and bake again"
+                if bones
+                else "its proportions are others"
             )
-            if off := _off(baked):
-                bones = ", ".join(f"'{bone}'" for bone in baked.overruled[:3])
-                why = (
-                    f"mute the constraints and drivers of {bones} and bake again"
-                    if bones
-                    else "its proportions are others"
-                )
-                self.report({"WARNING"}, f"The rig is off the character's motion, {off}: {why}")
-            places = ", ".join(
-                f"{part} {100 * mean:.1f} ({100 * most:.1f})"
-                for part, (mean, most) in baked.errors.items()
-            )
-            limbs = ", ".join(
-                f"{limb} {mean:.0f} ({most:.0f})" for limb, (mean, most) in baked.angles.items()
-            )
-            size = "" if baked.ratio == 1.0 else f", motion scaled by {baked.ratio:.2f}"
-            told = f"off by cm, mean (largest): {places}; by degrees: {limbs}{size}"
-            self.report({"INFO"}, f"'{baked.action.name}': {told}")
-            return {"FINISHED"}
-        return {"CANCELLED"}
+            self.report({"WARNING"}, f"The rig is off the character's motion, {off}: {why}")
+        places = ", ".join(
+            f"{part} {100 * mean:.1f} ({100 * most:.1f})"
+            for part, (mean, most) in baked.errors.items()
+        )
+        limbs = ", ".join(
+            f"{limb} {mean:.0f} ({most:.0f})" for limb, (mean, most) in baked.angles.items()
+        )
+        size = "" if baked.ratio == 1.0 else f", motion scaled by {baked.ratio:.2f}"
+        told = f"off by cm, mean (largest): {places}; by degrees: {limbs}{size}"
+        self.report({"INFO"}, f"'{baked.action.name}': {told}")
 
 
 def _off(baked: Baked) -> str:

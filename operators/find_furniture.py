@@ -4,15 +4,15 @@ import bpy
 
 from ..dafnet_addon.blender.armature import sent
 from ..dafnet_addon.blender.surroundings import find_furniture
+from .base import DafnetOperator
 from .follow_path import may_direct
-from .reporting import reported
 
 __all__ = ["DAFNET_OT_find_furniture"]
 
 _NAMED = 6
 
 
-class DAFNET_OT_find_furniture(bpy.types.Operator):
+class DAFNET_OT_find_furniture(DafnetOperator, bpy.types.Operator):
     """Link the visible meshes within 1.5 m of the root's path into a collection of the character's
     own, as its furniture
     """
@@ -26,13 +26,10 @@ class DAFNET_OT_find_furniture(bpy.types.Operator):
         """There is a character with a root."""
         return may_direct(cls, context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Find it."""
-        with reported(self):
-            found = find_furniture(context, sent(context)[0])
-            for warning in found.warnings:
-                self.report({"WARNING"}, warning)
-            more = f" and {len(found.taken) - _NAMED} more" if len(found.taken) > _NAMED else ""
-            self.report({"INFO"}, f"Furniture: {', '.join(found.taken[:_NAMED])}{more}.")
-            return {"FINISHED"}
-        return {"CANCELLED"}
+        found = find_furniture(context, sent(context)[0])
+        for warning in found.warnings:
+            self.report({"WARNING"}, warning)
+        more = f" and {len(found.taken) - _NAMED} more" if len(found.taken) > _NAMED else ""
+        self.report({"INFO"}, f"Furniture: {', '.join(found.taken[:_NAMED])}{more}.")

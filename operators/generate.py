@@ -12,7 +12,7 @@ from ..dafnet_addon.blender import job, overlays
 from ..dafnet_addon.blender.armature import character_of
 from ..dafnet_addon.blender.takes import active_take, draw_of, frames_of
 from ..dafnet_addon.core.errors import InputError
-from .reporting import reported
+from .base import DafnetOperator, reported
 
 __all__ = ["DAFNET_OT_cancel", "DAFNET_OT_generate", "idle"]
 
@@ -33,7 +33,7 @@ _LOOKING = {
 """Events that cannot change the scene."""
 
 
-class DAFNET_OT_generate(bpy.types.Operator):
+class DAFNET_OT_generate(DafnetOperator, bpy.types.Operator):
     """Generate the character's motion from its root, targets and furniture, and bake it into new
     actions
     """
@@ -129,12 +129,9 @@ class DAFNET_OT_generate(bpy.types.Operator):
             lower_temperature=draw.lower_temperature or _CALM_LEGS,
         )
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Generate without showing progress."""
-        with reported(self):
-            self._tell(job.run(context, self._settings(context)))
-            return {"FINISHED"}
-        return {"CANCELLED"}
+        self._tell(job.run(context, self._settings(context)))
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Start the job; ``modal`` goes on with it."""
@@ -234,7 +231,7 @@ def idle(operator: Any) -> bool:
     return False
 
 
-class DAFNET_OT_cancel(bpy.types.Operator):
+class DAFNET_OT_cancel(DafnetOperator, bpy.types.Operator):
     """Stop generating; the scene stays as it was"""
 
     bl_idname = "dafnet.cancel"
@@ -247,10 +244,9 @@ class DAFNET_OT_cancel(bpy.types.Operator):
         cls.poll_message_set("Nothing is being generated")
         return DAFNET_OT_generate.progress is not None
 
-    def execute(self, _context: bpy.types.Context) -> set[str]:
+    def run(self, _context: bpy.types.Context) -> None:
         """Let the running job end itself at its next tick."""
         DAFNET_OT_generate.stopping = True
-        return {"FINISHED"}
 
 
 def _over_sidebar(context: bpy.types.Context, event: bpy.types.Event) -> bool:

@@ -17,12 +17,12 @@ from ..dafnet_addon.blender.rigs import (
     required,
     save_map,
 )
-from .reporting import reported
+from .base import DafnetOperator
 
 __all__ = ["DAFNET_OT_detect_rig", "DAFNET_OT_load_rig_map", "DAFNET_OT_save_rig_map"]
 
 
-class _OfRig:
+class _OfRig(DafnetOperator):
     """For an armature that is no DAFNet character."""
 
     @classmethod
@@ -44,7 +44,7 @@ class DAFNET_OT_detect_rig(_OfRig, bpy.types.Operator):
     bl_label = "Detect Bones"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Fill the list."""
         rig = _rig(context)
         found = detected(rig)
@@ -55,7 +55,6 @@ class DAFNET_OT_detect_rig(_OfRig, bpy.types.Operator):
             self.report({"WARNING"}, f"No bone was found for: {names}; choose them in the list")
         else:
             self.report({"INFO"}, f"{found.name}: {len(found.joints)} joints")
-        return {"FINISHED"}
 
 
 class DAFNET_OT_load_rig_map(_OfRig, bpy.types.Operator):
@@ -67,15 +66,12 @@ class DAFNET_OT_load_rig_map(_OfRig, bpy.types.Operator):
 
     preset: EnumProperty(name="Preset", items=presets)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Fill the list."""
         rig = _rig(context)
-        with reported(self):
-            found = in_names_of(load_map(map_files()[self.preset]), rig.data.bones.keys())
-            show_map(rig, found)
-            self.report({"INFO"}, f"{found.name}: {len(found.joints)} joints")
-            return {"FINISHED"}
-        return {"CANCELLED"}
+        found = in_names_of(load_map(map_files()[self.preset]), rig.data.bones.keys())
+        show_map(rig, found)
+        self.report({"INFO"}, f"{found.name}: {len(found.joints)} joints")
 
 
 class DAFNET_OT_save_rig_map(_OfRig, bpy.types.Operator):
@@ -92,13 +88,10 @@ class DAFNET_OT_save_rig_map(_OfRig, bpy.types.Operator):
         self.name = _rig(context).name
         return context.window_manager.invoke_props_dialog(self)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Write the file."""
         rig = _rig(context)
-        with reported(self):
-            rig_map = map_of(rig)
-            required(rig, rig_map)
-            file = save_map(rig_map, self.name)
-            self.report({"INFO"}, f"Saved '{file.name}'")
-            return {"FINISHED"}
-        return {"CANCELLED"}
+        rig_map = map_of(rig)
+        required(rig, rig_map)
+        file = save_map(rig_map, self.name)
+        self.report({"INFO"}, f"Saved '{file.name}'")

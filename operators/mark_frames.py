@@ -1,18 +1,20 @@
 """Show where takes are at fault, in the timeline."""
 
+from typing import Any
+
 import bpy
 
 from ..dafnet_addon.blender import overlays
 from ..dafnet_addon.blender.armature import character_of
 from ..dafnet_addon.blender.overlay_data import faults_of, playing
 from ..dafnet_addon.blender.takes import PACKED, takes_of
+from .base import DafnetOperator
 from .generate import idle
-from .reporting import reported
 
 __all__ = ["DAFNET_OT_mark_frames"]
 
 
-class DAFNET_OT_mark_frames(bpy.types.Operator):
+class DAFNET_OT_mark_frames(DafnetOperator, bpy.types.Operator):
     """Show in the timeline where feet slide (yellow) and joints touch furniture (red) in the take
     that plays, or hide it
     """
@@ -29,31 +31,24 @@ class DAFNET_OT_mark_frames(bpy.types.Operator):
         character = character_of(context)
         return character is not None and playing(character) is not None
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Measure all takes of the character, or hide what was measured."""
-        character = character_of(context)
-        if character is None:
-            return {"CANCELLED"}
+        character: Any = character_of(context)
         plays = playing(character)
         if overlays.shown_faults(plays) is not None:
             overlays.hide_faults()
-            return {"FINISHED"}
-        with reported(self):
-            takes = dict.fromkeys(
-                [plays, *(action for action in takes_of(character) if PACKED in action)]
+            return
+        takes = dict.fromkeys(
+            [plays, *(action for action in takes_of(character) if PACKED in action)]
+        )
+        found = faults_of(context, character, (action for action in takes if action is not None))
+        overlays.show_faults(found)
+        faults = found[plays.session_uid] if plays is not None else None
+        if faults is not None:
+            sliding, touching = (
+                int((counts > 0).sum()) for counts in (faults.sliding, faults.collisions)
             )
-            found = faults_of(
-                context, character, (action for action in takes if action is not None)
+            self.report(
+                {"INFO"},
+                f"Feet slide in {sliding} frames, joints touch furniture in {touching}.",
             )
-            overlays.show_faults(found)
-            faults = found[plays.session_uid] if plays is not None else None
-            if faults is not None:
-                sliding, touching = (
-                    int((counts > 0).sum()) for counts in (faults.sliding, faults.collisions)
-                )
-                self.report(
-                    {"INFO"},
-                    f"Feet slide in {sliding} frames, joints touch furniture in {touching}.",
-                )
-            return {"FINISHED"}
-        return {"CANCELLED"}

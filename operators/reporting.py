@@ -1,25 +1,11 @@
-"""From the add-on's errors to Blender's reports."""
-
-from collections.abc import Iterator
-from contextlib import contextmanager
+"""What is reported of a walk, whichever operator keyed it."""
 
 import bpy
 
 from ..dafnet_addon.blender.walking import Walk
-from ..dafnet_addon.core.errors import DafnetError
+from .base import reported
 
 __all__ = ["keyed", "reported"]
-
-
-@contextmanager
-def reported(operator: bpy.types.Operator) -> Iterator[None]:
-    """Show an error of the add-on to the user and go on behind the block; any other exception
-    passes.
-    """
-    try:
-        yield
-    except DafnetError as error:
-        operator.report({"ERROR"}, str(error))
 
 
 def keyed(operator: bpy.types.Operator, made: Walk) -> set[str]:

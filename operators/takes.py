@@ -10,8 +10,9 @@ from bpy.props import EnumProperty, IntProperty
 from ..dafnet_addon.blender import job
 from ..dafnet_addon.blender.armature import character_of
 from ..dafnet_addon.blender.takes import active_take, drop_take, play_take, takes_of
+from ..dafnet_addon.core.errors import InputError
+from .base import DafnetOperator
 from .generate import idle
-from .reporting import reported
 
 __all__ = [
     "DAFNET_OT_clean_again",
@@ -26,7 +27,7 @@ def _character(context: bpy.types.Context) -> Any:
     return character_of(context)
 
 
-class _OfTakes:
+class _OfTakes(DafnetOperator):
     """For a character that has takes, while none is being generated."""
 
     @classmethod
@@ -58,7 +59,7 @@ class DAFNET_OT_play_take(_OfTakes, bpy.types.Operator):
         ],
     )
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Play it."""
         character = _character(context)
         rows = [row.action for row in character.dafnet.takes]
@@ -68,10 +69,8 @@ class DAFNET_OT_play_take(_OfTakes, bpy.types.Operator):
             playing = rows.index(data.action) if data and data.action in rows else 0
             index = (playing + (1 if self.step == "NEXT" else -1)) % len(rows)
         if not 0 <= index < len(rows) or rows[index] is None:
-            self.report({"ERROR"}, "This take's action was deleted; remove its row.")
-            return {"CANCELLED"}
+            raise InputError("This take's action was deleted; remove its row.")
         play_take(character, rows[index])
-        return {"FINISHED"}
 
 
 class DAFNET_OT_reject_take(_OfTakes, bpy.types.Operator):
@@ -90,11 +89,10 @@ class DAFNET_OT_reject_take(_OfTakes, bpy.types.Operator):
         cls.poll_message_set("There is no take in the list")
         return idle(cls) and character is not None and len(character.dafnet.takes) > 0
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Drop it."""
         own = _character(context).dafnet
         drop_take(own.id_data, max(0, min(own.active_take, len(own.takes) - 1)))
-        return {"FINISHED"}
 
 
 class DAFNET_OT_keep_accepted(_OfTakes, bpy.types.Operator):
@@ -104,17 +102,15 @@ class DAFNET_OT_keep_accepted(_OfTakes, bpy.types.Operator):
     bl_label = "Keep Accepted Only"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Drop the others."""
         character = _character(context)
         if not any(action.dafnet.accepted for action in takes_of(character)):
-            self.report({"ERROR"}, "No take is accepted; mark those to keep first.")
-            return {"CANCELLED"}
+            raise InputError("No take is accepted; mark those to keep first.")
         rows = character.dafnet.takes
         for index in range(len(rows) - 1, -1, -1):
             if rows[index].action is None or not rows[index].action.dafnet.accepted:
                 drop_take(character, index)
-        return {"FINISHED"}
 
 
 class DAFNET_OT_clean_again(_OfTakes, bpy.types.Operator):
@@ -126,15 +122,11 @@ class DAFNET_OT_clean_again(_OfTakes, bpy.types.Operator):
     bl_label = "Clean Up Again"
     bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> None:
         """Clean it."""
         character = _character(context)
         take = active_take(character)
         if take is None:
-            self.report({"ERROR"}, "Choose a take in the list of takes first.")
-            return {"CANCELLED"}
-        with reported(self):
-            result = job.clean_again_of(context, character, take)
-            self.report({"INFO"}, f"'{result.action.name}'")
-            return {"FINISHED"}
-        return {"CANCELLED"}
+            raise InputError("Choose a take in the list of takes first.")
+        result = job.clean_again_of(context, character, take)
+        self.report({"INFO"}, f"'{result.action.name}'")

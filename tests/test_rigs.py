@@ -1173,7 +1173,7 @@ def test_a_bake_that_is_off_is_warned_about(stage: Stage) -> None:
         def report(self, kind: set[str], message: str) -> None:
             messages.append((kind, message))
 
-    assert operator.execute(Reporter(), stage.bpy.context) == {"FINISHED"}
+    operator.run(Reporter(), stage.bpy.context)
     warned = [message for kind, message in messages if kind == {"WARNING"}]
     assert len(warned) == 1 and "left arm by" in warned[0] and "degrees" in warned[0]
     assert "wrists 0.0" in messages[-1][1] and "left arm" in messages[-1][1], (
@@ -1181,5 +1181,5 @@ def test_a_bake_that_is_off_is_warned_about(stage: Stage) -> None:
     )
     messages.clear()
     stage.bpy.context.view_layer.objects.active = stage.build("mixamo")
-    operator.execute(Reporter(), stage.bpy.context)
+    operator.run(Reporter(), stage.bpy.context)
     assert [kind for kind, _ in messages] == [{"INFO"}]

@@ -1,0 +1,39 @@
+"""What the add-on's operators share: errors become reports, and results what Blender expects."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import bpy
+
+from ..dafnet_addon.core.errors import DafnetError
+
+__all__ = ["DafnetOperator", "reported"]
+
+
+@contextmanager
+def reported(operator: bpy.types.Operator) -> Iterator[None]:
+    """Show an error of the add-on to the user and go on behind the block; any other exception
+    passes.
+    """
+    try:
+        yield
+    except DafnetError as error:
+        operator.report({"ERROR"}, str(error))
+
+
+class DafnetOperator:
+    """An operator that does one thing and is done: ``run`` does it.
+
+    Mixed into ``bpy.types.Operator``, before it.
+    """
+
+    def run(self, context: bpy.types.Context) -> None:
+        """Do it; an ``InputError`` or ``WeightsError`` says to the user why it cannot be done."""
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Run, as Blender calls it: finished, or cancelled and the error reported."""
+        with reported(self):
+            self.run(context)
+            return {"FINISHED"}
+        return {"CANCELLED"}
