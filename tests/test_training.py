@@ -275,22 +275,61 @@ def test_a_run_begins_with_what_weights_have_learnt(dataset, tmp_path):
         )
 
 
-def test_weights_that_were_not_told_of_the_way_ahead_begin_a_model_that_is(dataset, tmp_path):
-    weights = load_weights(_exported(dataset, tmp_path / "one", TINY))
-    told = replace(TINY, ahead=18)
+FORESEEING = replace(TINY, ahead=18)
+LIVE = replace(FORESEEING, ahead_mask=True)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"), [(TINY, FORESEEING), (TINY, LIVE), (FORESEEING, LIVE)]
+)
+def test_weights_that_were_told_less_of_the_way_ahead_begin_a_model_that_is_told(
+    before: ModelConfig, after: ModelConfig, dataset: Path, tmp_path: Path
+):
+    weights = load_weights(_exported(dataset, tmp_path / "one", before))
     found = _pool(dataset).statistics()
     statistics = adopted_statistics(weights, found)
     assert (statistics.pose_mean == weights.tensors["pose_mean"]).all()
     for part in ("upper", "lower"):
         short, long = (
-            Run(part, tmp_path / "two", model, _config(2), statistics) for model in (TINY, told)
+            Run(part, tmp_path / "two", model, _config(2), statistics) for model in (before, after)
         )
         for run in (short, long):
             adopt_predictor(run.gmvae.predictor, weights)
             run.adopt(weights)
         assert abs(_loss_at(short, dataset) - _loss_at(long, dataset)) < 1e-2
     with pytest.raises(WeightsError, match="choose others"):
-        Run("upper", tmp_path / "two", replace(TINY, width=8), _config(2), found).adopt(weights)
+        Run("upper", tmp_path / "two", replace(before, width=8), _config(2), found).adopt(weights)
+
+
+def test_the_way_ahead_is_hidden_from_a_share_of_the_windows(dataset, tmp_path):
+    statistics = _pool(dataset).statistics()
+    root = _pool(dataset).batch(torch.arange(4), statistics, LIVE).root.repeat(100, 1, 1)
+    assert root.shape[-1] == 22 and (root[..., -1] == 1.0).all()
+    run = Run("upper", tmp_path, LIVE, replace(_config(2), ahead_hidden=0.25), statistics)
+    told = run._foreseen(root)
+    hidden = (told[..., 3:] == 0.0).all(-1)
+    assert (hidden == hidden[:, :1]).all(), "all along a window or nowhere in it"
+    assert 0.15 < float(hidden.float().mean()) < 0.35
+    assert (told[~hidden] == root[~hidden]).all() and (told[..., :3] == root[..., :3]).all()
+
+
+def test_a_root_that_is_led_live_has_no_way_ahead(dataset, tmp_path):
+    """Models that learnt without it make poses; those that were always told say what they need."""
+    conditions = Conditions(
+        np.zeros((5, 3)),
+        np.full((5, 18), np.nan),
+        np.zeros((5, 2640)),
+        np.zeros((5, 66)),
+        np.zeros((5, 22)),
+    )
+    z = np.zeros((1, 66))
+    live = load_weights(_exported(dataset, tmp_path / "live", LIVE))
+    made = [drained(Sampler(live, device).run(conditions, z)).poses for device in (None, "cpu")]
+    assert np.isfinite(made[0]).all() and np.abs(made[0] - made[1]).max() < 1e-4
+    known = replace(conditions, ahead=np.zeros((5, 18)))
+    assert np.abs(drained(Sampler(live).run(known, z)).poses - made[0]).max() > 1e-6
+    with pytest.raises(InputError, match="whole path"):
+        drained(Sampler(load_weights()).run(conditions, z))
 
 
 def test_a_wider_network_begins_as_the_narrower_one(dataset, tmp_path):

@@ -83,9 +83,9 @@ class Conditions:
     (paper, section 4.1).
 
     ``velocity`` (T, 3): c_vel, metres and radians per frame. ``ahead`` (T, 18): where the root will
-    be (``root.ahead``), for models that are told. ``occupancy`` (T, 2640): c_env. ``observation``
-    (T, 66): c_ob, positions in metres in the model's order; what is not ``given`` (T, 22) is
-    ignored.
+    be (``root.ahead``), for models that are told; NaN where nobody knows. ``occupancy`` (T, 2640):
+    c_env. ``observation`` (T, 66): c_ob, positions in metres in the model's order; what is not
+    ``given`` (T, 22) is ignored.
     """
 
     velocity: np.ndarray
@@ -172,6 +172,9 @@ def _sizes(weights: Weights, systems: tuple[str, ...], parts: Iterable[str]) -> 
     )
     for name in ("mask", "shared_encoder"):
         said(name, lambda value: isinstance(value, bool), "true or false")
+    sizes["ahead_mask"] = said(
+        "ahead_mask", lambda value: isinstance(value, bool), "true or false", False
+    )
     said(
         "action_temperature",
         lambda value: type(value) in (int, float) and 1e-3 < value < 1e3,
@@ -318,7 +321,7 @@ class Sampler:
             array("pose_std", _POSE_SIZE),
         )
         self.velocity_mean, self.velocity_std = array("velocity_mean", 3), array("velocity_std", 3)
-        self.ahead = c["ahead"]
+        self.ahead, self.ahead_mask = c["ahead"], c["ahead_mask"] == 1
         told = ("ahead_mean", "ahead_std")
         self.ahead_mean, self.ahead_std = (
             array(name, self.ahead) if self.ahead else np.zeros(0) for name in told
@@ -356,7 +359,7 @@ class Sampler:
         )
         self._predictor_second = self._linear(array, "predictor.layers.2", width, width)
         self._predictor_out = self._linear(array, "predictor.layers.4", width, self.actions)
-        self.fresh, self.moving = self.actions, 3 + self.ahead
+        self.fresh, self.moving = self.actions, 3 + self.ahead + self.ahead_mask
         """Numbers that the nets are told at each frame anew, and that they are told of the root's
         way.
         """
@@ -476,7 +479,7 @@ class Sampler:
         velocity = (conditions.velocity - self.velocity_mean) / self.velocity_std
         window = velocities_up_to(velocity, self.history)
         occupancy = self._to(conditions.occupancy)
-        way = (conditions.ahead[:, : self.ahead] - self.ahead_mean) / self.ahead_std
+        way = self._way_ahead(conditions)
         moving = self._told_ahead(window, np.concatenate([velocity, way], axis=1), occupancy)
         yield 0.0
 
@@ -505,12 +508,30 @@ class Sampler:
                 yield 1.0
         self._past = self._to(np.zeros((takes, self.history * _POSE_SIZE)))
 
+    def _way_ahead(self, conditions: Conditions) -> np.ndarray:
+        """What the nets are told of the way ahead (T, 0), (T, 18), or (T, 19) with whether it is
+        known.
+
+        Raises InputError where it is not known to a model that was always told.
+        """
+        way = (conditions.ahead[:, : self.ahead] - self.ahead_mean) / self.ahead_std
+        known = np.isfinite(way).all(axis=1, keepdims=True)
+        if self.ahead_mask:
+            return np.concatenate([np.where(known, way, 0.0), known], axis=1)
+
+        if not known.all():
+            raise InputError(
+                f"The weights '{self.weights.path}' have to know where the root goes during the "
+                "next second; give its whole path, or choose weights for a live root."
+            )
+        return way
+
     def _told_ahead(self, window: np.ndarray, moving: np.ndarray, occupancy: Array) -> Array:
         """What the nets are told of the root's way (T, n), all frames at once; brings in what
         ``_told`` needs.
 
-        ``window`` (T, 33): velocities up to now; ``moving`` (T, 3 [+ 18]): the last of them, and
-        the way ahead.
+        ``window`` (T, 33): velocities up to now; ``moving`` (T, 3 [+ 18 [+ 1]]): the last of them,
+        the way ahead, and whether it is known.
         """
         matrix, bias = self._predictor_environment
         known, known_bias = self._predictor_known

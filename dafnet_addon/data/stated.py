@@ -1,8 +1,8 @@
 """What a ``clips.json`` or ``clips.csv`` (columns ``file`` and the same words) in a folder of
 motion files says of them:
 
-    {"*": {"licence": "CC0"}, "s2/*.bvh": {"subject": "s2", "split": "test", "category":
-    "sit-stand"}}
+    {"*": {"licence": "CC0"},
+     "s2/*.bvh": {"subject": "s2", "split": "test", "category": "sit-stand"}}
 
 Names are file names relative to the folder, in which ``*`` stands for any characters and ``?`` for
 one; later lines win.
@@ -87,8 +87,8 @@ class Stated:
             raise InputError(
                 f"The file '{self.file}' does not list clips by file name ({error}); write it in "
                 "UTF-8 like "
-                """{"*.bvh": {"licence": "CC0", "subject": "s1"}}, or as CSV with a column 'file'.
-                """
+                """{"*.bvh": {"licence": "CC0", "subject": "s1"}}, """
+                "or as CSV with a column 'file'."
             ) from None
         for pattern, fields in rows:
             wrong = sorted(set(fields) - _FIELDS)

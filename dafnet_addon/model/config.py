@@ -38,7 +38,8 @@ class ModelConfig:
     couplings of a part (else one each). ``mask``: 22 values beside the observation say which joints
     are given. ``action_temperature``: softmax temperature after training (paper, section 4.2).
     ``history``: past frames that the predictor (and MoGlow) sees. ``ahead``: numbers that tell the
-    flow where the root will be (``core.root.ahead``), or 0 as in the paper.
+    flow where the root will be (``core.root.ahead``), or 0 as in the paper. ``ahead_mask``: one
+    more says whether that is known: of a root that is led live, it is not.
 
     Raises ValueError where a size is out of its range.
     """
@@ -59,12 +60,15 @@ class ModelConfig:
     action_temperature: float = 0.7
     history: int = 10
     ahead: int = 0
+    ahead_mask: bool = False
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
             least, most = 0 if name == "ahead" else 1, _MOST.get(name, 1 << 16)
             if type(value) is int and not least <= value <= most:
                 raise ValueError(f"'{name}' must be {least} to {most}")
+        if self.ahead_mask and not self.ahead:
+            raise ValueError("'ahead_mask' is for models that are told of the way ahead ('ahead')")
         if not self.action_temperature > 0.0:
             raise ValueError("'action_temperature' must be above 0")
 
@@ -80,7 +84,8 @@ class ModelConfig:
         """Action probabilities and root velocity (and way ahead), or all of s; environment code;
         observation (and its mask).
         """
-        told = self.actions + VELOCITY_SIZE + self.ahead if self.predicts else self.scene_size
+        way = self.ahead + self.ahead_mask
+        told = self.actions + VELOCITY_SIZE + way if self.predicts else self.scene_size
         return told + self.code + POSE_SIZE + (22 if self.mask else 0)
 
     @property

@@ -61,9 +61,9 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Batch:
-    """``past`` (B, T, 693); ``upper`` (B, T, 42), ``lower`` (B, T, 24); ``root`` (B, T, 3 [+ 18]):
-    velocity and way ahead, all standardised; ``occupancy`` (B, T, 2640); ``step`` (B, T, 3): the
-    velocity in metres and radians.
+    """``past`` (B, T, 693); ``upper`` (B, T, 42), ``lower`` (B, T, 24); ``root`` (B, T, 3 [+ 18
+    [+ 1]]): velocity, way ahead, and 1, since it is known; all standardised; ``occupancy``
+    (B, T, 2640); ``step`` (B, T, 3): the velocity in metres and radians.
     """
 
     past: Tensor
@@ -179,6 +179,7 @@ class Pool:
         step = a["velocity"]
         velocity = (step - v_mean) / v_std
         way = ((a["ahead"] - a_mean) / a_std)[..., : config.ahead]
+        known = torch.ones_like(way[..., : int(config.ahead_mask)])
         now = poses[:, history:]
         if "seen" in a:
             occupancy = a["seen"].float() / 255.0
@@ -190,7 +191,7 @@ class Pool:
             past_of(poses, velocity, history),
             now[..., :UPPER_SIZE],
             now[..., UPPER_SIZE:],
-            torch.cat([velocity[:, history:], way], dim=-1),
+            torch.cat([velocity[:, history:], way, known], dim=-1),
             occupancy,
             step[:, history:],
         )

@@ -91,13 +91,15 @@ def adopt_part(part: PartFlow, name: str, weights: Weights, config: ModelConfig)
     """Give the flow's part ``name`` what a weights file of the same or smaller sizes holds. Raises
     WeightsError where they do not fit.
 
-    A file that was not told of the root's way ahead serves a model that is: what weighs it starts
-    at zero.
+    A file that was not told of the root's way ahead, or of whether that is known, serves a model
+    that is: what weighs it starts at zero.
     """
     for key, target in part.encoders.state_dict().items():
         _grown(weights, key, weights.require(f"{name}.encoders.{key}"), target)
-    told = int(weights.config["model"].get("ahead", 0))
-    if told not in (0, config.ahead):
+    model = weights.config["model"]
+    told = int(model.get("ahead", 0)) + bool(model.get("ahead_mask", False))
+    wanted = config.ahead + config.ahead_mask
+    if told not in (0, config.ahead, wanted):
         raise WeightsError(
             f"The weights '{weights.path}' are told of the root's way in another manner; choose "
             "another file."
@@ -115,13 +117,9 @@ def adopt_part(part: PartFlow, name: str, weights: Weights, config: ModelConfig)
         )
         for key, target in coupling.state_dict().items():
             array = weights.require(f"{prefix}.{key}")
-            if key == "lstm.weight_ih_l0" and told < config.ahead:
-                array = np.insert(
-                    array,
-                    [coupling.passes + config.actions + VELOCITY_SIZE] * config.ahead,
-                    0.0,
-                    axis=1,
-                )
+            if key == "lstm.weight_ih_l0" and told < wanted:
+                way = coupling.passes + config.actions + VELOCITY_SIZE
+                array = np.insert(array, [way + told] * (wanted - told), 0.0, axis=1)
             _grown(weights, f"{prefix}.{key}", array, target)
 
 

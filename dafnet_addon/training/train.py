@@ -85,6 +85,7 @@ class TrainingConfig:
     while it learns, and of past poses hidden from MoGlow. ``environment_dropout``: share of sensor
     values hidden from all, in a share ``dropout_windows`` of the windows (the paper hides them in
     all; then only whole layers of spheres are told apart, and seats are met to 12 cm).
+    ``ahead_hidden``: share of windows in which the way ahead is hidden, as it is from a live root.
     ``clip_norm``: largest gradient norm. ``free_run``: weight of the losses of motion that the flow
     makes by itself (see ``free_run``; 0 as in the paper), which begins after ``captured`` frames of
     a window, in a share ``cold`` of the batches after the first, with an empty memory, as a take
@@ -104,6 +105,7 @@ class TrainingConfig:
     slot_dropout: float = 0.95
     environment_dropout: float = 0.5
     dropout_windows: float = 0.5
+    ahead_hidden: float = 0.0
     clip_norm: float = 50.0
     free_run: float = 0.0
     captured: int = 20
@@ -377,7 +379,8 @@ class Run:
         """The part's poses (B, T, …), and what its flow is told of them beside the environment."""
         if self.model.predicts:
             with torch.no_grad():
-                base = torch.cat([self.gmvae.predictor(batch.past, occupancy), batch.root], dim=-1)
+                actions = self.gmvae.predictor(batch.past, occupancy)
+            base = torch.cat([actions, self._foreseen(batch.root)], dim=-1)
         else:
             # MoGlow's data dropout: whole past poses are hidden, so that it heeds what it is told.
             base = batch.past.clone()
@@ -389,6 +392,16 @@ class Run:
         return pose[..., self.flow.places[self.part]], self.flow.condition(
             self.part, base, observation, given, pose
         )
+
+    def _foreseen(self, root: torch.Tensor) -> torch.Tensor:
+        """What is told of the root (B, T, 3 [+ 18 [+ 1]]), its way ahead hidden in some windows: a
+        root that is led live has none yet.
+        """
+        if not self.model.ahead_mask:
+            return root
+        foreseen = torch.rand(len(root), 1, 1, device=self.device) >= self.config.ahead_hidden
+        velocity, way = root[..., :VELOCITY_SIZE], root[..., VELOCITY_SIZE:]
+        return torch.cat([velocity, way * foreseen], dim=-1)
 
     def _free_run(
         self,
