@@ -1,7 +1,7 @@
 """Everything in which Blender 4.2, 4.5, 5.0 and 5.2 differ for this add-on.
 
-Actions have slots from 4.4 on, and ``Action.fcurves`` is gone in 5.0; video is a media type of its
-own from 5.0 on.
+Actions have slots from 4.4 on, and ``Action.fcurves`` is gone in 5.0; images and video are
+media types of their own from 5.0 on.
 """
 
 from collections.abc import Callable
@@ -15,6 +15,7 @@ __all__ = [
     "action_curves",
     "animated_paths",
     "shares_curves",
+    "output_image",
     "output_video",
 ]
 
@@ -131,6 +132,14 @@ def shares_curves(owner: bpy.types.ID, other: bpy.types.ID) -> bool:
     if mine is None or theirs is None or mine.action is None or theirs.action != mine.action:
         return False
     return not _SLOTS or theirs.action_slot_handle == mine.action_slot_handle
+
+
+def output_image(scene: bpy.types.Scene) -> None:
+    """Let the scene render to a PNG file."""
+    image = scene.render.image_settings
+    if hasattr(image, "media_type"):
+        image.media_type = "IMAGE"
+    image.file_format = "PNG"
 
 
 def output_video(scene: bpy.types.Scene) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from mathutils import Vector
 
 from ..core.files import whole_file
-from .compat import output_video
+from .compat import output_image, output_video
 
 __all__ = ["look_at", "render_film", "render_sheet", "use_workbench"]
 
@@ -89,10 +89,7 @@ def render_sheet(
     white.
     """
     use_workbench(scene)
-    settings = scene.render.image_settings
-    if hasattr(settings, "media_type"):  # since 5.0
-        settings.media_type = "IMAGE"
-    settings.file_format = "PNG"
+    output_image(scene)
     scene.display.render_aa = "8"  # few frames that may take longer
     images = []
     with TemporaryDirectory() as folder:

@@ -33,7 +33,7 @@ __all__ = [
 
 _TRIES, _TURN = 4, 0.7  # random poses, and how far they turn, radians
 _RIGID = 0.01
-_ROOT, _OBJECT = -1, -1
+_ROOT = -1
 _CARRIED = (1, 2, 3, 6, 9)  # joints that have to go where the pelvis goes
 
 

@@ -18,6 +18,7 @@ from ..core.rotations import rotate, yaw_matrix
 from ..core.skeleton import JOINTS, REST
 from ..core.solids import Box
 from ..demo import Place
+from .compat import output_image
 from .demo_room import Part, add_piece
 from .mannequin import FACING, add_body
 from .preview import use_workbench
@@ -222,10 +223,8 @@ class Stage:
             -0.6 * np.sin(self._light_from),
         )
         display.shading.shadow_intensity = 0.30
-        settings = self.scene.render.image_settings
-        if hasattr(settings, "media_type"):  # since 5.0
-            settings.media_type = "IMAGE"
-        settings.file_format, settings.color_mode = "PNG", "RGB"
+        output_image(self.scene)
+        self.scene.render.image_settings.color_mode = "RGB"
         self.scene.render.dither_intensity = 0.0  # noise that no palette would keep small
         self.scene.render.filepath = str(file)
         bpy.ops.render.render(write_still=True, scene=self.scene.name)
