@@ -58,7 +58,7 @@ class Stage:
         )
 
     def steps(self, **overrides: Any) -> Any:
-        return self.addon("dafnet_addon.blender.scene_reader").read_steps(
+        return self.addon("dafnet_addon.blender.scene_reader").read_scene.steps(
             self.bpy.context, self.settings(**overrides)
         )
 

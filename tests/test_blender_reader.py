@@ -410,7 +410,7 @@ def test_the_frame_is_kept_while_reading(stage: Stage) -> None:
         stage.ann, stage.scene, frame_end=100
     )
     progress = []
-    for share in stage.addon("dafnet_addon.blender.scene_reader").read_steps(
+    for share in stage.addon("dafnet_addon.blender.scene_reader").read_scene.steps(
         stage.bpy.context, settings
     ):
         progress.append(share)

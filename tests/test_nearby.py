@@ -110,13 +110,13 @@ def test_takes_are_the_same_to_the_last_bit_and_far_grids_are_not_built(
     )
     clean, weights = CleanUp(1.0, 1.0, 1.0, 1.0, 0.5), load_weights()
     built: list[str] = []
-    real = distance._grid_of_steps
+    real = distance.grid_of.steps
 
     def counted(mesh: Mesh, floor: float):
         built.append(mesh.name)
         return (yield from real(mesh, floor))
 
-    monkeypatch.setattr(distance, "_grid_of_steps", counted)
+    monkeypatch.setattr(distance.grid_of, "steps", counted)
     scene = Scene((seat, *crowd))
     take = generate(scene, controls, weights, clean_up=clean)
     few = len(set(built))

@@ -1,7 +1,9 @@
 """Long jobs as generators, and the one BLAS thread that their small steps run on."""
 
 import ctypes
+import inspect
 import os
+import pickle
 from collections.abc import Callable, Generator
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,8 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dafnet_addon import Take, generate
 from dafnet_addon.core import threads
-from dafnet_addon.core.progress import drained, within
+from dafnet_addon.core.progress import drained, stepwise, within
 from dafnet_addon.core.threads import _openblas, cores, one_thread
 
 
@@ -44,6 +47,30 @@ def test_closing_a_job_closes_its_part():
     next(part)
     part.close()
     assert closed == [True]
+
+
+@stepwise
+def doubled(number: float, times: int = 1) -> Generator[float, None, float]:
+    """The number, doubled some times."""
+    for time in range(times):
+        yield time / times
+        number *= 2
+    return number
+
+
+def test_a_stepwise_job_runs_to_its_end_or_step_by_step():
+    seen: list[float] = []
+    assert doubled(3.0, times=2) == 12.0 and doubled(3.0) == 6.0
+    assert drained(doubled.steps(3.0, times=2), seen.append) == 12.0 and seen == [0.0, 0.5]
+
+
+def test_a_stepwise_job_is_told_of_as_the_function_that_it_is():
+    for function, result in ((doubled, float), (generate, Take)):
+        assert inspect.isfunction(function) and pickle.loads(pickle.dumps(function)) is function
+        assert inspect.signature(function).return_annotation is result
+        assert inspect.signature(function.steps).return_annotation == Generator[float, None, result]
+    assert inspect.getdoc(doubled) == "The number, doubled some times."
+    assert list(inspect.signature(generate).parameters)[:3] == ["scene", "controls", "weights"]
 
 
 def test_one_thread_gives_back_what_it_took():

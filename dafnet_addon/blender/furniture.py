@@ -65,7 +65,7 @@ def furniture_now(context: bpy.types.Context, settings: Settings) -> dict[str, l
     """The furniture's meshes in the current frame by the names of the objects that they belong to;
     world, metres.
 
-    ``InputError`` where there is none to be seen, as for ``scene_reader.read_steps``.
+    ``InputError`` where there is none to be seen, as for ``scene_reader.read_scene``.
     """
     scene = find_scene(settings)
     furniture = furniture_of(settings, Dependencies(scene))

@@ -17,7 +17,7 @@ from .. import load_weights
 from ..core.cleanup import CleanUp
 from ..core.errors import InputError
 from ..core.generate import Draw, clean_again_steps, takes_steps
-from ..core.progress import drained, within
+from ..core.progress import drained, stepwise, within
 from ..core.take import Controls, Take
 from .armature import metres_per_unit
 from .baker import bake
@@ -33,7 +33,7 @@ from .properties import (
     weights_path,
 )
 from .rollback import state_of, undone_on_failure
-from .scene_reader import read_steps
+from .scene_reader import read_scene
 from .takes import add_take, draw_of, play_take, stored
 
 if TYPE_CHECKING:
@@ -86,7 +86,8 @@ def _clean_up(settings: Settings) -> CleanUp:
     return CleanUp(**{strength: getattr(settings, name) for name, strength in CLEAN_UP.items()})
 
 
-def steps(
+@stepwise
+def run(
     context: bpy.types.Context,
     settings: Settings,
     weights: "Weights | None" = None,
@@ -96,7 +97,7 @@ def steps(
 
     ``settings`` comes from ``settings_of(armature, scene, **overrides)``. Without ``weights`` those
     of the preferences, else the shipped ones, are loaded. ``watch``: see ``takes_steps``. The
-    current frame is as it was at every yield (but see ``read_steps`` for simulations). Any error
+    current frame is as it was at every yield (but see ``read_scene`` for simulations). Any error
     (``InputError``, ``WeightsError`` or whatever else), and ``close()``, leaves the scene as it
     was.
     """
@@ -120,7 +121,7 @@ def steps(
                 "frame in it."
             )
     try:
-        read = yield from within(read_steps(context, settings), 0.0, _READ)
+        read = yield from within(read_scene.steps(context, settings), 0.0, _READ)
     except ReferenceError as error:
         raise InputError(
             "Something was deleted while the scene was read; generate again."
@@ -153,6 +154,9 @@ def steps(
     return Result(
         tuple(actions), tuple(takes), tuple(draws), read.warnings + takes[0].warnings, seconds
     )
+
+
+steps = run.steps
 
 
 def _bake_steps(
@@ -193,11 +197,6 @@ def _unbake(
         bpy.data.actions.remove(action)
 
 
-def run(context: bpy.types.Context, settings: Settings, weights: "Weights | None" = None) -> Result:
-    """``steps`` drained."""
-    return drained(steps(context, settings, weights))
-
-
 def clean_again_of(
     context: bpy.types.Context, armature: bpy.types.Object, action: bpy.types.Action
 ) -> Result:
@@ -212,7 +211,7 @@ def clean_again_of(
     settings = settings_of(
         armature, context.scene, frame_start=start, frame_end=start + len(take) - 1, mode="FREE"
     )
-    read = drained(read_steps(context, settings))
+    read = read_scene(context, settings)
     again = drained(clean_again_steps(read.scene, controls, take, _clean_up(settings)))
     draw = draw_of(action)
     actions = drained(_bake_steps(settings, [again], controls, [draw]))

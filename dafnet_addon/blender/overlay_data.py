@@ -714,7 +714,7 @@ def faults_of(
     """Faults of takes by their actions' ``session_uid``, among the furniture as the scene has it in
     each frame.
 
-    ``InputError`` as for ``read_steps``, and where an action holds no take.
+    ``InputError`` as for ``read_scene``, and where an action holds no take.
     """
     found, scenes = {}, {}
     for action in actions:

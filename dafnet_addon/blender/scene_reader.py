@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.progress import drained
+from ..core.progress import stepwise
 from ..core.root import (
     POSITION_SIGMA,
     YAW_SIGMA,
@@ -41,7 +41,7 @@ from .rig_reading import joints_of, pose_matrices
 from .rigs import RigMap, required
 from .takes import stored
 
-__all__ = ["ReadScene", "read_steps", "read_scene"]
+__all__ = ["ReadScene", "read_scene"]
 
 _TURNED = np.radians(0.1)
 # degrees, mean, by which a copied upper body may lie otherwise than its source without a word
@@ -64,12 +64,8 @@ class ReadScene:
     warnings: tuple[str, ...]
 
 
-def read_scene(context: bpy.types.Context, settings: Settings) -> ReadScene:
-    """``read_steps`` drained."""
-    return drained(read_steps(context, settings))
-
-
-def read_steps(context: bpy.types.Context, settings: Settings) -> Generator[float, None, ReadScene]:
+@stepwise
+def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[float, None, ReadScene]:
     """Read the scene; yields progress in [0, 1], at which the current frame is as it was.
 
     Only where a simulation that is not baked moves what is read, the frames run on in order from

@@ -15,7 +15,7 @@ import numpy as np
 
 from .errors import InputError
 from .kinematics import on_bones, two_bone
-from .progress import drained
+from .progress import stepwise
 from .root import gaussian
 from .rotations import matrix_from_vector, smoothstep
 from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, TOE_HEIGHT, joint
@@ -23,7 +23,6 @@ from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, TOE_HEIGHT, joint
 __all__ = [
     "CleanUp",
     "cleaned",
-    "cleaning_steps",
     "cleared",
     "planted",
     "seated",
@@ -433,19 +432,8 @@ def _bent(
     return joints
 
 
+@stepwise
 def cleaned(
-    joints: np.ndarray,
-    targets: dict[str, np.ndarray],
-    settings: CleanUp,
-    floor: np.ndarray | float = 0.0,
-    tops: np.ndarray | None = None,
-    distance: Distance | None = None,
-) -> np.ndarray:
-    """``cleaning_steps`` drained."""
-    return drained(cleaning_steps(joints, targets, settings, floor, tops, distance))
-
-
-def cleaning_steps(
     joints: np.ndarray,
     targets: dict[str, np.ndarray],
     settings: CleanUp,

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .checks import in_frames
-from .distance import BAND, prepared_steps, rigid_split, scaled
+from .distance import BAND, prepared, rigid_split, scaled
 from .errors import InputError
 from .kinematics import Turn
 from .nearby import REACH_OF_A_BODY, beside
-from .occupancy import occupancy_steps
+from .occupancy import occupancy
 from .passage import listed, passages, seats_along
 from .progress import within
 from .resampling import (
@@ -409,10 +409,10 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     own_scene = scaled(_those(scene, moved, near), 1.0 / controls.scale)
     floor = float(np.median(path.position[:, 2]))
     scene, said = yield from within(
-        prepared_steps(scaled(near, 1.0 / controls.scale), floor, controls.scale), 0.0, 0.5
+        prepared.steps(scaled(near, 1.0 / controls.scale), floor, controls.scale), 0.0, 0.5
     )
     warnings += said
-    occupied = yield from within(occupancy_steps(scene, path), 0.5, 1.0)
+    occupied = yield from within(occupancy.steps(scene, path), 0.5, 1.0)
     _look_around(scene, path, occupied, warnings)
 
     # Before the first frame nothing but a seat under the root is there, so that who starts beside

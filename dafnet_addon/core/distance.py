@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .progress import drained, within
+from .progress import stepwise, within
 from .solids import Box, Mesh, Scene
 
 __all__ = [
@@ -30,7 +30,6 @@ __all__ = [
     "build_grid",
     "grid_of",
     "prepared",
-    "prepared_steps",
     "scaled",
 ]
 
@@ -372,15 +371,9 @@ def _furniture(
     return (top > FLOOR)[part] & ~underfoot, room[part]
 
 
+@stepwise
 def build_grid(
     vertices: np.ndarray, triangles: np.ndarray, floor: np.ndarray | None = None
-) -> DistanceGrid:
-    """``_grid_steps`` drained."""
-    return drained(_grid_steps(vertices, triangles, floor))
-
-
-def _grid_steps(
-    vertices: np.ndarray, triangles: np.ndarray, floor: np.ndarray | None
 ) -> Generator[float, None, DistanceGrid]:
     """Distance grid of a mesh, ``vertices`` (V, 3) in its rigid space, metres; ``triangles`` (F,
     3).
@@ -456,12 +449,8 @@ def _floor_plane(rigid: np.ndarray, floor: float) -> np.ndarray | None:
     return planes[0]
 
 
-def grid_of(mesh: Mesh, floor: float) -> DistanceGrid:
-    """``_grid_of_steps`` drained."""
-    return drained(_grid_of_steps(mesh, floor))
-
-
-def _grid_of_steps(mesh: Mesh, floor: float) -> Generator[float, None, DistanceGrid]:
+@stepwise
+def grid_of(mesh: Mesh, floor: float) -> Generator[float, None, DistanceGrid]:
     """The mesh's distance grid: its own, one made before for the same geometry, or a new one.
 
     ``floor``: height of the root's plane in the world (metres). The scale of the first frame
@@ -479,19 +468,15 @@ def _grid_of_steps(mesh: Mesh, floor: float) -> Generator[float, None, DistanceG
     key.update(b"" if plane is None else np.rint(plane * 1e4).astype(np.int64).tobytes())
     name = key.digest()
     if name not in _cache:
-        _cache[name] = yield from _grid_steps(vertices, np.asarray(mesh.triangles), plane)
+        _cache[name] = yield from build_grid.steps(vertices, np.asarray(mesh.triangles), plane)
     _cache.move_to_end(name)
     while len(_cache) > 1 and sum(grid.values.nbytes for grid in _cache.values()) > _CACHED_BYTES:
         _cache.popitem(last=False)
     return _cache[name]
 
 
-def prepared(scene: Scene, floor: float) -> tuple[Scene, tuple[str, ...]]:
-    """``prepared_steps`` drained."""
-    return drained(prepared_steps(scene, floor))
-
-
-def prepared_steps(
+@stepwise
+def prepared(
     scene: Scene,
     floor: float,
     size: float = 1.0,
@@ -506,7 +491,7 @@ def prepared_steps(
     for solid in scene.solids:
         if isinstance(solid, Mesh):
             done, one = len(solids) / len(scene.solids), 1 / len(scene.solids)
-            grid = yield from within(_grid_of_steps(solid, floor), done, done + one)
+            grid = yield from within(grid_of.steps(solid, floor), done, done + one)
             solid = replace(solid, grid=grid)
             across = max(grid.values.shape) * grid.spacing
             linear = rigid_split(solid.matrix)[1].reshape(-1, 3, 3)

@@ -10,7 +10,7 @@ from time import perf_counter
 import numpy as np
 
 from .checks import MOST_SEED, number, whole
-from .cleanup import CleanUp, cleaning_steps, reaching
+from .cleanup import CleanUp, cleaned, reaching
 from .conditions import PREROLL, Change, Shot, rolled, shot_steps, targets_of, turns_of
 from .errors import InputError
 from .kinematics import (
@@ -24,7 +24,7 @@ from .kinematics import (
 )
 from .metrics import summary
 from .occupancy import distance, tops_under
-from .progress import drained, within
+from .progress import stepwise, within
 from .resampling import (
     MODEL_FPS,
     covering_frames,
@@ -109,12 +109,8 @@ def _kept(resume: Take, frame: int, controls: Controls, path: RootPath) -> np.nd
     )
 
 
-def cleaned_up(joints: np.ndarray, shot: Shot, settings: CleanUp) -> np.ndarray:
-    """``_clean_up_steps`` drained."""
-    return drained(_clean_up_steps(joints, shot, settings))
-
-
-def _clean_up_steps(
+@stepwise
+def cleaned_up(
     joints: np.ndarray, shot: Shot, settings: CleanUp
 ) -> Generator[float, None, np.ndarray]:
     """Joints (N, 22, 3) of a shot, canonical metres, on constant bones, after all that ``settings``
@@ -126,7 +122,7 @@ def _clean_up_steps(
     yield 0.2
     targets = targets_of(shot.path, shot.told)
     return (
-        yield from within(cleaning_steps(joints, targets, settings, floor, tops, reach), 0.2, 1.0)
+        yield from within(cleaned.steps(joints, targets, settings, floor, tops, reach), 0.2, 1.0)
     )
 
 
@@ -222,7 +218,7 @@ def _finished_steps(
     yield 0.4
     if clean_up.asked:
         joints = yield from within(
-            _clean_up_steps(_joints(motion), shot, replace(clean_up, reach=0.0)), 0.4, 0.6
+            cleaned_up.steps(_joints(motion), shot, replace(clean_up, reach=0.0)), 0.4, 0.6
         )
         yield 0.6
         if not same:
@@ -387,7 +383,8 @@ def clean_again_steps(
     )
 
 
-def generate_steps(
+@stepwise
+def generate(
     scene: Scene,
     controls: Controls,
     weights: Weights,
@@ -418,31 +415,4 @@ def generate_steps(
     return takes[0]
 
 
-def generate(
-    scene: Scene,
-    controls: Controls,
-    weights: Weights,
-    *,
-    seed: int = 0,
-    lower_seed: int | None = None,
-    temperature: float = 0.0,
-    resume: Take | None = None,
-    resume_frame: int = 0,
-    device: str | None = None,
-    clean_up: CleanUp = RAW,
-) -> Take:
-    """Drain ``generate_steps``, whose arguments these are, and return its take."""
-    return drained(
-        generate_steps(
-            scene,
-            controls,
-            weights,
-            seed=seed,
-            lower_seed=lower_seed,
-            temperature=temperature,
-            resume=resume,
-            resume_frame=resume_frame,
-            device=device,
-            clean_up=clean_up,
-        )
-    )
+generate_steps = generate.steps

@@ -13,13 +13,13 @@ import numpy as np
 
 from .checks import in_frames
 from .distance import BAND, FLOOR, grid_of, rigid_frames
-from .progress import drained
+from .progress import stepwise
 from .root import RootPath
 from .rotations import rotate, transpose
 from .sensor import HEIGHT, RADIUS, REACH, SPHERES, occupancy_of_distance
 from .solids import Box, Scene, box_distance
 
-__all__ = ["occupancy", "occupancy_steps", "distance", "tops_under"]
+__all__ = ["occupancy", "distance", "tops_under"]
 
 _FRAMES_AT_ONCE = 32
 # metres over the floor between which tops are looked for, and how finely
@@ -64,12 +64,8 @@ def _fields(scene: Scene, floor: np.ndarray, reach: float) -> Iterator[_Field]:
                 yield _Field(rotation, position, np.ones(frames, bool), low, high, grid.sample)
 
 
-def occupancy(scene: Scene, path: RootPath) -> np.ndarray:
-    """``occupancy_steps`` drained."""
-    return drained(occupancy_steps(scene, path))
-
-
-def occupancy_steps(scene: Scene, path: RootPath) -> Generator[float, None, np.ndarray]:
+@stepwise
+def occupancy(scene: Scene, path: RootPath) -> Generator[float, None, np.ndarray]:
     """Occupancy (T, 2640) float32 of the sensor on every frame of ``path``, the largest over all
     solids.
 
