@@ -6,8 +6,7 @@ import bpy
 from bpy.props import EnumProperty
 
 from ..dafnet_addon.blender.examples import EXAMPLES, add_example
-from .base import DafnetOperator
-from .generate import idle
+from .base import DafnetOperator, idle
 
 __all__ = ["DAFNET_OT_add_example"]
 

@@ -4,8 +4,7 @@ import bpy
 
 from ..dafnet_addon.blender.armature import character_of
 from ..dafnet_addon.blender.targets import add_root, lacks_root
-from .base import DafnetOperator
-from .generate import idle
+from .base import DafnetOperator, idle
 
 __all__ = ["DAFNET_OT_add_root"]
 

@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import bpy
 
+from ..dafnet_addon.blender.running import running_job
 from ..dafnet_addon.core.errors import DafnetError
 
-__all__ = ["DafnetOperator", "reported"]
+__all__ = ["DafnetOperator", "idle", "reported"]
 
 
 @contextmanager
@@ -37,3 +39,11 @@ class DafnetOperator:
             self.run(context)
             return {"FINISHED"}
         return {"CANCELLED"}
+
+
+def idle(operator: Any) -> bool:
+    """Whether no job is running; else the operator's button says why it has to wait."""
+    if running_job() is None:
+        return True
+    operator.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
+    return False

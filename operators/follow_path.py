@@ -16,7 +16,7 @@ from ..dafnet_addon.blender.path_sources import (
     through_points,
 )
 from ..dafnet_addon.core.trails import FASTEST, SLOWEST
-from .generate import idle
+from .base import idle
 from .reporting import keyed, reported
 
 __all__ = [

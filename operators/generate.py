@@ -2,7 +2,7 @@
 
 from collections.abc import Generator
 from time import perf_counter
-from typing import Any, ClassVar
+from typing import Any
 
 import bpy
 import numpy as np
@@ -10,11 +10,12 @@ from bpy.props import EnumProperty
 
 from ..dafnet_addon.blender import job, overlays
 from ..dafnet_addon.blender.armature import character_of
+from ..dafnet_addon.blender.running import RunningJob, begin_job, end_job, running_job
 from ..dafnet_addon.blender.takes import active_take, draw_of, frames_of
 from ..dafnet_addon.core.errors import InputError
 from .base import DafnetOperator, reported
 
-__all__ = ["DAFNET_OT_cancel", "DAFNET_OT_generate", "idle"]
+__all__ = ["DAFNET_OT_cancel", "DAFNET_OT_generate"]
 
 _TICK = 0.02
 """Seconds of work between two looks at the user's input."""
@@ -61,15 +62,7 @@ class DAFNET_OT_generate(DafnetOperator, bpy.types.Operator):
         ],
     )
 
-    progress: ClassVar[float | None] = None
-    """How far the running job is, None where none runs; for the panel."""
-    growing: ClassVar[np.ndarray | None] = None
-    """The joints (22, 3) of the frame just made, world, metres; for the viewport."""
-    left: ClassVar[float] = 0.0
-    """Seconds that the running job will still take."""
-    stopping: ClassVar[bool] = False
-    """Whether the Cancel button was pressed."""
-
+    _running: RunningJob
     _started: float
     _steps: Generator[float, None, job.Result]
     _timer: bpy.types.Timer
@@ -78,7 +71,7 @@ class DAFNET_OT_generate(DafnetOperator, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """A character with a root, and no other job."""
         character = character_of(context)
-        if cls.progress is not None:
+        if running_job() is not None:
             cls.poll_message_set("A take is being generated already")
         elif character is None:
             cls.poll_message_set("Select a character, or add one")
@@ -142,9 +135,8 @@ class DAFNET_OT_generate(DafnetOperator, bpy.types.Operator):
             self._timer = manager.event_timer_add(0.01, window=context.window)
             manager.progress_begin(0, 100)
             manager.modal_handler_add(self)
-            own = type(self)
-            own.progress, own.left, own.stopping, own.growing = 0.0, 0.0, False, None
-            overlays.show_growing(lambda: own.growing)
+            running = self._running = begin_job()
+            overlays.show_growing(lambda: running.joints)
             return {"RUNNING_MODAL"}
         return {"CANCELLED"}
 
@@ -153,7 +145,7 @@ class DAFNET_OT_generate(DafnetOperator, bpy.types.Operator):
 
         Until the end only looking around is let through, so the scene stays as it was read.
         """
-        if event.type == "ESC" or self.stopping:
+        if event.type == "ESC" or self._running.cancel_requested:
             self.cancel(context)
             self.report({"INFO"}, "Cancelled; the scene is as it was")
             return {"CANCELLED"}
@@ -181,8 +173,7 @@ class DAFNET_OT_generate(DafnetOperator, bpy.types.Operator):
     def cancel(self, context: bpy.types.Context) -> None:
         """End the job, which leaves the scene untouched unless it has finished."""
         self._steps.close()
-        own = type(self)
-        own.progress, own.growing, own.stopping = None, None, False
+        end_job()
         overlays.hide_growing()
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
@@ -191,7 +182,7 @@ class DAFNET_OT_generate(DafnetOperator, bpy.types.Operator):
         _redraw(context)
 
     def _watch(self, _frame: int, joints: np.ndarray) -> None:
-        type(self).growing = joints
+        self._running.joints = joints
 
     def _pump(self, context: bpy.types.Context) -> job.Result | None:
         """Work for a tick; the result once it is there."""
@@ -200,15 +191,15 @@ class DAFNET_OT_generate(DafnetOperator, bpy.types.Operator):
         # after a long step another one is likely, which had better have its own tick
         while now < until and step < _TICK / 2:
             try:
-                type(self).progress = next(self._steps)
+                self._running.progress = next(self._steps)
             except StopIteration as done:
                 return done.value
             step, now = perf_counter() - now, perf_counter()
-        share, spent = self.progress or 0.0, perf_counter() - self._started
-        type(self).left = spent * (1.0 - share) / max(share, 0.01)
+        share, spent = self._running.progress, perf_counter() - self._started
+        self._running.seconds_left = spent * (1.0 - share) / max(share, 0.01)
         context.window_manager.progress_update(100 * share)
         context.workspace.status_text_set(
-            f"DAFNet: {100 * share:.0f} %, {self.left:.0f} s left. Esc cancels"
+            f"DAFNet: {100 * share:.0f} %, {self._running.seconds_left:.0f} s left. Esc cancels"
         )
         _redraw(context)
         return None
@@ -223,14 +214,6 @@ class DAFNET_OT_generate(DafnetOperator, bpy.types.Operator):
         self.report({"INFO"}, f"{len(result.take)} frames in {seconds:.1f} s: {takes}")
 
 
-def idle(operator: Any) -> bool:
-    """Whether nothing is being generated; else the operator's button says why it waits."""
-    if DAFNET_OT_generate.progress is None:
-        return True
-    operator.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
-    return False
-
-
 class DAFNET_OT_cancel(DafnetOperator, bpy.types.Operator):
     """Stop generating; the scene stays as it was"""
 
@@ -242,11 +225,12 @@ class DAFNET_OT_cancel(DafnetOperator, bpy.types.Operator):
     def poll(cls, _context: bpy.types.Context) -> bool:
         """Something is being generated."""
         cls.poll_message_set("Nothing is being generated")
-        return DAFNET_OT_generate.progress is not None
+        return running_job() is not None
 
     def run(self, _context: bpy.types.Context) -> None:
         """Let the running job end itself at its next tick."""
-        DAFNET_OT_generate.stopping = True
+        if (running := running_job()) is not None:
+            running.cancel_requested = True
 
 
 def _over_sidebar(context: bpy.types.Context, event: bpy.types.Event) -> bool:

@@ -8,8 +8,7 @@ from ..dafnet_addon.blender import overlays
 from ..dafnet_addon.blender.armature import character_of
 from ..dafnet_addon.blender.overlay_data import faults_of, playing
 from ..dafnet_addon.blender.takes import PACKED, takes_of
-from .base import DafnetOperator
-from .generate import idle
+from .base import DafnetOperator, idle
 
 __all__ = ["DAFNET_OT_mark_frames"]
 

@@ -11,8 +11,7 @@ from ..dafnet_addon.blender import job
 from ..dafnet_addon.blender.armature import character_of
 from ..dafnet_addon.blender.takes import active_take, drop_take, play_take, takes_of
 from ..dafnet_addon.core.errors import InputError
-from .base import DafnetOperator
-from .generate import idle
+from .base import DafnetOperator, idle
 
 __all__ = [
     "DAFNET_OT_clean_again",

@@ -5,7 +5,7 @@ from bpy.props import EnumProperty, FloatProperty
 
 from ..dafnet_addon.blender.armature import sent
 from ..dafnet_addon.blender.walking import walk
-from .generate import idle
+from .base import idle
 from .reporting import keyed, reported
 
 __all__ = ["DAFNET_OT_walk_to"]

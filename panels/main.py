@@ -6,6 +6,7 @@ import bpy
 
 from ..dafnet_addon.blender.armature import character_of, sent
 from ..dafnet_addon.blender.compat import action_curves
+from ..dafnet_addon.blender.running import running_job
 from ..dafnet_addon.blender.targets import lacks_root, missing_targets
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.add_root import DAFNET_OT_add_root
@@ -29,7 +30,7 @@ class CharacterPanel:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """A character is active."""
-        return DAFNET_OT_generate.progress is None and character_of(context) is not None
+        return running_job() is None and character_of(context) is not None
 
 
 class DAFNET_PT_character(bpy.types.Panel):
@@ -49,13 +50,10 @@ class DAFNET_PT_character(bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the settings of the active character, or the way to get one."""
         layout = self.layout
-        if DAFNET_OT_generate.progress is not None:
+        if (running := running_job()) is not None:
             layout.progress(
-                factor=DAFNET_OT_generate.progress,
-                text=(
-                    f"{100 * DAFNET_OT_generate.progress:.0f} %, {DAFNET_OT_generate.left:.0f} s "
-                    "left"
-                ),
+                factor=running.progress,
+                text=f"{100 * running.progress:.0f} %, {running.seconds_left:.0f} s left",
             )
             layout.operator(DAFNET_OT_cancel.bl_idname, icon="CANCEL")
             return

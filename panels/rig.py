@@ -6,8 +6,8 @@ import bpy
 
 from ..dafnet_addon.blender.rig_properties import rig_of
 from ..dafnet_addon.blender.rigs import NEEDED
+from ..dafnet_addon.blender.running import running_job
 from ..operators.bake_to_rig import DAFNET_OT_bake_to_rig
-from ..operators.generate import DAFNET_OT_generate
 from ..operators.map_rig import DAFNET_OT_detect_rig, DAFNET_OT_load_rig_map, DAFNET_OT_save_rig_map
 
 __all__ = ["DAFNET_PT_rig", "DAFNET_UL_rig"]
@@ -53,7 +53,7 @@ class DAFNET_PT_rig(bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """An armature that is no character is active."""
-        return DAFNET_OT_generate.progress is None and rig_of(context) is not None
+        return running_job() is None and rig_of(context) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the list, the choices and the button."""

@@ -5,6 +5,7 @@ import bpy
 from ..dafnet_addon.blender.armature import sent
 from ..dafnet_addon.blender.examples import EXAMPLES
 from ..dafnet_addon.blender.path_sources import chosen, floor_points, is_curve, may_move
+from ..dafnet_addon.blender.running import running_job
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.add_example import DAFNET_OT_add_example
 from ..operators.add_targets import DAFNET_OT_add_targets
@@ -14,7 +15,6 @@ from ..operators.follow_path import (
     DAFNET_OT_walk_along_curve,
     DAFNET_OT_walk_through_points,
 )
-from ..operators.generate import DAFNET_OT_generate
 from ..operators.walk_to import DAFNET_OT_walk_to
 from .main import CharacterPanel
 
@@ -32,7 +32,7 @@ class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
         """There is a character to direct: the active one, one that is selected beside its goal, or
         the only one.
         """
-        return DAFNET_OT_generate.progress is None and sent(context)[0] is not None
+        return running_job() is None and sent(context)[0] is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the buttons, with the names of what they would take."""

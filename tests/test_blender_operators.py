@@ -225,7 +225,7 @@ def test_the_panel_draws(shot: Shot, addon) -> None:
             return call
 
     panel = addon("panels.main").DAFNET_PT_character
-    operator = addon("operators.generate").DAFNET_OT_generate
+    running = addon("dafnet_addon.blender.running")
 
     def drawn() -> list[str]:
         Layout.drawn = []
@@ -242,7 +242,7 @@ def test_the_panel_draws(shot: Shot, addon) -> None:
     assert "upper_body_source" in drawn() and "head" not in drawn()
     shot.ann.dafnet.keyframe_insert("mode", frame=1)
     assert {"upper_body_source", "head"} <= set(drawn())
-    operator.progress = 0.5
+    running.begin_job().progress = 0.5
     try:
         assert (
             "50 %, 0 s left" in drawn()
@@ -251,7 +251,7 @@ def test_the_panel_draws(shot: Shot, addon) -> None:
         )
         assert not shot.bpy.ops.dafnet.generate.poll()
     finally:
-        operator.progress = None
+        running.end_job()
     shot.bpy.context.view_layer.objects.active = None
     assert "dafnet.add_character" in drawn() and "root" not in drawn()
 

@@ -16,7 +16,6 @@ class Careless:
         self.bpy, self.addon, self.folder = bpy, addon, folder
         self.random = np.random.default_rng(seed)
         self.job = addon("dafnet_addon.blender.job")
-        self.generate = addon("operators.generate").DAFNET_OT_generate
         self.errors = 0
         self.states: list[set[str]] = []
         self.at = -1
@@ -211,10 +210,11 @@ def test_a_hundred_random_actions(blender: ModuleType, addon, tmp_path: Path, se
     handlers = blender.app.handlers
     lists = [value for name in dir(handlers) if isinstance(value := getattr(handlers, name), list)]
     registered = [list(each) for each in lists]
+    running = addon("dafnet_addon.blender.running")
     user = Careless(blender, addon, tmp_path, seed)
     done = []
     for _ in range(100):
         done.append(user.act())
-        assert user.generate.progress is None
+        assert running.running_job() is None
         assert [list(each) for each in lists] == registered, f"a handler is left after {done[-3:]}"
     assert len(set(done)) > 8 and user.errors < 50

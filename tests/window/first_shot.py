@@ -14,8 +14,9 @@ __all__ = ["first_shot", "progress"]
 
 def progress() -> float | None:
     """How far the running job is, as the panel knows it."""
-    module: Any = next(m for name, m in sys.modules.items() if name.endswith(".operators.generate"))
-    return module.DAFNET_OT_generate.progress
+    module: Any = next(m for name, m in sys.modules.items() if name.endswith(".blender.running"))
+    running = module.running_job()
+    return None if running is None else running.progress
 
 
 def _look(user: Driver, at: tuple[float, float, float], distance: float) -> None:

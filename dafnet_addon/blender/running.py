@@ -1,0 +1,44 @@
+"""The job that runs in a window, one at a time: for what shows it, and for what has to wait for it.
+
+It belongs to the session and to no file: undoing, or opening another file, leaves it alone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["RunningJob", "begin_job", "end_job", "running_job"]
+
+
+@dataclass
+class RunningJob:
+    """How far a job is.
+
+    ``progress``: the share done, in [0, 1]. ``seconds_left``: an estimate. ``joints`` (22, 3): of
+    the frame generated last, world, metres; None before the first one. ``cancel_requested``: the
+    job is to end at its next step.
+    """
+
+    progress: float = 0.0
+    seconds_left: float = 0.0
+    joints: np.ndarray | None = None
+    cancel_requested: bool = False
+
+
+_running: list[RunningJob] = []  # at most one
+
+
+def running_job() -> RunningJob | None:
+    """The job that is running; None where none is."""
+    return _running[0] if _running else None
+
+
+def begin_job() -> RunningJob:
+    """A new job that is running from now on."""
+    _running[:] = [RunningJob()]
+    return _running[0]
+
+
+def end_job() -> None:
+    """No job is running any more."""
+    _running.clear()
