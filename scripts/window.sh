@@ -12,7 +12,7 @@ work=$(mktemp -d "${debian:-}/tmp/dafnet.XXXXXX")
 trap 'rm -rf "$work"; [[ -z ${mounted:-} ]] || umount "$debian/proc"' EXIT
 cp build/dafnet-*.zip "$work/dafnet.zip"
 cp -r tests/window "$work/drive"
-cp tests/rig_builders.py "$work/drive/" 2>/dev/null || true
+cp -r tests/kit "$work/drive/"
 mkdir -p "$work/profile/extensions/user_default" "$work/pictures"
 inside=${work#"$debian"}
 run=(env HOME="$inside" BLENDER_USER_RESOURCES="$inside/profile" LIBGL_ALWAYS_SOFTWARE=1)

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).absolute().parents[1]
+from kit.places import ROOT
+
 PACKAGE = ROOT / "dafnet_addon"
 FOLDERS = ("dafnet_addon", "operators", "panels", "benchmarks")
 

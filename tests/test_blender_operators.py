@@ -7,6 +7,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from kit.panels import drawn_by
+
 
 class Shot:
     """A character before a chair, its root walking for a second."""
@@ -211,27 +213,12 @@ def test_one_undo_step(shot: Shot) -> None:
 
 
 def test_the_panel_draws(shot: Shot, addon) -> None:
-    """The panel is drawn with a layout that records it, in each of its states."""
-
-    class Layout:
-        drawn: list[str] = []
-
-        def __getattr__(self, name: str):
-            def call(*arguments, **options):
-                self.drawn.extend(str(a) for a in arguments)
-                self.drawn.extend(str(v) for k, v in options.items() if k == "text")
-                return Layout()
-
-            return call
-
+    """In each of its states."""
     panel = addon("panels.main").DAFNET_PT_character
     running = addon("dafnet_addon.blender.running")
 
     def drawn() -> list[str]:
-        Layout.drawn = []
-        owner = type("Owner", (), {"layout": Layout()})()
-        panel.draw(owner, shot.bpy.context)
-        return Layout.drawn
+        return drawn_by(panel, shot.bpy.context).words()
 
     shot.ann.dafnet.mode = "FREE"
     free = drawn()

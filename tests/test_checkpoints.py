@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from kit.places import ROOT
+
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from dafnet_addon import cli  # noqa: E402
@@ -27,7 +29,6 @@ from dafnet_addon.training.batches import Statistics  # noqa: E402
 from dafnet_addon.training.checkpoints import Checkpoint, write_checkpoint  # noqa: E402
 from dafnet_addon.training.train import Run, TrainingConfig, train_part, trained  # noqa: E402
 
-ROOT = Path(__file__).resolve().parents[1]
 TINY = ModelConfig(
     system="moglow",
     predictor_code=8,

@@ -16,6 +16,7 @@ import pytest
 
 from dafnet_addon.cli import main
 from dafnet_addon.core.weights import load_weights
+from kit.places import ROOT
 
 Addon = Callable[[str], Any]
 
@@ -238,7 +239,7 @@ def test_the_demo_runs_in_a_process_of_its_own(tmp_path: Path) -> None:
         ],
         capture_output=True,
         text=True,
-        cwd=Path(__file__).resolve().parents[1],
+        cwd=ROOT,
         env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")},
     )
     assert done.returncode == 0, done.stderr

@@ -12,12 +12,12 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from said import without_blenders
 
 from dafnet_addon.cli import main
+from kit.places import ROOT
+from kit.processes import without_blenders
 
 Addon = Callable[[str], Any]
-ROOT = Path(__file__).resolve().parents[1]
 _RUN = "import sys; sys.argv[0] = 'dafnet'; from dafnet_addon.cli import run; run()"
 
 

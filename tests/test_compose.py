@@ -2,8 +2,6 @@
 is capture, all of it.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -17,8 +15,8 @@ from dafnet_addon.data.joins import handed, joined, lent
 from dafnet_addon.data.pieces import entrance
 from dafnet_addon.data.uses import stroking, working
 from dafnet_addon.data.windows import Motion, motion_of
+from kit.places import MOCAP
 
-MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
 BONES = np.linalg.norm(OFFSETS[1:], axis=1)
 TOES = [joint("left_foot"), joint("right_foot")]
 LEGS = [j for j in LOWER if j not in (1, 2)]

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from motion_files import write_compact
 
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.occupancy import occupancy as sensor_occupancy
@@ -21,8 +20,9 @@ from dafnet_addon.data.mocap import Clip, read_clips
 from dafnet_addon.data.motions import read_motions, write_motions
 from dafnet_addon.data.rests import resting
 from dafnet_addon.data.windows import draw, mirrored, motion_of
+from kit.motion_files import write_compact
+from kit.places import MOCAP
 
-MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
 BONES = np.linalg.norm(OFFSETS[1:], axis=1)
 
 

@@ -3,7 +3,6 @@ seat sits on it.
 """
 
 from itertools import pairwise
-from pathlib import Path
 from time import process_time
 
 import numpy as np
@@ -17,8 +16,7 @@ from dafnet_addon.core.skeleton import SEAT_TO_PELVIS
 from dafnet_addon.director.seats import on_a_seat, seat_of
 from dafnet_addon.director.surfaces import height_field, surface_points
 from dafnet_addon.director.walks import walk_to, way_round
-
-SCANS = Path(__file__).resolve().parents[2] / "shared" / "data" / "furniture"
+from kit.places import FURNITURE
 
 
 def _box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Box:
@@ -101,7 +99,7 @@ def test_what_nobody_can_sit_on_is_refused():
 @pytest.mark.parametrize(("scan", "height"), [("sofa_03", 0.50), ("painted_wooden_stool", 0.58)])
 def test_seats_of_real_furniture(scan, height):
     trimesh = pytest.importorskip("trimesh")
-    file = SCANS / f"{scan}.glb"
+    file = FURNITURE / f"{scan}.glb"
     if not file.exists():
         pytest.skip(f"needs the scan {file}")
     mesh = trimesh.load(file, force="mesh")

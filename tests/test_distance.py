@@ -1,7 +1,6 @@
 """Distance grids of clean, broken and real meshes, against exact distances."""
 
 import tracemalloc
-from pathlib import Path
 from time import process_time
 
 import numpy as np
@@ -11,8 +10,8 @@ from dafnet_addon.core import distance
 from dafnet_addon.core.distance import BAND, build_grid, grid_of, prepared, rigid_split, scaled
 from dafnet_addon.core.rotations import matrix_from_quaternion, yaw_matrix
 from dafnet_addon.core.solids import Box, Mesh, Scene, box_distance
+from kit.places import FURNITURE
 
-FURNITURE = Path(__file__).resolve().parents[2] / "shared" / "data" / "furniture"
 MODELS = (
     "painted_wooden_cabinet",
     "painted_wooden_cabinet_02",

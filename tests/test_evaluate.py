@@ -5,7 +5,6 @@ known.
 import json
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,8 +22,8 @@ from dafnet_addon.data.boxes import box
 from dafnet_addon.data.mocap import read_clips
 from dafnet_addon.data.rests import Rest
 from dafnet_addon.training import evaluate as e
+from kit.places import MOCAP
 
-MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
 needs_mocap = pytest.mark.skipif(
     not any(MOCAP.glob("*.npz")), reason="the motion files are not here"
 )

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kit.places import ROOT
+
 torch = pytest.importorskip("torch", reason="the comparisons need torch")
 
 from dafnet_addon.baselines.samp import SampConfig  # noqa: E402
@@ -22,7 +24,7 @@ from dafnet_addon.data.rests import Rest  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training.train import Run, TrainingConfig  # noqa: E402
 
-BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
+BENCHMARKS = ROOT / "benchmarks"
 TINY = ModelConfig(
     predictor_code=8,
     predictor_width=16,

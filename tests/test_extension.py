@@ -14,9 +14,10 @@ import zipfile
 from pathlib import Path, PurePosixPath
 
 import pytest
-from said import without_blenders
 
-ROOT = Path(__file__).absolute().parents[1]
+from kit.places import ROOT
+from kit.processes import without_blenders
+
 SHIPPED = {
     "__init__.py",
     "blender_manifest.toml",

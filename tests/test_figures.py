@@ -10,9 +10,10 @@ import pytest
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.skeleton import SEAT_TO_PELVIS
 from dafnet_addon.core.weights import load_weights
+from kit.places import ROOT
 
 Image = pytest.importorskip("PIL.Image")
-SCRIPT = Path(__file__).parents[1] / "benchmarks" / "figures.py"
+SCRIPT = ROOT / "benchmarks" / "figures.py"
 
 
 def test_figure_11_is_drawn_and_its_mannequins_end_at_different_heights(

@@ -13,8 +13,7 @@ from dafnet_addon.core import files
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.files import require_writable, save_text, whole_file
 from dafnet_addon.core.stopping import Stop
-
-ROOT = Path(__file__).parents[1]
+from kit.places import ROOT
 
 
 def names(folder: Path) -> list[str]:

@@ -18,7 +18,6 @@ from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pytest
-from bounds import bounded
 
 from dafnet_addon import (
     Box,
@@ -39,6 +38,7 @@ from dafnet_addon.core.skeleton import END_EFFECTORS, OFFSETS, UPPER
 from dafnet_addon.core.storage import packed, unpacked
 from dafnet_addon.core.take import MODES
 from dafnet_addon.core.weights import FORMAT, Weights, read_safetensors, write_safetensors
+from kit.limits import bounded
 
 hypothesis = pytest.importorskip("hypothesis")
 st = pytest.importorskip("hypothesis.strategies")

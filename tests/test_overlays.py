@@ -9,6 +9,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from kit.panels import drawn_by
+
 CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 
@@ -485,18 +487,8 @@ def test_the_corner_avoids_the_sidebar(shot: Shot) -> None:
 
 
 def test_the_panel_draws_all_switches(shot: Shot, addon) -> None:
-    drawn: list[str] = []
-
-    class Layout:
-        def __getattr__(self, name: str):
-            def call(*arguments, **options):
-                drawn.extend(a for a in arguments if isinstance(a, str))
-                drawn.append(f"depress {options.get('depress')}") if "depress" in options else None
-                return Layout()
-
-            return call
-
     panel = addon("panels.overlays").DAFNET_PT_overlays
     assert panel.poll(shot.bpy.context)
-    panel.draw(type("Owner", (), {"layout": Layout()})(), shot.bpy.context)
-    assert set(shot.data.KINDS) <= set(drawn) and "depress False" in drawn
+    layout = drawn_by(panel, shot.bpy.context)
+    assert set(shot.data.KINDS) <= set(layout.words())
+    assert any(options.get("depress") is False for _, _, options in layout.calls)

@@ -6,7 +6,6 @@ import json
 from collections import defaultdict
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,8 +22,8 @@ from dafnet_addon.data.contacts import contacts
 from dafnet_addon.data.held_out import HeldClip, frozen_text
 from dafnet_addon.data.mocap import read_clips
 from dafnet_addon.data.windows import Motion
+from kit.places import MOCAP
 
-MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
 pytestmark = pytest.mark.skipif(
     not any(MOCAP.glob("*.npz")), reason="the motion files are not here"
 )

@@ -3,7 +3,6 @@ may.
 """
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,8 +16,8 @@ from dafnet_addon.core.progress import drained
 from dafnet_addon.core.root import RootPath
 from dafnet_addon.director.seats import seat_of
 from dafnet_addon.director.walks import walk_to
+from kit.places import LIBRARY
 
-LIBRARY = Path(__file__).resolve().parents[2] / "shared" / "data" / "furniture" / "library"
 FACES = (
     (0, 1, 3),
     (0, 3, 2),

@@ -3,7 +3,6 @@ do.
 """
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ import pytest
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.paths import Route, Stop, facing, route
 from dafnet_addon.core.root import root_from_joints, smoothed, velocities
+from kit.places import MOCAP
 
 SEAT = Stop((0.0, 0.0), 0.0, 2.0, seated=True, name="seat")
 FROM_SIDE = Stop((-3.0, 0.6), facing((1, 0)), 1.0)
@@ -85,7 +85,7 @@ def test_a_captured_sit_down_moves_alike() -> None:
     """Distance to the seat over the last second, against a captured person who comes from the side
     (held-out clip).
     """
-    folder = Path(__file__).parents[2] / "shared" / "data" / "mocap"
+    folder = MOCAP
     if not (folder / "snu_tiling.npz").exists():
         pytest.skip("the motion capture is not beside the repository")
     data = np.load(folder / "snu_tiling.npz")

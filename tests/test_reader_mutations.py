@@ -18,9 +18,7 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 import hypothesis
 import numpy as np
 import pytest
-from bounds import bounded
 from hypothesis import strategies as st
-from motion_files import walk, write_amc, write_asf, write_bvh, write_compact
 
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.skeleton import JOINTS
@@ -28,8 +26,10 @@ from dafnet_addon.data.canonical import calibrate, canonical
 from dafnet_addon.data.mocap import Clip, read_clips
 from dafnet_addon.data.stated import Stated
 from dafnet_addon.data.windows import motion_of
+from kit.limits import bounded
+from kit.motion_files import walk, write_amc, write_asf, write_bvh, write_compact
+from kit.places import RAW
 
-RAW = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap" / "raw_samples"
 FRAMES = 12
 
 

@@ -11,7 +11,6 @@ from zipfile import ZIP_DEFLATED, ZIP_LZMA, ZipFile
 
 import numpy as np
 import pytest
-from motion_files import MIXAMO, VICON, Y_UP, walk, write_amc, write_asf, write_bvh, write_compact
 
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.rotations import rotate
@@ -29,9 +28,17 @@ from dafnet_addon.data.rigs import mapped, rigs
 from dafnet_addon.data.sheet import sheet
 from dafnet_addon.data.summary import summary
 from dafnet_addon.data.world import at_model_rate, floor_height, unit_of
-
-MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
-RAW = MOCAP / "raw_samples"
+from kit.motion_files import (
+    MIXAMO,
+    VICON,
+    Y_UP,
+    walk,
+    write_amc,
+    write_asf,
+    write_bvh,
+    write_compact,
+)
+from kit.places import MOCAP, RAW
 
 
 def test_an_axis_turns_as_it_should():

@@ -15,9 +15,9 @@ from dafnet_addon.data.library import Piece, kind_of, read_library
 from dafnet_addon.data.real_pieces import LIES_OVER, bed_shape_for, seat_shape_for
 from dafnet_addon.data.rests import Rest
 from dafnet_addon.data.shapes import FARTHEST, PELVIS_OVER, STRETCH, ShapeBank, bank_of
+from kit.places import LIBRARY
 
 trimesh = pytest.importorskip("trimesh")
-LIBRARY = Path(__file__).resolve().parents[2] / "shared" / "data" / "furniture" / "library"
 
 
 def _chair(width: float = 0.46) -> "trimesh.Trimesh":

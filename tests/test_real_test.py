@@ -3,7 +3,6 @@ carry them.
 """
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,8 @@ from dafnet_addon.core.take import Controls
 from dafnet_addon.data.flesh import probes
 from dafnet_addon.data.real_test import FROZEN_REAL, real_test
 from dafnet_addon.data.splits import role_of_body, role_of_maker
+from kit.places import SHARED
 
-SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 FROZEN = json.loads(FROZEN_REAL.read_text(encoding="utf-8"))["clips"]
 
 

@@ -2,8 +2,6 @@
 real ones where present.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -13,8 +11,8 @@ from dafnet_addon.core.skeleton import MIRROR, OFFSETS, PARENTS, REST, TOE_HEIGH
 from dafnet_addon.data.canonical import calibrate, canonical, pose_legs
 from dafnet_addon.data.mocap import read_clips
 from dafnet_addon.data.retarget import at_seat_height
+from kit.places import MOCAP
 
-MOCAP = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
 BONES = np.linalg.norm(OFFSETS[1:], axis=1)
 SEATED = 0.55
 HEIGHTS = [0.40, 0.48, 0.65, 0.78, 0.92]

@@ -11,7 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import rig_builders
+
+from kit import humanoids
+from kit.panels import Layout, drawn_by
+from kit.places import SHARED
 
 CENTIMETRE = 0.01
 # What is measured, by bone: wrists, ankles, head, and the hip joints, whose middle is the pelvis'
@@ -131,13 +134,13 @@ class Stage:
 
     def build(self, kind: str, **body: Any) -> Any:
         try:
-            return rig_builders.BUILDERS[kind](self.bpy, **body)
+            return humanoids.BUILDERS[kind](self.bpy, **body)
         except RuntimeError as error:
             pytest.skip(f"Rigify does not run here: {error}")
 
     def map(self, kind: str, rig: Any) -> Any:
         if kind == "odd":
-            return self.rigs.RigMap("Odd", joints=rig_builders.ODD, root="Wurzel")
+            return self.rigs.RigMap("Odd", joints=humanoids.ODD, root="Wurzel")
         return self.rigs.detected(rig)
 
     def bake(self, kind: str, rig: Any, **options: Any) -> Any:
@@ -570,7 +573,7 @@ def test_hips_beside_the_trunk_do_not_tear_it(stage: Stage) -> None:
     What was played before is played again then, in its own slot.
     """
     stage.play("walk")
-    rig = rig_builders.mixamo(stage.bpy, prefix="")
+    rig = humanoids.mixamo(stage.bpy, prefix="")
     stage.bpy.ops.object.mode_set(mode="EDIT")
     bones = rig.data.edit_bones
     for old, new in (
@@ -644,13 +647,13 @@ def test_conventions_are_detected(stage: Stage, kind: str) -> None:
 
 @pytest.mark.parametrize("prefix", ["", "mixamorig1:", "mixamorig_", "Mia:"])
 def test_prefixes_do_not_matter(stage: Stage, prefix: str) -> None:
-    found = stage.rigs.detected(rig_builders.mixamo(stage.bpy, prefix=prefix))
+    found = stage.rigs.detected(humanoids.mixamo(stage.bpy, prefix=prefix))
     assert (found.name, len(found.joints)) == ("Mixamo", 22)
     assert found.joints["left_hip"] == f"{prefix}LeftUpLeg"
 
 
 def test_five_spine_bones_of_unreal(stage: Stage) -> None:
-    rig = rig_builders.unreal(stage.bpy, spines=5)
+    rig = humanoids.unreal(stage.bpy, spines=5)
     found = stage.rigs.detected(rig)
     assert found.name == "Unreal mannequin (UE5)" and found.joints["spine3"] == "spine_05"
     stage.play("write")
@@ -677,7 +680,7 @@ GUESSED = {
 
 
 def test_names_of_no_convention_are_guessed(stage: Stage) -> None:
-    rig = rig_builders.mixamo(stage.bpy)
+    rig = humanoids.mixamo(stage.bpy)
     meant = stage.rigs.detected(rig).joints
     new = {}
     for joint, bone in meant.items():
@@ -712,20 +715,20 @@ def test_presets_are_saved_and_found_again(stage: Stage, user_maps: Path) -> Non
     assert stage.bpy.ops.dafnet.detect_rig() == {"FINISHED"}
     assert len(rig.dafnet_rig.rows) == 22
     for row in rig.dafnet_rig.rows:
-        row.bone = rig_builders.ODD.get(row.name, "")
+        row.bone = humanoids.ODD.get(row.name, "")
     rig.dafnet_rig.root_bone = "Wurzel"
     assert stage.bpy.ops.dafnet.save_rig_map(name="Otto's Rig") == {"FINISHED"}
     assert [file.suffix for file in user_maps.iterdir()] == [".json"]
-    other = rig_builders.odd(stage.bpy)
+    other = humanoids.odd(stage.bpy)
     found = stage.rigs.detected(other)
-    assert (found.name, found.joints, found.root) == ("Otto's Rig", rig_builders.ODD, "Wurzel")
+    assert (found.name, found.joints, found.root) == ("Otto's Rig", humanoids.ODD, "Wurzel")
     key = next(key for key, name, _ in properties.presets(None, None) if name == "Otto's Rig")
     assert key.startswith("my_") and "mixamo" in {
         key for key, _, _ in properties.presets(None, None)
     }
     stage.bpy.context.view_layer.objects.active = other
     assert stage.bpy.ops.dafnet.load_rig_map(preset=key) == {"FINISHED"}
-    assert properties.map_of(other).joints == rig_builders.ODD
+    assert properties.map_of(other).joints == humanoids.ODD
     (user_maps / "broken.json").write_text("{}", encoding="utf-8")
     assert stage.rigs.detected(other).name == "Otto's Rig"
     with pytest.raises(stage.error, match=r"'broken\.json'"):
@@ -733,39 +736,33 @@ def test_presets_are_saved_and_found_again(stage: Stage, user_maps: Path) -> Non
 
 
 def test_the_panel_shows_a_row_for_each_joint(stage: Stage) -> None:
-    """Drawn on a stand-in for Blender's layout; a needed joint without a bone is red."""
-    drawn: list[Any] = []
+    """And offers to bake; the list is there once bones were detected."""
 
-    class Layout:
-        alert = False
-
-        def __getattr__(self, name: str) -> Any:
-            def note(*values: Any, **options: Any) -> Any:
-                drawn.append((name, *(value for value in values if isinstance(value, str))))
-                return Layout()
-
-            return note
+    def called(layout: Layout) -> list[tuple[str, ...]]:
+        return [
+            (name, *(v for v in values if isinstance(v, str))) for name, values, _ in layout.calls
+        ]
 
     rig = stage.build("vrm")
     stage.bpy.context.view_layer.objects.active = rig
     panels = stage.addon("panels.rig")
-    owner = type("Owner", (), {"layout": Layout()})()
-    panels.DAFNET_PT_rig.draw(owner, stage.bpy.context)
+    drawn = called(drawn_by(panels.DAFNET_PT_rig, stage.bpy.context))
     assert ("operator", "dafnet.bake_to_rig") in drawn and not any(
         each[0] == "template_list" for each in drawn
     )
     stage.bpy.ops.dafnet.detect_rig()
     rig.dafnet_rig.root_motion = "BONE"
-    panels.DAFNET_PT_rig.draw(owner, stage.bpy.context)
+    drawn = called(drawn_by(panels.DAFNET_PT_rig, stage.bpy.context))
     assert (
         any(each[0] == "template_list" for each in drawn)
         and ("prop_search", "root_bone", "bones") in drawn
     )
+    rows = Layout()
     for row in rig.dafnet_rig.rows:
         panels.DAFNET_UL_rig.draw_item(
-            None, stage.bpy.context, Layout(), rig.dafnet_rig, row, 0, None, ""
+            None, stage.bpy.context, rows, rig.dafnet_rig, row, 0, None, ""
         )
-    assert drawn.count(("prop_search", "bone", "bones")) == 22
+    assert called(rows).count(("prop_search", "bone", "bones")) == 22
 
 
 def test_presets_lie_in_the_extensions_folder(stage: Stage) -> None:
@@ -863,7 +860,7 @@ def test_full_mode_copies_from_any_rig(stage: Stage, kind: str) -> None:
 
 
 def test_full_mode_refuses_what_it_does_not_know(stage: Stage) -> None:
-    rig = rig_builders.odd(stage.bpy)
+    rig = humanoids.odd(stage.bpy)
     stage.ann.dafnet.upper_body_source = rig
     stage.ann.dafnet.mode = "FULL"
     settings = stage.addon("dafnet_addon.blender.properties").settings_of(stage.ann, stage.scene)
@@ -871,7 +868,6 @@ def test_full_mode_refuses_what_it_does_not_know(stage: Stage) -> None:
         stage.addon("dafnet_addon.blender.scene_reader").read_scene(stage.bpy.context, settings)
 
 
-SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
 ENDS = {
     "upper arms": ((16, 18), (17, 19)),
     "forearms": ((18, 20), (19, 21)),
@@ -948,7 +944,7 @@ class World:
         return reading.joints_of(self.rig, self.map, np.array(bodies), np.array(poses), 1.0)[0]
 
 
-@pytest.mark.parametrize("rest", rig_builders.RESTS)
+@pytest.mark.parametrize("rest", humanoids.RESTS)
 @pytest.mark.parametrize("kind", ["mixamo", "unreal", "vrm"])
 def test_the_rest_pose_does_not_matter(stage: Stage, kind: str, rest: str) -> None:
     """Arms hanging or ahead, sitting, twisted, bent, leaning: limbs, trunk and head lie in the room
@@ -958,9 +954,7 @@ def test_the_rest_pose_does_not_matter(stage: Stage, kind: str, rest: str) -> No
     """
     stage.play("write")
     rig = stage.build(kind)
-    rig_builders.rested(
-        stage.bpy, rig, *rig_builders.rest_pose(rest, stage.rigs.detected(rig).joints)
-    )
+    humanoids.rested(stage.bpy, rig, *humanoids.rest_pose(rest, stage.rigs.detected(rig).joints))
     baked = stage.bake(kind, rig)
     for part, distances in stage.errors(kind, rig).items():
         assert distances.mean() < CENTIMETRE, part
@@ -1058,7 +1052,7 @@ def test_real_characters_keep_the_motions_shape(stage: Stage, name: str, take: s
     file = SHARED / "rigs" / f"{name}.json"
     if not file.is_file():
         pytest.skip(f"needs the rest pose {file}")
-    rig = rig_builders.of_file(stage.bpy, file)
+    rig = humanoids.of_file(stage.bpy, file)
     stage.play(take)
     baked = stage.bake(name, rig)
     assert baked.errors["ankles"][0] < CENTIMETRE, (
@@ -1086,7 +1080,7 @@ def test_real_characters_keep_the_motions_shape(stage: Stage, name: str, take: s
         )
 
 
-@pytest.mark.parametrize("rest", rig_builders.RESTS)
+@pytest.mark.parametrize("rest", humanoids.RESTS)
 def test_hands_feet_and_face_turn_the_same_from_any_rest_pose(stage: Stage, rest: str) -> None:
     """Fingers, palms, soles and face as the character's in the room, by where bones are that nobody
     keyed.
@@ -1099,9 +1093,7 @@ def test_hands_feet_and_face_turn_the_same_from_any_rest_pose(stage: Stage, rest
         60
     ]
     rig = stage.build("mixamo")
-    rig_builders.rested(
-        stage.bpy, rig, *rig_builders.rest_pose(rest, stage.rigs.detected(rig).joints)
-    )
+    humanoids.rested(stage.bpy, rig, *humanoids.rest_pose(rest, stage.rigs.detected(rig).joints))
     stage.bake("mixamo", rig)
 
     def way(start: str, end: str) -> np.ndarray:

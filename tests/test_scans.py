@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
-SCANS = ROOT.parent / "shared" / "data" / "furniture"
+from kit.places import FURNITURE, ROOT
+
 SEATS = {"Stool": ((-1.6, 0.6), 0.58), "Sofa": ((1.4, 0.34), 0.52)}
 
 BUILD = """
@@ -67,7 +67,7 @@ os._exit(0)  # see cli.run
 """
 
 
-@pytest.mark.skipif(not SCANS.is_dir(), reason=f"needs the scanned furniture at {SCANS}")
+@pytest.mark.skipif(not FURNITURE.is_dir(), reason=f"needs the scanned furniture at {FURNITURE}")
 def test_scanned_furniture_is_sat_on(tmp_path: Path) -> None:
     bpy = pytest.importorskip("bpy")
     if bpy.app.binary_path:
@@ -76,7 +76,7 @@ def test_scanned_furniture_is_sat_on(tmp_path: Path) -> None:
         Path(os.environ.get("DAFNET_PICTURES", tmp_path)) / "scans.blend",
         tmp_path / "baked.blend",
     )
-    script = BUILD.format(root=str(ROOT), scans=str(SCANS), out=str(room))
+    script = BUILD.format(root=str(ROOT), scans=str(FURNITURE), out=str(room))
     environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")}
 
     def run(*command: str) -> subprocess.CompletedProcess[str]:

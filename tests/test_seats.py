@@ -3,14 +3,14 @@ there.
 """
 
 import runpy
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dafnet_addon.core.solids import box_distance
+from kit.places import ROOT
 
-SEATS = runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / "seats.py"))
+SEATS = runpy.run_path(str(ROOT / "benchmarks" / "seats.py"))
 
 
 @pytest.mark.parametrize("back", [False, True])

@@ -13,6 +13,7 @@ import pytest
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.paths import Stop
 from dafnet_addon.core.trails import followed, trail
+from kit.panels import drawn_by
 
 
 def test_a_straight_line_is_walked_in_the_time_that_people_take() -> None:
@@ -598,34 +599,17 @@ def test_the_menu_and_the_panel_are_there(stage: Set) -> None:
     stage.select(stage.empty("Other", (0, 0, 0)))
     assert panels.DAFNET_PT_setup.poll(stage.bpy.context), "the only character is meant"
 
-    class Layout:
-        """Records what is drawn with it."""
-
-        drawn: list[str] = []
-
-        def __getattr__(self, name: str) -> Any:
-            def call(*arguments: str, **options: Any) -> "Layout":
-                self.drawn.extend([*arguments, options.get("text") or ""])
-                return Layout()
-
-            return call
-
     curve = stage.curve([(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)])
     stage.select(stage.ann, curve, stage.empty("One", (0, 0, 0)), stage.empty("Two", (1, 0, 0)))
-    panels.DAFNET_PT_setup.draw(type("Owner", (), {"layout": Layout()})(), stage.bpy.context)
     assert {
         "Walk along Path",
         "Walk through 2 Points",
         "Sit on Selected",
         "dafnet.find_furniture",
-    } <= set(Layout.drawn)
-    Layout.drawn = []
-    panels.DAFNET_MT_add.draw(type("Owner", (), {"layout": Layout()})(), stage.bpy.context)
-    assert Layout.drawn.count("dafnet.add_example") == 4 and {
-        "Character",
-        "Chair and Desk",
-        "Bed",
-    } <= set(Layout.drawn)
+    } <= set(drawn_by(panels.DAFNET_PT_setup, stage.bpy.context).words())
+    added = drawn_by(panels.DAFNET_MT_add, stage.bpy.context).words()
+    assert added.count("dafnet.add_example") == 4
+    assert {"Character", "Chair and Desk", "Bed"} <= set(added)
 
 
 def test_the_menu_is_gone_after_unregister(stage: Set, extension: str) -> None:

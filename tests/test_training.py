@@ -15,6 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kit.places import ROOT
+
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from dafnet_addon import cli  # noqa: E402
@@ -408,7 +410,7 @@ def test_what_a_cpu_reads_of_the_sensor_is_what_other_devices_make(dataset):
 
 
 def test_configurations_are_read_and_bad_ones_refused(tmp_path):
-    root = Path(__file__).resolve().parents[1] / "configs"
+    root = ROOT / "configs"
     for file in sorted(root.glob("*.toml")):
         model, config = read_config(file)
         assert model.actions == 10 and config.batch > 0
@@ -442,7 +444,7 @@ def test_what_a_run_cannot_be_trained_with_is_said(dataset, tmp_path, capsys):
         train_part(
             "predictor", dataset, tmp_path / "run", replace(TINY, width=17, code=9), _config(1)
         )
-    config = Path(__file__).resolve().parents[1] / "configs" / "small.toml"
+    config = ROOT / "configs" / "small.toml"
     command = ["train", str(config), str(dataset), "-o", str(tmp_path / "two")]
     for device in ("cuda:77", "gpu"):
         assert cli.main([*command, "--device", device]) == 1
@@ -538,7 +540,7 @@ def _tiny_train(
     }
     done = subprocess.run(
         [sys.executable, *python, "-m", "dafnet_addon", "train", config, dataset, "-o", folder],
-        cwd=Path(__file__).resolve().parents[1],
+        cwd=ROOT,
         env=environment,
         capture_output=True,
         text=True,

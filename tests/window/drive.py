@@ -11,10 +11,11 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-import rig_builders
-from driver import Waits, play
 from first_shot import first_shot
 from interruptions import interruptions
+
+from kit import humanoids
+from kit.window import Waits, play
 
 PICTURES = Path(sys.argv[sys.argv.index("--") + 1])
 
@@ -23,7 +24,7 @@ def everything() -> Waits:
     yield from interruptions(PICTURES)
     bpy.ops.wm.read_homefile(app_template="")
     yield 0.5
-    yield from first_shot(PICTURES, rig_builders)
+    yield from first_shot(PICTURES, humanoids)
 
 
 play(everything)

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from driver import Driver, Waits
+
+from kit.window import Driver, Waits
 
 __all__ = ["first_shot", "progress"]
 
@@ -49,7 +50,7 @@ def _only(*selected: bpy.types.Object) -> None:
 
 def first_shot(pictures: Path, builders: Any) -> Waits:
     """Every step by its button, with a picture of each; ``builders``: rigs by script
-    (tests/rig_builders.py).
+    (tests/kit/humanoids.py).
     """
     user = Driver(pictures)
     scene = bpy.context.scene

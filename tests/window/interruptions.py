@@ -6,8 +6,9 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 
 import bpy
-from driver import Driver, Waits
 from first_shot import progress
+
+from kit.window import Driver, Waits
 
 __all__ = ["interruptions"]
 

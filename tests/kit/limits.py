@@ -5,6 +5,8 @@ import tracemalloc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+__all__ = ["TooLong", "bounded"]
+
 SECONDS, MEGABYTES = 5.0, 200
 
 
