@@ -18,8 +18,9 @@ def register() -> None:
 
     from . import operators, panels
     from .dafnet_addon import cli
-    from .dafnet_addon.blender import overlays, properties, translations
+    from .dafnet_addon.blender import overlays, preferences, properties, translations
 
+    preferences.register()
     properties.register()
     overlays.register()
     bpy.utils.register_preset_path(_FILES)
@@ -39,7 +40,7 @@ def unregister() -> None:
     import bpy
 
     from . import operators, panels
-    from .dafnet_addon.blender import overlays, properties, translations
+    from .dafnet_addon.blender import overlays, preferences, properties, translations
 
     while _commands:
         bpy.utils.unregister_cli_command(_commands.pop())
@@ -50,3 +51,4 @@ def unregister() -> None:
     bpy.utils.unregister_preset_path(_FILES)
     overlays.unregister()
     properties.unregister()
+    preferences.unregister()

@@ -53,7 +53,7 @@ class Stage:
         curve.driver.expression = "read"
 
     def settings(self, **overrides: Any) -> Any:
-        return self.addon("dafnet_addon.blender.properties").settings_of(
+        return self.addon("dafnet_addon.blender.settings").settings_of(
             self.ann, self.scene, **overrides
         )
 
@@ -241,7 +241,7 @@ def test_the_source_of_the_upper_body_may_not_follow_the_character(stage: Stage)
 def test_a_character_of_another_scene_is_said(stage: Stage) -> None:
     other = stage.bpy.data.scenes.new("Other")
     other.collection.objects.link(stage.ann)
-    settings = stage.addon("dafnet_addon.blender.properties").settings_of(stage.ann, other)
+    settings = stage.addon("dafnet_addon.blender.settings").settings_of(stage.ann, other)
     with pytest.raises(stage.error, match="scene 'Other' is not the active one; make it active"):
         stage.addon("dafnet_addon.blender.scene_reader").read_scene(stage.bpy.context, settings)
 

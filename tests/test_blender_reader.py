@@ -35,7 +35,7 @@ class Stage:
         return made
 
     def read(self, **overrides):
-        settings = self.addon("dafnet_addon.blender.properties").settings_of(
+        settings = self.addon("dafnet_addon.blender.settings").settings_of(
             self.ann, self.scene, **overrides
         )
         return self.addon("dafnet_addon.blender.scene_reader").read_scene(
@@ -406,7 +406,7 @@ def test_bad_input_is_refused_in_one_sentence(stage: Stage) -> None:
 def test_the_frame_is_kept_while_reading(stage: Stage) -> None:
     stage.cube("Chair")
     stage.scene.frame_set(3, subframe=0.25)
-    settings = stage.addon("dafnet_addon.blender.properties").settings_of(
+    settings = stage.addon("dafnet_addon.blender.settings").settings_of(
         stage.ann, stage.scene, frame_end=100
     )
     progress = []

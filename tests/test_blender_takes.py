@@ -277,13 +277,13 @@ def test_influence_and_blend_are_read_from_the_scene(shot: Shot) -> None:
 
 def test_an_engine_that_is_not_there_is_said(shot: Shot, monkeypatch: pytest.MonkeyPatch) -> None:
     preferences = shot.bpy.context.preferences.addons["bl_ext.user_default.dafnet"].preferences
-    properties = shot.addon("dafnet_addon.blender.properties")
+    module = shot.addon("dafnet_addon.blender.preferences")
     try:
         preferences.engine = "mps"
         with pytest.raises(RuntimeError, match="preferences"):
             shot.bpy.ops.dafnet.generate()
         preferences.engine = "cpu"
-        monkeypatch.setattr(properties.importlib.util, "find_spec", lambda name: None)
+        monkeypatch.setattr(module.importlib.util, "find_spec", lambda name: None)
         with pytest.raises(RuntimeError, match="PyTorch is not installed"):
             shot.bpy.ops.dafnet.generate()
     finally:
@@ -396,7 +396,7 @@ def test_a_damaged_take_is_told_in_a_sentence_wherever_it_is_used(
 ) -> None:
     shot.bpy.ops.dafnet.generate()
     own, take = shot.ann.dafnet, shot.listed()[0]
-    packed = shot.addon("dafnet_addon.blender.properties").PACKED
+    packed = shot.addon("dafnet_addon.blender.takes").PACKED
     data = spoil(take[packed])
     del take[packed]  # Blender writes over bytes that are there up to the first zero
     take[packed] = data

@@ -844,7 +844,7 @@ def test_full_mode_copies_from_any_rig(stage: Stage, kind: str) -> None:
     read = {}
     for each in (bob, rig):
         source.dafnet.upper_body_source = each
-        settings = stage.addon("dafnet_addon.blender.properties").settings_of(source, stage.scene)
+        settings = stage.addon("dafnet_addon.blender.settings").settings_of(source, stage.scene)
         read[each.name] = (
             stage.addon("dafnet_addon.blender.scene_reader")
             .read_scene(bpy.context, settings)
@@ -863,7 +863,7 @@ def test_full_mode_refuses_what_it_does_not_know(stage: Stage) -> None:
     rig = humanoids.odd(stage.bpy)
     stage.ann.dafnet.upper_body_source = rig
     stage.ann.dafnet.mode = "FULL"
-    settings = stage.addon("dafnet_addon.blender.properties").settings_of(stage.ann, stage.scene)
+    settings = stage.addon("dafnet_addon.blender.settings").settings_of(stage.ann, stage.scene)
     with pytest.raises(stage.error, match="'Odd' has no bone for the"):
         stage.addon("dafnet_addon.blender.scene_reader").read_scene(stage.bpy.context, settings)
 
@@ -1125,14 +1125,14 @@ def test_full_mode_tells_what_it_cannot_follow(stage: Stage) -> None:
     stage.ann.dafnet.upper_body_source = rig
     stage.ann.dafnet.mode = "FULL"
     stage.scene.frame_start, stage.scene.frame_end = 1, 20
-    properties, reader = (
-        stage.addon(f"dafnet_addon.blender.{name}") for name in ("properties", "scene_reader")
+    settings, reader = (
+        stage.addon(f"dafnet_addon.blender.{name}") for name in ("settings", "scene_reader")
     )
 
     def warnings() -> str:
         return " ".join(
             reader.read_scene(
-                stage.bpy.context, properties.settings_of(stage.ann, stage.scene)
+                stage.bpy.context, settings.settings_of(stage.ann, stage.scene)
             ).warnings
         )
 

@@ -17,8 +17,9 @@ from ..core.errors import InputError
 from ..core.solids import Mesh
 from .armature import metres_per_unit
 from .dependencies import Dependencies
+from .lookup import find_collection, find_object, find_scene
 from .playback import in_order
-from .properties import Settings, find_collection, find_object, find_scene
+from .settings import Settings
 
 __all__ = ["Furniture", "array", "furniture_at", "furniture_now", "furniture_of"]
 

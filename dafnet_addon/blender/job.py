@@ -21,19 +21,11 @@ from ..core.progress import drained, stepwise, within
 from ..core.take import Controls, Take
 from .armature import metres_per_unit
 from .baker import bake
-from .properties import (
-    CLEAN_UP,
-    Settings,
-    device_of,
-    find_action,
-    find_object,
-    find_scene,
-    names_in_use,
-    settings_of,
-    weights_path,
-)
+from .lookup import find_action, find_object, find_scene, names_in_use
+from .preferences import device_of, weights_path
 from .rollback import state_of, undone_on_failure
 from .scene_reader import read_scene
+from .settings import CLEAN_UP, Settings, settings_of
 from .takes import add_take, draw_of, play_take, stored
 
 if TYPE_CHECKING:

@@ -31,8 +31,8 @@ from ..core.take import Controls, Take
 from .armature import character_scale, is_character, metres_per_unit, sent
 from .compat import action_curves
 from .furniture import furniture_now
-from .properties import settings_of
 from .scene_reader import read_scene
+from .settings import settings_of
 from .takes import PACKED, stored, takes_of
 
 __all__ = [

@@ -23,8 +23,8 @@ from .compat import action_curves
 from .dependencies import Dependencies
 from .furniture import furniture_at
 from .playback import frame_kept, in_order
-from .properties import settings_of
 from .root_keys import MOVES, keyable_root, keyed_along, last_key, unchanged_on_failure
+from .settings import settings_of
 from .walking import Walk, extended_to, told_of, walk
 
 __all__ = [

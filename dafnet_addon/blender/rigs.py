@@ -21,6 +21,7 @@ import bpy
 from ..core.errors import InputError
 from ..core.files import save_text
 from ..core.skeleton import JOINTS
+from .preferences import ADDON
 
 __all__ = [
     "NEEDED",
@@ -44,7 +45,6 @@ NEEDED = tuple(
 )
 """Joints without which a rig cannot be used."""
 
-_ADDON = (__package__ or "").removesuffix(".dafnet_addon.blender")
 _PREFIX = re.compile(r"^(.*:|mixamorig\d*_)")
 _SHIPPED = Path(__file__).parent / "rig_maps"
 
@@ -77,8 +77,8 @@ def user_folder(create: bool = False) -> Path:
     """Where the user's own maps are kept: the extension's folder, or Blender's configuration where
     there is no extension.
     """
-    if _ADDON.startswith("bl_ext."):
-        return Path(bpy.utils.extension_path_user(_ADDON, path="rig_maps", create=create))
+    if ADDON.startswith("bl_ext."):
+        return Path(bpy.utils.extension_path_user(ADDON, path="rig_maps", create=create))
     return Path(bpy.utils.user_resource("CONFIG", path="dafnet/rig_maps", create=create))
 
 

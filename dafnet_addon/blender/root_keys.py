@@ -11,8 +11,9 @@ import numpy as np
 from ..core.errors import InputError
 from ..core.paths import Route
 from .compat import action_curves, shares_curves
+from .lookup import find_object
 from .playback import frame_kept
-from .properties import Settings, find_object
+from .settings import Settings
 
 __all__ = ["MOVES", "keyable_root", "keyed_along", "last_key", "unchanged_on_failure", "write_keys"]
 

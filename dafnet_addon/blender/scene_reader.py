@@ -33,12 +33,13 @@ from .baker import laid_over, require_bakeable
 from .compat import action_curves
 from .dependencies import Dependencies, Simulation
 from .furniture import Furniture, array, furniture_of
+from .lookup import find_action, find_object, find_scene
 from .mannequin import FACING
 from .playback import play_steps
-from .properties import Settings, find_action, find_object, find_scene
 from .rig_properties import map_of
 from .rig_reading import joints_of, pose_matrices
 from .rigs import RigMap, required
+from .settings import Settings
 from .takes import stored
 
 __all__ = ["ReadScene", "read_scene"]

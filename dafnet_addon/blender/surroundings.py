@@ -13,9 +13,10 @@ from ..core.solids import Mesh
 from ..director.surfaces import surface_points
 from .armature import character_scale, metres_per_unit, parts_of
 from .furniture import furniture_now
+from .lookup import find_object
 from .path_sources import places_of
-from .properties import Settings, find_object, settings_of
 from .scene_reader import read_scene
+from .settings import Settings, settings_of
 
 __all__ = ["Found", "find_furniture"]
 

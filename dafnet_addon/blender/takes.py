@@ -13,9 +13,9 @@ from ..core.generate import Draw
 from ..core.storage import packed, unpacked
 from ..core.take import Controls, Take
 from .compat import assign_action
-from .properties import PACKED
 
 __all__ = [
+    "PACKED",
     "active_take",
     "add_take",
     "draw_of",
@@ -25,6 +25,9 @@ __all__ = [
     "stored",
     "takes_of",
 ]
+
+PACKED = "dafnet_take"
+"""The property of an action that holds its take."""
 
 _STATURE = 1.7  # metres, by which ``end_effector_error`` was divided
 _FIGURES = {

@@ -16,8 +16,8 @@ from ..director.walks import walk_to
 from .armature import character_scale, metres_per_unit
 from .furniture import furniture_at
 from .playback import frame_kept
-from .properties import settings_of
 from .root_keys import keyable_root, keyed_along, last_key, unchanged_on_failure
+from .settings import settings_of
 
 __all__ = ["Walk", "extended_to", "told_of", "walk"]
 
