@@ -136,7 +136,7 @@ class DAFNET_OT_generate(DafnetOperator, bpy.types.Operator):
             manager.progress_begin(0, 100)
             manager.modal_handler_add(self)
             running = self._running = begin_job()
-            overlays.show_growing(lambda: running.joints)
+            overlays.show_live_pose(lambda: running.joints)
             return {"RUNNING_MODAL"}
         return {"CANCELLED"}
 
@@ -174,7 +174,7 @@ class DAFNET_OT_generate(DafnetOperator, bpy.types.Operator):
         """End the job, which leaves the scene untouched unless it has finished."""
         self._steps.close()
         end_job()
-        overlays.hide_growing()
+        overlays.hide_live_pose()
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
         if context.workspace:

@@ -6,8 +6,8 @@ import bpy
 
 from ..dafnet_addon.blender import overlays
 from ..dafnet_addon.blender.armature import character_of
-from ..dafnet_addon.blender.overlay_data import faults_of, playing
-from ..dafnet_addon.blender.takes import PACKED, takes_of
+from ..dafnet_addon.blender.overlay_faults import faults_of
+from ..dafnet_addon.blender.takes import PACKED, played_take, takes_of
 from .base import DafnetOperator, idle
 
 __all__ = ["DAFNET_OT_mark_frames"]
@@ -28,12 +28,12 @@ class DAFNET_OT_mark_frames(DafnetOperator, bpy.types.Operator):
             return False
         cls.poll_message_set("Let the character play a take first")
         character = character_of(context)
-        return character is not None and playing(character) is not None
+        return character is not None and played_take(character) is not None
 
     def run(self, context: bpy.types.Context) -> None:
         """Measure all takes of the character, or hide what was measured."""
         character: Any = character_of(context)
-        plays = playing(character)
+        plays = played_take(character)
         if overlays.shown_faults(plays) is not None:
             overlays.hide_faults()
             return

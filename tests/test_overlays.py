@@ -42,6 +42,14 @@ class Shot:
         return self.addon("dafnet_addon.blender.overlay_data")
 
     @property
+    def cache(self):
+        return self.addon("dafnet_addon.blender.overlay_cache").cache
+
+    @property
+    def faults(self):
+        return self.addon("dafnet_addon.blender.overlay_faults")
+
+    @property
     def overlays(self):
         return self.addon("dafnet_addon.blender.overlays")
 
@@ -98,7 +106,7 @@ def shot(blender, addon):
     yield made
     for kind in made.data.KINDS:
         made.overlays.switch(kind, False)
-    made.overlays.hide_growing()
+    made.overlays.hide_live_pose()
     made.overlays.hide_faults()
     made.data.forget()
 
@@ -132,11 +140,11 @@ def test_nothing_is_touched_before_a_switch_goes_on(shot: Shot) -> None:
     switches.circle = True
     assert hooks() == [2, len(overlays._LISTENERS)], "one hook for all"
     switches.path = switches.circle = False
-    assert hooks() == [0, 0] and not shot.data._takes and not shot.data._kept
-    overlays.show_growing(lambda: None)
+    assert hooks() == [0, 0] and not len(shot.cache)
+    overlays.show_live_pose(lambda: None)
     assert hooks() == [2, 0]
-    overlays.hide_growing()
-    overlays.show_faults({1: shot.data.Faults(np.ones(2), np.ones(2))})
+    overlays.hide_live_pose()
+    overlays.show_faults({1: shot.faults.Faults(np.ones(2), np.ones(2))})
     assert hooks() == [1, len(overlays._LISTENERS)]
     overlays.hide_faults()
     assert hooks() == [0, 0]
@@ -151,14 +159,14 @@ def test_nothing_is_touched_before_a_switch_goes_on(shot: Shot) -> None:
 def test_switches_live_in_no_file_and_outlast_another(shot: Shot, tmp_path) -> None:
     bpy, overlays = shot.bpy, shot.overlays
     overlays.switch("ghosts", True)
-    overlays.show_faults({1: shot.data.Faults(np.ones(2), np.ones(2))})
+    overlays.show_faults({1: shot.faults.Faults(np.ones(2), np.ones(2))})
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "on.blend"))
     overlays.switch("ghosts", False)
     overlays.hide_faults()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "on.blend"))
     assert not bpy.context.window_manager.dafnet_overlays.ghosts and not overlays._drawers
     overlays.switch("ghosts", True)
-    overlays.show_faults({1: shot.data.Faults(np.ones(2), np.ones(2))})
+    overlays.show_faults({1: shot.faults.Faults(np.ones(2), np.ones(2))})
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "on.blend"))
     assert bpy.context.window_manager.dafnet_overlays.ghosts
     assert set(overlays._drawers) == {"scene", "corner"}, "faults are of the file that was left"
@@ -168,7 +176,7 @@ def test_switches_live_in_no_file_and_outlast_another(shot: Shot, tmp_path) -> N
 def test_unregistering_switches_off(shot: Shot) -> None:
     bpy, overlays = shot.bpy, shot.overlays
     overlays.switch("spheres", True)
-    overlays.show_growing(lambda: None)
+    overlays.show_live_pose(lambda: None)
     overlays.unregister()
     try:
         assert not overlays._drawers and not overlays.switched_on()
@@ -205,12 +213,12 @@ def test_spheres_go_with_the_root_and_the_furniture(shot: Shot) -> None:
     shot.overlays.switch("spheres", True)
     before = shot.drawn("spheres")
     assert shot.drawn("spheres") is before, "nothing has changed"
-    rooms = list(shot.data._rooms.values())
+    read = list(shot.cache._results["furniture"].values())
     root = shot.ann.dafnet.root
     root.rotation_euler.z = np.pi / 2
     shot.update()
     turned = shot.drawn("spheres")
-    assert turned is not before and list(shot.data._rooms.values()) == rooms, (
+    assert turned is not before and list(shot.cache._results["furniture"].values()) == read, (
         "the furniture is not read again for it"
     )
     assert shot.is_seen(-0.4, 0.0, 0.3), "the box has not moved"
@@ -246,7 +254,7 @@ def test_the_root_path_is_the_takes_else_that_of_the_keys(blender, addon, unit: 
         root.keyframe_insert("location", frame=frame)
         root.keyframe_insert("rotation_euler", frame=frame)
     shot.scene.frame_set(40)
-    shot.data.note_edit(None)
+    shot.cache.note_edit(None)
     (drawn,) = shot.drawn("path")
     assert np.allclose(unit * drawn.lines[38, 1], (0.0, 2.0, 0.01), atol=1e-5)
     tick = unit * (drawn.lines[39, 1] - drawn.lines[39, 0])
@@ -261,7 +269,7 @@ def test_the_root_path_is_the_takes_else_that_of_the_keys(blender, addon, unit: 
     )
     shot.ann.animation_data.action = None
     root.constraints.new("COPY_LOCATION")
-    shot.data.note_edit(None)
+    shot.cache.note_edit(None)
     assert shot.drawn("path") == (), "keys alone would tell a wrong way"
 
 
@@ -355,9 +363,9 @@ def test_ghosts_are_the_other_takes_that_are_ticked(shot: Shot) -> None:
     ), "it waits"
 
 
-def test_the_growing_figure_is_in_scene_units(blender, addon) -> None:
+def test_the_live_pose_is_in_scene_units(blender, addon) -> None:
     shot = Shot(blender, addon, 0.01)
-    (drawn,) = shot.data.growing(shot.bpy.context, standing(1)[0])
+    (drawn,) = shot.data.live_pose(shot.bpy.context, standing(1)[0])
     assert drawn.lines.shape == (21, 2, 3) and np.allclose(
         drawn.lines[:, 1], 100.0 * standing(1)[0, 1:]
     )
@@ -414,14 +422,14 @@ def test_another_object_may_be_active(shot: Shot) -> None:
     shot.scene.frame_set(5)
     objects = shot.bpy.context.view_layer.objects
     objects.active = shot.box
-    assert shot.data.watched(shot.bpy.context) == shot.ann, "the only character"
+    assert shot.data.watched_character(shot.bpy.context) == shot.ann, "the only character"
     objects.active = shot.ann
     shot.bpy.ops.dafnet.add_character(name="Bob")
-    assert shot.data.watched(shot.bpy.context).name == "Bob"
+    assert shot.data.watched_character(shot.bpy.context).name == "Bob"
     shot.bpy.ops.object.select_all(action="DESELECT")
     objects.active = shot.box
-    shot.data.note_edit(None)
-    assert shot.data.watched(shot.bpy.context).name == "Bob", (
+    shot.cache.note_edit(None)
+    assert shot.data.watched_character(shot.bpy.context).name == "Bob", (
         "the last one, while the furniture is worked on"
     )
 
@@ -443,7 +451,7 @@ def test_faulty_frames_are_marked_and_unmarked(shot: Shot) -> None:
         faults.sliding[10:15]
     ) == {2}
     assert faults.collisions[:19].max() == 0 and faults.collisions[20:].min() >= 1
-    bars = shot.data.strip(faults, 11)
+    bars = shot.faults.fault_bars(faults, 11)
     assert bars.first[0] == 21 and bars.last[0] == 25 and bars.row[0] == 0
     assert (
         bars.first[1] == 31
@@ -458,8 +466,8 @@ def test_faulty_frames_are_marked_and_unmarked(shot: Shot) -> None:
 
 
 def test_beads_are_closed_and_lit(shot: Shot) -> None:
-    data = shot.data
-    drawn = data._drawn(beads=[(np.array([[1.0, 2.0, 3.0]]), (1.0, 1.0, 1.0, 1.0), 0.5)])
+    compose = shot.addon("dafnet_addon.blender.overlay_drawing").compose
+    drawn = compose(beads=[(np.array([[1.0, 2.0, 3.0]]), (1.0, 1.0, 1.0, 1.0), 0.5)])
     corners, colours = shot.overlays.beads_of(drawn)
     faces = corners.reshape(8, 3, 3)
     normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])

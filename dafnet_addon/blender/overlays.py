@@ -1,7 +1,7 @@
 """Overlays in the viewport and the timeline: switches, what draws them, and when.
 
-All are off at first. Blender is asked to draw only while a switch is on or a job shows what grows,
-and ``gpu`` is imported only when something is drawn. The switches live here and not in the file, so
+All are off at first. Blender is asked to draw only while a switch is on or a job shows its live
+pose, and ``gpu`` is imported only when something is drawn. The switches live here and not in the file, so
 opening another file or undoing leaves them as they are; nothing here holds on to objects of the
 file, which ``overlay_data`` looks up at each redraw.
 """
@@ -15,32 +15,44 @@ from bpy.app.handlers import persistent
 from bpy.props import BoolProperty, PointerProperty
 
 from . import overlay_data
-from .overlay_data import CIRCLE, KINDS, Drawing, Faults
+from .overlay_cache import cache
+from .overlay_data import CIRCLE, KINDS, watched_character
+from .overlay_drawing import Drawing
+from .overlay_faults import Faults, fault_bars
+from .takes import played_take
 
 __all__ = [
     "Overlays",
     "beads_of",
     "corner_of",
     "hide_faults",
-    "hide_growing",
+    "hide_live_pose",
     "register",
     "show_faults",
-    "show_growing",
+    "show_live_pose",
     "shown_faults",
     "switch",
     "switched_on",
     "unregister",
 ]
 
-_RADIUS, _EDGE = 52.0, 26.0  # pixels: of the circle; from its labels to the view's edges
-# pixels: height of a bar in the timeline; of the first one over the region's lower edge
-_BAR, _BAR_EDGE = 4.5, 7.0
+_CIRCLE_RADIUS = 52.0
+"""Pixels."""
+_CIRCLE_MARGIN = 26.0
+"""Pixels from the circle's labels to the view's edges."""
 _DISC = (0.10, 0.11, 0.12, 0.72)
-_LETTERS = 12.0  # points
-_LIGHT = np.array((0.3, -0.45, 0.84))  # from where beads look lit
+"""Colour behind the circle, red, green, blue and opacity."""
+_BAR_HEIGHT = 4.5
+"""Pixels; of a bar in the timeline."""
+_BAR_MARGIN = 7.0
+"""Pixels from the timeline's lower edge to the first bar."""
+_FONT_SIZE = 12.0
+"""Points."""
+_LIGHT = np.array((0.3, -0.45, 0.84))
+"""The direction from which beads look lit."""
 
 _on: set[str] = set()
-_growing: list[Callable[[], np.ndarray | None]] = []
+_live_pose: list[Callable[[], np.ndarray | None]] = []
 _faults: dict[int, Faults] = {}
 _drawers: dict[str, tuple[Any, Any]] = {}
 _batches: dict[tuple[str, int], tuple[Drawing, list[tuple[str, Any]]]] = {}
@@ -55,8 +67,8 @@ class Overlays(bpy.types.PropertyGroup):
         name="Sensor",
         options=set(),
         description=(
-            "The spheres round the root that furniture occupies now, which is all that the "
-            "network sees of it"
+            "The spheres around the root that furniture occupies now: all that the network sees of "
+            "it"
         ),
         get=lambda _self: "spheres" in _on,
         set=lambda _self, on: switch("spheres", on),
@@ -64,7 +76,7 @@ class Overlays(bpy.types.PropertyGroup):
     path: BoolProperty(
         name="Root Path",
         options=set(),
-        description="The root's path on the floor with its facing",
+        description="The root's path on the floor and where it faces",
         get=lambda _self: "path" in _on,
         set=lambda _self, on: switch("path", on),
     )
@@ -80,21 +92,21 @@ class Overlays(bpy.types.PropertyGroup):
     circle: BoolProperty(
         name="Action",
         options=set(),
-        description="How likely each of the network's actions is, as rays of a circle",
+        description="How likely each of the network's actions is, as the rays of a circle",
         get=lambda _self: CIRCLE in _on,
         set=lambda _self, on: switch(CIRCLE, on),
     )
     reach: BoolProperty(
         name="Head and Hands",
         options=set(),
-        description="The ways of head and hands, and their targets (red)",
+        description="The paths of the head and hands, and their targets (red)",
         get=lambda _self: "reach" in _on,
         set=lambda _self, on: switch("reach", on),
     )
     ghosts: BoolProperty(
         name="Ghosts",
         options=set(),
-        description="The takes whose ghost is ticked in the list, as figures of lines",
+        description="The takes whose ghost is ticked in the list, as stick figures",
         get=lambda _self: "ghosts" in _on,
         set=lambda _self, on: switch("ghosts", on),
     )
@@ -114,22 +126,22 @@ def switched_on() -> frozenset[str]:
     return frozenset(_on)
 
 
-def show_growing(joints: Callable[[], np.ndarray | None]) -> None:
+def show_live_pose(joints: Callable[[], np.ndarray | None]) -> None:
     """Draw the joints (22, 3), world metres, that the function gives at each redraw; None draws
     nothing.
     """
-    _growing[:] = [joints]
+    _live_pose[:] = [joints]
     _arrange()
 
 
-def hide_growing() -> None:
-    """End ``show_growing``."""
-    _growing.clear()
+def hide_live_pose() -> None:
+    """End ``show_live_pose``."""
+    _live_pose.clear()
     _arrange()
 
 
 def show_faults(faults: dict[int, Faults]) -> None:
-    """Draw these faults (``overlay_data.faults_of``) into the timeline while their takes play."""
+    """Draw these faults (``overlay_faults.faults_of``) into the timeline while their takes play."""
     _faults.clear()
     _faults.update(faults)
     _arrange()
@@ -149,27 +161,30 @@ def shown_faults(action: bpy.types.Action | None) -> Faults | None:
 
 
 def _arrange() -> None:
-    """Have what draws and what listens exactly while there is something to draw."""
-    view = bool(_on or _growing)
+    """Register what draws and what listens, exactly while there is something to draw."""
+    view = bool(_on or _live_pose)
     wanted: dict[str, tuple[Any, Callable[[], None], str]] = {}
     if view:
         wanted |= {"scene": (bpy.types.SpaceView3D, _draw_scene, "POST_VIEW")}
         wanted |= {"corner": (bpy.types.SpaceView3D, _draw_flat, "POST_PIXEL")}
     if _faults:
         wanted |= {"timeline": (bpy.types.SpaceDopeSheetEditor, _draw_timeline, "POST_PIXEL")}
+
     for name in set(_drawers) - set(wanted):
         space, handle = _drawers.pop(name)
         space.draw_handler_remove(handle, "WINDOW")
     for name in set(wanted) - set(_drawers):
         space, function, moment = wanted[name]
         _drawers[name] = space, space.draw_handler_add(function, (), "WINDOW", moment)
+
     listening = bool(_on or _faults)
     for event, function in _LISTENERS.items():
-        told = getattr(bpy.app.handlers, event)
-        if listening and function not in told:
-            told.append(function)
-        elif not listening and function in told:
-            told.remove(function)
+        handlers = getattr(bpy.app.handlers, event)
+        if listening and function not in handlers:
+            handlers.append(function)
+        elif not listening and function in handlers:
+            handlers.remove(function)
+
     if not view:
         _batches.clear()
     if not listening:
@@ -187,12 +202,12 @@ def _redraw() -> None:
 
 @persistent
 def _edited(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
-    overlay_data.note_edit(depsgraph)
+    cache.note_edit(depsgraph)
 
 
 @persistent
 def _other_frame(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
-    overlay_data.note_frame(depsgraph)
+    cache.note_frame(depsgraph)
 
 
 @persistent
@@ -235,6 +250,7 @@ def beads_of(drawing: Drawing) -> tuple[np.ndarray, np.ndarray]:
             for z in (-1, 1)
         ]
     )
+
     lit = 0.68 + 0.32 * np.clip(corners.sum(axis=1) @ _LIGHT / np.sqrt(3.0), -1.0, 1.0)
     places = drawing.beads[:, None, None] + drawing.radii[:, None, None, None] * corners
     colours = np.repeat(drawing.bead_colours[:, None], 8, axis=1)
@@ -250,25 +266,21 @@ def _batches_of(kind: str, number: int, drawing: Drawing) -> list[tuple[str, Any
     known = _batches.get((kind, number))
     if known is not None and known[0] is drawing:
         return known[1]
-    made = []
+
+    batches = []
+
+    def add(shader: str, primitive: str, places: np.ndarray, colours: np.ndarray) -> None:
+        content = {"pos": places.astype(np.float32), "color": colours.astype(np.float32)}
+        builtin = gpu.shader.from_builtin(shader)
+        batches.append((shader, batch_for_shader(builtin, primitive, content)))
+
     if len(drawing.beads):
-        places, colours = (a.astype(np.float32) for a in beads_of(drawing))
-        shader = gpu.shader.from_builtin("SMOOTH_COLOR")
-        made.append(
-            ("SMOOTH_COLOR", batch_for_shader(shader, "TRIS", {"pos": places, "color": colours}))
-        )
+        add("SMOOTH_COLOR", "TRIS", *beads_of(drawing))
     if len(drawing.lines):
-        places = drawing.lines.reshape(-1, 3).astype(np.float32)
-        colours = np.repeat(drawing.line_colours, 2, axis=0).astype(np.float32)
-        shader = gpu.shader.from_builtin("POLYLINE_SMOOTH_COLOR")
-        made.append(
-            (
-                "POLYLINE_SMOOTH_COLOR",
-                batch_for_shader(shader, "LINES", {"pos": places, "color": colours}),
-            )
-        )
-    _batches[kind, number] = drawing, made
-    return made
+        ends = drawing.lines.reshape(-1, 3)
+        add("POLYLINE_SMOOTH_COLOR", "LINES", ends, np.repeat(drawing.line_colours, 2, axis=0))
+    _batches[kind, number] = drawing, batches
+    return batches
 
 
 def _draw(kind: str, drawn: Iterable[Drawing]) -> None:
@@ -278,6 +290,7 @@ def _draw(kind: str, drawn: Iterable[Drawing]) -> None:
     depth = gpu.state.depth_test_get()
     gpu.state.blend_set("ALPHA")
     gpu.state.depth_test_set("NONE")
+
     scale = bpy.context.preferences.system.ui_scale
     for number, drawing in enumerate(drawn):
         for name, batch in _batches_of(kind, number, drawing):
@@ -287,6 +300,7 @@ def _draw(kind: str, drawn: Iterable[Drawing]) -> None:
                 shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
                 shader.uniform_float("lineWidth", drawing.width * scale)
             batch.draw(shader)
+
     gpu.state.blend_set("NONE")
     gpu.state.depth_test_set(depth)
 
@@ -295,21 +309,21 @@ def _wanted(context: bpy.types.Context) -> dict[str, tuple[Drawing, ...]]:
     """What there is to draw in the context's view: nothing where its overlays are off."""
     if context.space_data is None or not context.space_data.overlay.show_overlays:
         return {}
-    out = overlay_data.drawings(context, [kind for kind in KINDS if kind in _on])
-    if _growing and (joints := _growing[0]()) is not None:
-        out["growing"] = overlay_data.growing(context, joints)
-    return out
+    wanted = overlay_data.drawings(context, [kind for kind in KINDS if kind in _on])
+    if _live_pose and (joints := _live_pose[0]()) is not None:
+        wanted["live pose"] = overlay_data.live_pose(context, joints)
+    return wanted
 
 
 def _draw_scene() -> None:
-    """What lies in the scene."""
+    """Draw what lies in the scene."""
     for kind, drawn in _wanted(bpy.context).items():
         if kind != CIRCLE:
             _draw(kind, drawn)
 
 
 def _draw_flat() -> None:
-    """What is written over the scene, and the circle in its corner."""
+    """Draw the labels over the scene, and the circle in its corner."""
     import gpu
     from bpy_extras.view3d_utils import location_3d_to_region_2d
 
@@ -323,18 +337,19 @@ def _draw_flat() -> None:
                 at = location_3d_to_region_2d(context.region, context.region_data, place)
                 if at is not None:
                     _write(text, at[0], at[1] + 10.0, colour)
+
     if not wanted.get(CIRCLE):
         return
     scale = context.preferences.system.ui_scale
-    middle, radius = (
-        corner_of(context.area, context.region, (1.4 * _RADIUS + _EDGE) * scale),
-        _RADIUS * scale,
-    )
+    inset = (1.4 * _CIRCLE_RADIUS + _CIRCLE_MARGIN) * scale
+    middle = corner_of(context.area, context.region, inset)
+    radius = _CIRCLE_RADIUS * scale
     with gpu.matrix.push_pop():
         gpu.matrix.translate((*middle, 0.0))
         gpu.matrix.scale((radius, radius, 1.0))
         _fill_disc(1.4)
         _draw(CIRCLE, wanted[CIRCLE])
+
     for drawing in wanted[CIRCLE]:
         for place, text, colour in drawing.labels:
             _write(
@@ -347,8 +362,8 @@ def _draw_flat() -> None:
 
 
 def corner_of(area: bpy.types.Area, region: bpy.types.Region, inset: float) -> tuple[float, float]:
-    """A place ``inset`` pixels from the region's lower right corner that the sidebar does not hide;
-    in the region.
+    """The place ``inset`` pixels from the region's lower right corner, or from the sidebar where it
+    covers that; in the region.
     """
     covered = (r for r in area.regions if r.type == "UI" and r.width > 1 and r.x > region.x)
     right = min([region.x + region.width, *(r.x for r in covered)]) - region.x
@@ -376,10 +391,12 @@ def _fill_disc(radius: float) -> None:
 def _write(
     text: str, x: float, y: float, colour: tuple[float, float, float, float], centred: bool = False
 ) -> None:
-    """Write with the lower middle at (x, y) of the region, or the very middle."""
+    """Write with the middle of the text's lower edge at (x, y) of the region, or its very middle if
+    ``centred``.
+    """
     import blf
 
-    blf.size(0, _LETTERS * bpy.context.preferences.system.ui_scale)
+    blf.size(0, _FONT_SIZE * bpy.context.preferences.system.ui_scale)
     width, height = blf.dimensions(0, text)
     blf.color(0, *colour)
     blf.position(0, x - width / 2, y - (height / 2 if centred else 0.0), 0.0)
@@ -394,22 +411,24 @@ def _draw_timeline() -> None:
     from gpu_extras.batch import batch_for_shader
 
     context = bpy.context
-    armature = overlay_data.watched(context) if context.scene else None
-    action = overlay_data.playing(armature) if armature else None
+    armature = watched_character(context) if context.scene else None
+    action = played_take(armature) if armature else None
     faults = shown_faults(action)
     if action is None or faults is None:
         return
-    bars = overlay_data.strip(faults, action.dafnet.frame_start)
+    bars = fault_bars(faults, action.dafnet.frame_start)
     if not len(bars.row):
         return
+
     view, scale = context.region.view2d, context.preferences.system.ui_scale
     origin, step = (view.view_to_region(frame, 0.0, clip=False)[0] for frame in (0.0, 1000.0))
     left, right = (
         origin + (step - origin) * (edge / 1000.0) for edge in (bars.first - 0.5, bars.last + 0.5)
     )
-    low = (_BAR_EDGE + (1.0 - bars.row) * (_BAR + 1.0)) * scale
-    high = low + _BAR * scale
+    low = (_BAR_MARGIN + (1.0 - bars.row) * (_BAR_HEIGHT + 1.0)) * scale
+    high = low + _BAR_HEIGHT * scale
     right = np.maximum(right, left + 1.0)
+
     corners = np.stack(
         [left, low, right, low, right, high, left, low, right, high, left, high], axis=1
     ).reshape(-1, 2)
@@ -433,7 +452,7 @@ def register() -> None:
 def unregister() -> None:
     """Turn everything off and take the switches away."""
     _on.clear()
-    _growing.clear()
+    _live_pose.clear()
     _faults.clear()
     _arrange()
     del bpy.types.WindowManager.dafnet_overlays

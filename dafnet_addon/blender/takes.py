@@ -22,6 +22,7 @@ __all__ = [
     "drop_take",
     "frames_of",
     "play_take",
+    "played_take",
     "stored",
     "takes_of",
 ]
@@ -78,6 +79,12 @@ def draw_of(action: bpy.types.Action) -> Draw:
 def takes_of(armature: bpy.types.Object) -> list[bpy.types.Action]:
     """The actions in the armature's list, without rows whose action was deleted."""
     return [row.action for row in armature.dafnet.takes if row.action is not None]
+
+
+def played_take(armature: bpy.types.Object) -> bpy.types.Action | None:
+    """The take that the armature plays, None where it plays none."""
+    data = armature.animation_data
+    return data.action if data and data.action and PACKED in data.action else None
 
 
 def active_take(armature: bpy.types.Object) -> bpy.types.Action | None:
