@@ -1,9 +1,9 @@
 """Overlays in the viewport and the timeline: switches, what draws them, and when.
 
 All are off at first. Blender is asked to draw only while a switch is on or a job shows its live
-pose, and ``gpu`` is imported only when something is drawn. The switches live here and not in the file, so
-opening another file or undoing leaves them as they are; nothing here holds on to objects of the
-file, which ``overlay_data`` looks up at each redraw.
+pose, and ``gpu`` is imported only when something is drawn. The switches live here and not in the
+file, so opening another file or undoing leaves them as they are. Nothing here holds on to objects
+of the file: ``overlay_data`` looks them up at each redraw.
 """
 
 from collections.abc import Callable, Iterable
