@@ -29,7 +29,6 @@ from typing import Any
 
 import numpy as np
 
-from dafnet_addon.baselines.flows import parts_of
 from dafnet_addon.baselines.samp import SMALL_SAMP, SampConfig
 from dafnet_addon.baselines.samp_evaluate import measured_samp
 from dafnet_addon.baselines.train import train_samp
@@ -38,6 +37,7 @@ from dafnet_addon.core.weights import load_weights
 from dafnet_addon.data.held_out import HeldClip, held_out
 from dafnet_addon.data.paper_test import paper_test
 from dafnet_addon.model.config import SMALL, ModelConfig
+from dafnet_addon.model.systems import system_named
 from dafnet_addon.training import precision
 from dafnet_addon.training.checkpoints import Checkpoint, checkpoint_file
 from dafnet_addon.training.evaluate import Measured, captured, measured, row
@@ -126,7 +126,7 @@ def _jobs(runs: Path, budget: str, model: ModelConfig, training: TrainingConfig)
         of_it = replace(model, **changed)
         if budget != BUDGETS[0] and name not in STEPPED:
             continue
-        parts = parts_of(of_it)
+        parts = system_named(of_it.system).partition
         for part in parts:
             shared = replace(training, minutes_flow=training.minutes_flow / len(parts))
             yield Job(_at(runs, budget) / of_it.system, part, of_it, shared)

@@ -19,7 +19,6 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from dafnet_addon import Controls, InputError, Scene, generate, load_weights
-from dafnet_addon.baselines.samplers import sampler_of
 from dafnet_addon.blender.demo_room import FURNITURE, Part
 from dafnet_addon.blender.stage import Colour, Stage, mixed, solids
 from dafnet_addon.core.conditions import PREROLL, shot_steps
@@ -33,6 +32,7 @@ from dafnet_addon.core.skeleton import END_EFFECTORS, SEAT_TO_PELVIS, UPPER
 from dafnet_addon.core.weights import Weights
 from dafnet_addon.data.courses import AT_DESKS
 from dafnet_addon.demo import Place
+from dafnet_addon.model.systems import sampler_of
 
 __all__ = ["FIGURES", "HEIGHTS", "Motion", "draw", "seated_at"]
 

@@ -19,15 +19,15 @@ from typing import Any
 import numpy as np
 import torch
 
-from dafnet_addon.baselines.flows import flow_of
 from dafnet_addon.baselines.samp import PAPER_SAMP, SampConfig, network_of
-from dafnet_addon.baselines.samplers import sampler_of
 from dafnet_addon.core.sampler import Conditions, Sampler
 from dafnet_addon.core.skeleton import OFFSETS
 from dafnet_addon.core.threads import one_thread
 from dafnet_addon.core.weights import FORMAT, Weights, load_weights
 from dafnet_addon.model.config import PAPER, ModelConfig
+from dafnet_addon.model.flow import BodyFlow
 from dafnet_addon.model.predictor import ActionPredictor
+from dafnet_addon.model.systems import sampler_of
 from dafnet_addon.training.batches import Statistics
 from dafnet_addon.training.export import tensors_of
 
@@ -39,7 +39,7 @@ _REPEATS = 3
 def random_weights(config: ModelConfig) -> Weights:
     """Weights of these sizes that were never trained."""
     torch.manual_seed(0)
-    flow = flow_of(config)
+    flow = BodyFlow(config)
     unit = Statistics(np.zeros(66), np.ones(66), np.zeros(3), np.ones(3), np.zeros(18), np.ones(18))
     tensors = tensors_of(flow, ActionPredictor(config) if config.predicts else None, unit)
     description = {"model": config.as_dict(), "fps": 30, "offsets": OFFSETS.tolist()}
@@ -64,18 +64,18 @@ def recurrent_bytes(sampler: Sampler) -> int:
     """Bytes of the matrices that each frame multiplies with."""
     arrays = [
         m
-        for part in sampler._parts
+        for part in sampler.network.parts
         for step in part.steps
-        for m in (step.inverse, step.coupling.out)
+        for m in (step.inverse, step.coupling.out.matrix)
     ]
     arrays += [
         layer.matrix
-        for part in sampler._parts
+        for part in sampler.network.parts
         for step in part.steps
         for layer in step.coupling.layers
     ]
-    if sampler.actions:
-        arrays += [sampler._predictor_past, sampler._predictor_second[0], sampler._predictor_out[0]]
+    if (predictor := sampler.network.predictor) is not None:
+        arrays += [predictor.past, predictor.second.matrix, predictor.out.matrix]
     return sum(int(a.nbytes) for a in arrays)
 
 
@@ -85,14 +85,14 @@ def per_pose(sampler: Sampler, batch: int, frames: int) -> float:
     """
     nothing = {"velocity": 3, "ahead": 18, "occupancy": 2640, "observation": 66, "given": 22}
     conditions = Conditions(**{name: np.zeros((frames, size)) for name, size in nothing.items()})
-    noise = sampler._to(np.zeros((batch, 66)))
+    noise = sampler.backend.array(np.zeros((batch, 66)))
     best = np.inf
     with one_thread():
         for _ in range(_REPEATS):
             sampler.start(conditions, batch)
             begin = perf_counter()
             for t in range(frames):
-                sampler.frame(t, noise)
+                sampler.decode(t, noise)
             best = min(best, perf_counter() - begin)
     return 1000.0 * best / (frames * batch)
 

@@ -191,3 +191,53 @@ def test_importing_the_package_loads_its_core_and_numpy_alone() -> None:
     }
     ours = {".".join(name.split(".")[:2]) for name in loaded if name.startswith("dafnet_addon")}
     assert ours == {"dafnet_addon", "dafnet_addon.core"}, "what is not asked for is not loaded"
+
+
+LAYERS = {
+    "core": set(),
+    "director": {"core"},
+    "model": {"core"},
+    "data": {"core", "director"},
+    "training": {"core", "data", "model"},
+    "baselines": {"core", "data", "model", "training"},
+    "demo": {"core"},
+    "blender": {"core", "director", "demo"},
+    "cli": {"core", "data", "training", "baselines", "blender"},
+    "__main__": {"core", "cli"},
+    "__init__": {"core"},
+}
+"""What each package or module of ``dafnet_addon`` may import, those that it stands on."""
+
+
+def imported_modules(file: Path) -> set[Path]:
+    """The files of ``dafnet_addon`` that a file of it imports, also inside functions."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.ImportFrom) or not node.level:
+            continue
+        place = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+        for target in (place / alias.name for alias in node.names):
+            candidates = (target.with_suffix(".py"), target / "__init__.py")
+            whole = (place.with_suffix(".py"), place / "__init__.py")
+            found |= {next((each for each in (*candidates, *whole) if each.exists()), file)}
+    return {each for each in found if each.is_relative_to(PACKAGE)} - {file}
+
+
+def layer(file: Path) -> str:
+    return file.relative_to(PACKAGE).with_suffix("").parts[0]
+
+
+@pytest.mark.parametrize(
+    "file", sources("dafnet_addon"), ids=lambda file: file.relative_to(PACKAGE).as_posix()
+)
+def test_no_layer_imports_upward(file: Path) -> None:
+    above = {layer(each) for each in imported_modules(file)} - {layer(file), "__init__"}
+    assert above <= LAYERS[layer(file)]
+
+
+def test_there_is_no_import_circle() -> None:
+    imported = {file: imported_modules(file) for file in sources("dafnet_addon")}
+    while leaves := [file for file, others in imported.items() if not others & imported.keys()]:
+        for file in leaves:
+            del imported[file]
+    assert not imported, sorted(file.relative_to(PACKAGE).as_posix() for file in imported)

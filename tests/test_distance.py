@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from dafnet_addon.core import distance
-from dafnet_addon.core.distance import BAND, build_grid, grid_of, prepared, rigid_split, scaled
+from dafnet_addon.core.distance import build_grid, grid_of, prepared, rigid_split, scaled
+from dafnet_addon.core.grid import BAND
 from dafnet_addon.core.rotations import matrix_from_quaternion, yaw_matrix
 from dafnet_addon.core.solids import Box, Mesh, Scene, box_distance
 from kit.places import FURNITURE

@@ -447,7 +447,7 @@ def test_seeds_of_numpy_are_seeds(weights):
     )
     # As they have always been: NumPy's generator, seeded with the seed and the part's number.
     upper = np.random.default_rng([1, 0]).standard_normal(42)
-    assert np.allclose(drawn[1][0, :42], (sampler._spread @ np.r_[upper, np.zeros(24)])[:42])
+    assert np.allclose(drawn[1][0, :42], (sampler.network.spread @ np.r_[upper, np.zeros(24)])[:42])
 
 
 def test_bad_temperature_and_bad_mesh_are_refused(weights):

@@ -3,6 +3,7 @@ sizes of the paper.
 """
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,9 +13,8 @@ torch = pytest.importorskip(
     "torch", reason="the model's own code needs torch; inside Blender only NumPy runs"
 )
 
-from dafnet_addon.baselines.flows import LowerFirstFlow  # noqa: E402
 from dafnet_addon.model.config import PAPER, SMALL, ModelConfig  # noqa: E402
-from dafnet_addon.model.flow import ActNorm, Coupling, InvertibleLinear, PartFlow, TwoPartFlow  # noqa: E402
+from dafnet_addon.model.flow import ActNorm, BodyFlow, Coupling, InvertibleLinear, PartFlow  # noqa: E402
 from dafnet_addon.model.predictor import GMVAE, gumbel_temperature  # noqa: E402
 
 TINY = ModelConfig(
@@ -27,6 +27,9 @@ TINY = ModelConfig(
     steps_upper=2,
     steps_lower=2,
 )
+
+
+_HALVES = slice(0, 3), slice(3, 5)
 
 
 @pytest.fixture(autouse=True)
@@ -53,9 +56,9 @@ def test_actnorm_whitens_inverts_and_counts_volume():
     norm = ActNorm(5)
     x = 3.0 + 2.0 * torch.randn(40, 7, 5)
     norm.initialise(x)
-    y, log_det = norm(x)
+    y, log_det, _ = norm(x)
     assert y.mean((0, 1)).abs().max() < 1e-9 and (y.std((0, 1)) - 1).abs().max() < 1e-2
-    assert (norm.inverse(y) - x).abs().max() < 1e-10
+    assert (norm.inverse(y).x - x).abs().max() < 1e-10
     assert torch.allclose(log_det[0, 0], _log_abs_det(lambda v: norm(v)[0], x[0, 0]))
 
 
@@ -68,8 +71,8 @@ def test_actnorm_survives_a_constant_feature():
 def test_linear_inverts_and_counts_volume():
     linear = _stirred(InvertibleLinear(6))
     x = torch.randn(3, 4, 6)
-    y, log_det = linear(x)
-    assert (linear.inverse(y) - x).abs().max() < 1e-10
+    y, log_det, _ = linear(x)
+    assert (linear.inverse(y).x - x).abs().max() < 1e-10
     assert torch.allclose(log_det[0, 0], _log_abs_det(lambda v: linear(v)[0], x[0, 0]))
     assert torch.allclose(linear.inverse_weight() @ linear.weight(), torch.eye(6))
 
@@ -130,25 +133,53 @@ def _inputs(frames=5, batch=2):
     base = torch.cat(
         [torch.softmax(torch.randn(batch, frames, 10), -1), torch.randn(batch, frames, 3)], -1
     )
-    return upper, lower, base, torch.rand(batch, frames, 2640), observation, given
+    return torch.cat([upper, lower], -1), base, torch.rand(batch, frames, 2640), observation, given
 
 
-@pytest.mark.parametrize("kind", [TwoPartFlow, LowerFirstFlow])
-def test_two_part_flow_inverts(kind: type[TwoPartFlow]):
-    flow = _stirred(kind(TINY))
-    inputs = _inputs()
-    z_upper, z_lower, _, _ = flow(*inputs)
-    pose = flow.inverse(z_upper, z_lower, *inputs[2:])
-    assert (pose - torch.cat(inputs[:2], -1)).abs().max() < 1e-8
+def _body_flow(system: str) -> BodyFlow:
+    return _stirred(BodyFlow(replace(TINY, system=system, steps_whole=2)))
+
+
+@pytest.mark.parametrize("system", ["dafnet", "lower-first", "ap-p"])
+def test_a_flow_of_the_body_inverts_and_goes_on_from_its_state(system: str):
+    flow = _body_flow(system)
+    pose, *known = _inputs()
+    noise, log_det, _ = flow(pose, *known)
+    assert (flow.inverse(noise, *known).x - pose).abs().max() < 1e-8
+
+    first, second = ([each[:, frames] for each in (pose, *known)] for frames in _HALVES)
+    begun = flow(*first)
+    ended = flow(*second, begun.state)
+    assert torch.allclose(torch.cat([begun.y, ended.y], dim=1), noise)
+    assert torch.allclose(torch.cat([begun.log_det, ended.log_det], dim=1), log_det)
+    back = flow.inverse(begun.y, *first[1:])
+    assert torch.allclose(flow.inverse(ended.y, *second[1:], back.state).x, second[0])
+
+
+def test_every_transform_keeps_the_same_contract():
+    x, condition, occupancy = torch.randn(2, 5, 6), torch.randn(2, 5, 79), torch.rand(2, 5, 2640)
+    config = ModelConfig(width=10, code=8)
+    transforms = (
+        (ActNorm(6), (condition,)),
+        (InvertibleLinear(6), (condition,)),
+        (Coupling(6, 79, 10, 2), (condition,)),
+        (PartFlow(6, 2, config), (condition, occupancy)),
+    )
+    for transform, known in transforms:
+        whole = transform(x, *known, None)
+        begun = transform(x[:, :2], *(each[:, :2] for each in known), None)
+        ended = transform(x[:, 2:], *(each[:, 2:] for each in known), begun.state)
+        assert torch.allclose(torch.cat([begun.y, ended.y], dim=1), whole.y)
+        assert whole.log_det.shape == x.shape[:-1]
+        assert torch.allclose(transform.inverse(whole.y, *known, None).x, x)
 
 
 def test_the_upper_body_does_not_hang_on_the_lower_noise():
-    flow = _stirred(TwoPartFlow(TINY))
-    _, _, base, occupancy, observation, given = _inputs()
+    flow = _body_flow("dafnet")
+    _, *known = _inputs()
     z_upper = torch.randn(2, 5, 42)
     one, two = (
-        flow.inverse(z_upper, torch.randn(2, 5, 24), base, occupancy, observation, given)
-        for _ in range(2)
+        flow.inverse(torch.cat([z_upper, torch.randn(2, 5, 24)], -1), *known).x for _ in range(2)
     )
     assert torch.allclose(one[..., :42], two[..., :42]) and not torch.allclose(
         one[..., 42:], two[..., 42:]
@@ -156,20 +187,20 @@ def test_the_upper_body_does_not_hang_on_the_lower_noise():
 
 
 def test_with_the_lower_body_first_it_is_the_other_way_round():
-    flow = _stirred(LowerFirstFlow(TINY))
-    upper, lower, base, occupancy, observation, given = _inputs()
+    flow = _body_flow("lower-first")
+    pose, *known = _inputs()
+    base, _, observation, given = known
     z_lower = torch.randn(2, 5, 24)
     one, two = (
-        flow.inverse(torch.randn(2, 5, 42), z_lower, base, occupancy, observation, given)
-        for _ in range(2)
+        flow.inverse(torch.cat([torch.randn(2, 5, 42), z_lower], -1), *known).x for _ in range(2)
     )
     assert torch.allclose(one[..., 42:], two[..., 42:]) and not torch.allclose(
         one[..., :42], two[..., :42]
     )
-    told = flow.condition("upper", base, observation, given, torch.cat([upper, lower], -1))[
-        ..., base.shape[-1] :
-    ]
-    assert (told[..., :42] == observation[..., :42]).all() and (told[..., 42:66] == lower).all()
+    told = flow.condition("upper", base, observation, given, pose)[..., base.shape[-1] :]
+    assert (told[..., :42] == observation[..., :42]).all() and (
+        told[..., 42:66] == pose[..., 42:]
+    ).all()
     assert (told[..., 66:80] == given[..., :14]).all() and (told[..., 80:] == 1).all()
 
 
@@ -190,7 +221,7 @@ def test_data_dependent_start_whitens_the_noise():
 
 def test_sizes_of_the_paper():
     with torch.device("meta"):
-        flow, gmvae = TwoPartFlow(PAPER), GMVAE(PAPER)
+        flow, gmvae = BodyFlow(PAPER), GMVAE(PAPER)
     count = lambda module: sum(p.numel() for p in module.parameters())  # noqa: E731
     assert PAPER.scene_size == 693 and PAPER.condition_size == 591
     assert (

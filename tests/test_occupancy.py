@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from dafnet_addon.core.conditions import PREROLL, shot_steps
-from dafnet_addon.core.distance import BAND, prepared, scaled
+from dafnet_addon.core.distance import prepared, scaled
 from dafnet_addon.core.errors import InputError
+from dafnet_addon.core.grid import BAND
 from dafnet_addon.core.occupancy import distance, occupancy, tops_under
 from dafnet_addon.core.progress import drained
 from dafnet_addon.core.root import RootPath, to_world

@@ -10,8 +10,8 @@ import pytest
 
 from dafnet_addon.core.errors import WeightsError
 from dafnet_addon.core.progress import drained
-from dafnet_addon.core.sampler import Conditions, Sampler, model_order, smpl_order
-from dafnet_addon.core.skeleton import OFFSETS
+from dafnet_addon.core.sampler import Conditions, Sampler
+from dafnet_addon.core.skeleton import OFFSETS, model_order, smpl_order
 from dafnet_addon.core.weights import load_weights
 
 
@@ -36,7 +36,7 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     torch = pytest.importorskip("torch")
     from dafnet_addon.core.weights import FORMAT, Weights
     from dafnet_addon.model.config import ModelConfig
-    from dafnet_addon.model.flow import TwoPartFlow
+    from dafnet_addon.model.flow import BodyFlow
     from dafnet_addon.model.predictor import ActionPredictor
     from dafnet_addon.training.batches import Statistics, past_of
     from dafnet_addon.training.export import tensors_of
@@ -51,7 +51,7 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
         mask=True,
         ahead=18,
     )
-    flow, predictor = TwoPartFlow(config), ActionPredictor(config)
+    flow, predictor = BodyFlow(config), ActionPredictor(config)
     with torch.no_grad():
         for p in [*flow.parameters(), *predictor.parameters()]:
             p += 0.05 * torch.randn_like(p)
@@ -95,18 +95,15 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
         ).repeat(2, 1, 1)
         base = torch.cat([probabilities, velocity[:, 10:], way], -1)
         observation = torch.from_numpy(scaled).repeat(2, 1, 1)
-        z_upper, z_lower, det_upper, det_lower = flow(
-            poses[..., :42], poses[..., 42:], base, occupancy, observation, given
-        )
+        noise, flow_log_det, _ = flow(poses, base, occupancy, observation, given)
     assert np.abs(actions - probabilities.transpose(0, 1).numpy()).max() < 1e-9
-    noise = torch.cat([z_upper, z_lower], -1).numpy()
-    assert np.abs(noise - z[:, None]).max() < 1e-8
+    assert np.abs(noise.numpy() - z[:, None]).max() < 1e-8
     sampler = Sampler(weights, dtype="float64")
     sampler.start(conditions, takes=2)
-    taken = [sampler.absorb(t, sampler.standardised(made[t])) for t in range(30)]
-    assert max(np.abs(back - z).max() for back, _, _ in taken) < 1e-8
-    log_det = np.stack([d for _, _, d in taken], axis=1)
-    assert np.abs(log_det - (det_upper + det_lower).numpy()).max() < 1e-8
+    taken = [sampler.encode(t, sampler.standardised(made[t])) for t in range(30)]
+    assert max(np.abs(back - z).max() for _, back, _, _ in taken) < 1e-8
+    log_det = np.stack([frame.log_det for frame in taken], axis=1)
+    assert np.abs(log_det - flow_log_det.numpy()).max() < 1e-8
     gaussian = -0.5 * (z**2).sum(-1) - 33.0 * np.log(2.0 * np.pi)
     assert np.abs(density.T - gaussian[:, None] - log_det).max() < 1e-8, (
         "what it says of itself as it makes it"
@@ -116,11 +113,11 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
 @pytest.mark.parametrize("system", ["ap-p", "moglow", "lower-first"])
 def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: Path):
     torch = pytest.importorskip("torch")
-    from dafnet_addon.baselines.flows import flow_of
-    from dafnet_addon.baselines.samplers import LowerFirstSampler, MoGlowSampler, WholeBodySampler
     from dafnet_addon.core.weights import FORMAT, Weights
     from dafnet_addon.model.config import ModelConfig
+    from dafnet_addon.model.flow import BodyFlow
     from dafnet_addon.model.predictor import ActionPredictor
+    from dafnet_addon.model.systems import sampler_of
     from dafnet_addon.training.batches import Statistics, past_of
     from dafnet_addon.training.export import tensors_of
 
@@ -135,7 +132,7 @@ def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: 
         steps_whole=4,
         shared_encoder=system == "moglow",
     )
-    flow = flow_of(config).double()
+    flow = BodyFlow(config).double()
     predictor = ActionPredictor(config).double() if config.predicts else None
     with torch.no_grad():
         for p in [*flow.parameters(), *(predictor.parameters() if predictor else ())]:
@@ -152,9 +149,8 @@ def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: 
     tensors = tensors_of(flow, predictor, statistics)
     description = {"model": config.as_dict(), "fps": 30, "offsets": OFFSETS.tolist()}
     conditions, z = _conditions(30), rng.normal(size=(2, 66))
-    sampler = {"ap-p": WholeBodySampler, "moglow": MoGlowSampler, "lower-first": LowerFirstSampler}[
-        system
-    ](Weights(tensors, description, {"format": FORMAT}, tmp_path), dtype="float64")
+    weights = Weights(tensors, description, {"format": FORMAT}, tmp_path)
+    sampler = sampler_of(weights, dtype="float64")
     made, actions, density, _ = drained(sampler.run(conditions, z))
     assert actions.shape == (30, 2, 0 if system == "moglow" else 10)
 
@@ -183,14 +179,15 @@ def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: 
             else torch.cat([predictor(past, occupancy), velocity[:, 10:]], -1)
         )
         log_det = torch.zeros(2, 30)
-        for name, columns in flow.places.items():
+        for name, columns in flow.partition.items():
             condition = flow.condition(name, told, observation, given, poses)
             noise, part_det, _ = flow.parts()[name](poses[..., columns], condition, occupancy)
             assert np.abs(noise.numpy() - z[:, None, columns]).max() < 1e-8
             log_det = log_det + part_det
     sampler.start(conditions, takes=2)
-    taken = [sampler.absorb(t, sampler.standardised(made[t])) for t in range(30)]
-    assert np.abs(np.stack([d for _, _, d in taken], axis=1) - log_det.numpy()).max() < 1e-8
+    taken = [sampler.encode(t, sampler.standardised(made[t])) for t in range(30)]
+    encoded = np.stack([frame.log_det for frame in taken], axis=1)
+    assert np.abs(encoded - log_det.numpy()).max() < 1e-8
     assert np.ptp(density.T - log_det.numpy(), axis=1).max() < 1e-8
 
 
@@ -214,7 +211,7 @@ def test_shipped_weights_invert(weights):
     again = Sampler(weights)
     again.start(conditions)
     standard = again.standardised(made).astype(np.float32)
-    noise = np.concatenate([again.absorb(t, standard[t])[0] for t in range(100)])
+    noise = np.concatenate([again.encode(t, standard[t]).noise for t in range(100)])
     assert np.abs(noise - z).max() < 1e-2, "pose to noise gives back the noise"
 
 
@@ -325,7 +322,7 @@ def test_poses_that_are_no_bodys_are_refused_before_they_are_shown(weights):
         np.zeros((3, 22)),
     )
     with pytest.raises(
-        WeightsError, match="their poses are no numbers, or farther than 100 metres"
+        WeightsError, match="the poses they give are not numbers, or farther than 100 metres"
     ):
         drained(
             sampler.run(conditions, np.zeros((1, 66)), None, lambda frame, pose: shown.append(pose))

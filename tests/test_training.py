@@ -20,8 +20,6 @@ from kit.places import ROOT
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from dafnet_addon import cli  # noqa: E402
-from dafnet_addon.baselines.flows import flow_of, parts_of  # noqa: E402
-from dafnet_addon.baselines.samplers import sampler_of  # noqa: E402
 from dafnet_addon.core.errors import InputError, WeightsError  # noqa: E402
 from dafnet_addon.core.progress import drained  # noqa: E402
 from dafnet_addon.core.root import RootPath  # noqa: E402
@@ -30,7 +28,12 @@ from dafnet_addon.core.skeleton import MODEL_ORDER  # noqa: E402
 from dafnet_addon.core.weights import load_weights  # noqa: E402
 from dafnet_addon.data import boxes as boxes_module  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
-from dafnet_addon.model.flow import Coupling, EnvironmentEncoder  # noqa: E402
+from dafnet_addon.model.flow import (  # noqa: E402
+    BodyFlow,
+    Coupling,
+    EnvironmentEncoder,
+)
+from dafnet_addon.model.systems import sampler_of, system_named  # noqa: E402
 from dafnet_addon.training import precision  # noqa: E402
 from dafnet_addon.training import train as training  # noqa: E402
 from dafnet_addon.training.batches import Pool, Statistics, observation_for, occupancy_of, past_of  # noqa: E402
@@ -435,7 +438,7 @@ def test_configurations_are_read_and_bad_ones_refused(tmp_path):
     with pytest.raises(InputError, match="holds no windows"):
         train_part("predictor", tmp_path, tmp_path / "run", TINY, _config(1))
     with pytest.raises(InputError, match="'lower' is unknown"):
-        flow_of(replace(TINY, system="lower"))
+        BodyFlow(replace(TINY, system="lower"))
 
 
 def test_what_a_run_cannot_be_trained_with_is_said(dataset, tmp_path, capsys):
@@ -589,7 +592,7 @@ def test_baselines_learn_and_their_weights_run(system: str, dataset: Path, tmp_p
     folder = tmp_path / "run"
     if model.predicts:
         _until("predictor", dataset, folder, steps=2, model=model)
-    for part in parts_of(model):
+    for part in system_named(model.system).partition:
         fresh = Run(part, tmp_path / "fresh", model, _config(10), _pool(dataset).statistics())
         before = _loss_at(fresh, dataset)
         assert (

@@ -18,11 +18,13 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from ..core.conditions import PREROLL, Shot
+from ..core.inputs import velocities_up_to
 from ..core.kinematics import on_bones
 from ..core.root import RootPath, to_world
-from ..core.sampler import Conditions, smpl_order, velocities_up_to
+from ..core.sampler import Conditions
+from ..core.skeleton import POSE_SIZE, smpl_order
 from ..data.held_out import HeldClip
-from ..model.config import POSE_SIZE, SENSOR_SIZE, ModelConfig
+from ..model.config import SENSOR_SIZE, ModelConfig
 from ..training import precision
 from ..training.batches import Pool, Statistics, observation_for
 from .samp_features import FIELDS, goals_seen, of_clip, of_windows, parts_of

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .checks import in_frames
-from .distance import BAND, prepared, rigid_split, scaled
+from .distance import prepared, rigid_split, scaled
 from .errors import InputError
+from .grid import BAND
 from .kinematics import Turn
 from .nearby import REACH_OF_A_BODY, beside
 from .occupancy import occupancy

@@ -34,7 +34,8 @@ from .resampling import (
 )
 from .root import RootPath, to_root, to_world
 from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix
-from .sampler import Sampler, Unchanged, model_order
+from .sampler import Sampler, Unchanged
+from .skeleton import model_order
 from .solids import Scene
 from .take import Controls, Take
 from .weights import Weights

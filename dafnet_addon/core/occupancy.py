@@ -12,7 +12,8 @@ from functools import partial
 import numpy as np
 
 from .checks import in_frames
-from .distance import BAND, FLOOR, grid_of, rigid_frames
+from .distance import FLOOR, grid_of, rigid_frames
+from .grid import BAND
 from .progress import stepwise
 from .root import RootPath
 from .rotations import rotate, transpose

@@ -13,6 +13,15 @@ __all__ = [
     "UPPER",
     "LOWER",
     "MODEL_ORDER",
+    "POSE_SIZE",
+    "UPPER_SIZE",
+    "LOWER_SIZE",
+    "Partition",
+    "UPPER_THEN_LOWER",
+    "LOWER_THEN_UPPER",
+    "WHOLE_BODY",
+    "model_order",
+    "smpl_order",
     "MIRROR",
     "END_EFFECTORS",
     "OFFSETS",
@@ -53,6 +62,37 @@ UPPER = (0, 3, 6, 9, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21)
 LOWER = (1, 2, 4, 5, 7, 8, 10, 11)
 MODEL_ORDER = UPPER + LOWER
 """Joint order of poses inside the model: upper body first."""
+
+UPPER_SIZE = 3 * len(UPPER)
+LOWER_SIZE = 3 * len(LOWER)
+POSE_SIZE = UPPER_SIZE + LOWER_SIZE
+"""Coordinates of a pose, and of its parts."""
+
+Partition = dict[str, slice]
+"""The parts of the body that a model makes one after another: their names, in the order of making,
+and their places in a pose in the model's order.
+"""
+UPPER_THEN_LOWER: Partition = {
+    "upper": slice(0, UPPER_SIZE),
+    "lower": slice(UPPER_SIZE, POSE_SIZE),
+}
+LOWER_THEN_UPPER: Partition = {name: UPPER_THEN_LOWER[name] for name in ("lower", "upper")}
+WHOLE_BODY: Partition = {"whole": slice(0, POSE_SIZE)}
+
+_TO_MODEL_ORDER = np.array([3 * j + k for j in MODEL_ORDER for k in range(3)])
+_TO_SMPL_ORDER = np.argsort(_TO_MODEL_ORDER)
+
+
+def model_order(poses: np.ndarray) -> np.ndarray:
+    """Poses (…, 66) in SMPL order, as the model holds them: the upper body first."""
+    return poses[..., _TO_MODEL_ORDER]
+
+
+def smpl_order(poses: np.ndarray) -> np.ndarray:
+    """Inverse of ``model_order``."""
+    return poses[..., _TO_SMPL_ORDER]
+
+
 END_EFFECTORS = {"head": 15, "hand_left": 20, "hand_right": 21}
 
 _INDEX = {name: i for i, name in enumerate(JOINTS)}

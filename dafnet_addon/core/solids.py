@@ -6,16 +6,13 @@ on.
 
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .checks import FARTHEST, array, corners, inside, rotations, shaped
 from .errors import InputError
+from .grid import DistanceGrid
 from .text import printable
-
-if TYPE_CHECKING:
-    from .distance import DistanceGrid
 
 __all__ = ["Box", "Mesh", "Scene", "box_distance"]
 
@@ -87,7 +84,7 @@ class Mesh:
     triangles: np.ndarray
     matrix: np.ndarray = field(default_factory=lambda: np.eye(4))
     name: str = "mesh"
-    grid: "DistanceGrid | None" = None
+    grid: DistanceGrid | None = None
 
     def __post_init__(self) -> None:
         hold = partial(object.__setattr__, self)

@@ -20,9 +20,9 @@ import numpy as np
 from .checks import FARTHEST, MOST_FRAMES, inside, number, shaped, whole
 from .conditions import PREROLL
 from .errors import InputError
+from .network import MAX_ACTIONS
 from .resampling import covering_frames
 from .root import RootPath
-from .sampler import MOST_ACTIONS
 from .skeleton import END_EFFECTORS, UPPER
 from .take import Controls, Take
 from .text import printable, read_json
@@ -175,7 +175,7 @@ def _arrays(file: zipfile.ZipFile, fps: float) -> dict[str, np.ndarray]:
         "take.path.yaw": (made,),
         "take.unchanged": (-1, 66),
     }
-    longest = {"take.action": MOST_ACTIONS, "take.unchanged": 2 * made}
+    longest = {"take.action": MAX_ACTIONS, "take.unchanged": 2 * made}
     arrays = {}
     for name, shape in wanted.items():
         if name not in _FREE | _LATER or f"{name}.npy" in there:

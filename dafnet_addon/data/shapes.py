@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.distance import BAND, DistanceGrid, build_grid
+from ..core.distance import build_grid
 from ..core.errors import InputError
+from ..core.grid import BAND, DistanceGrid
 from ..core.root import RootPath
 from ..core.rotations import rotate, yaw_matrix
 from ..core.sensor import RADIUS, REACH, SPHERES, occupancy_of_distance

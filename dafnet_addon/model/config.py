@@ -2,20 +2,25 @@
 
 from dataclasses import asdict, dataclass
 
+from ..core.root import AHEAD
+from ..core.sensor import SPHERES
+from ..core.skeleton import JOINTS, POSE_SIZE
+from .systems import SYSTEMS
+
 __all__ = [
     "ModelConfig",
     "PAPER",
     "SMALL",
-    "UPPER_SIZE",
-    "LOWER_SIZE",
-    "POSE_SIZE",
     "VELOCITY_SIZE",
     "AHEAD_SIZE",
     "SENSOR_SIZE",
 ]
 
-POSE_SIZE, UPPER_SIZE, LOWER_SIZE, VELOCITY_SIZE, AHEAD_SIZE, SENSOR_SIZE = 66, 42, 24, 3, 18, 2640
-_MOST = {
+VELOCITY_SIZE = 3
+AHEAD_SIZE = 3 * len(AHEAD)
+SENSOR_SIZE = len(SPHERES)
+
+_MAX_SIZES = {
     "steps_upper": 64,
     "steps_lower": 64,
     "steps_whole": 64,
@@ -29,9 +34,9 @@ _MOST = {
 class ModelConfig:
     """Sizes and switches.
 
-    ``system``: "dafnet", the two-part flow; or what it is compared with (``baselines.flows``):
-    "ap-p" or "moglow", one flow of ``steps_whole`` steps for the whole body, or "lower-first", the
-    two parts in the opposite order. ``actions``: K of the action predictor. ``predictor_code``,
+    ``system``: "dafnet", the two-part flow; or what it is compared with (``model.systems``): "ap-p"
+    or "moglow", one flow of ``steps_whole`` steps for the whole body, or "lower-first", the two
+    parts in the opposite order. ``actions``: K of the action predictor. ``predictor_code``,
     ``predictor_width``: its environment code and its layers. ``latent``: the GMVAE's.
     ``steps_upper``, ``steps_lower``: flow steps of each part. ``width``, ``layers``: the coupling's
     LSTM. ``code``: the flow's environment code. ``shared_encoder``: one environment encoder for all
@@ -64,20 +69,20 @@ class ModelConfig:
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
-            least, most = 0 if name == "ahead" else 1, _MOST.get(name, 1 << 16)
-            if type(value) is int and not least <= value <= most:
-                raise ValueError(f"'{name}' must be {least} to {most}")
+            low, high = 0 if name == "ahead" else 1, _MAX_SIZES.get(name, 1 << 16)
+            if type(value) is int and not low <= value <= high:
+                raise ValueError(f"'{name}' must be {low} to {high}")
         if self.ahead_mask and not self.ahead:
-            raise ValueError("'ahead_mask' is for models that are told of the way ahead ('ahead')")
+            raise ValueError("'ahead_mask' is for models that are given the way ahead ('ahead')")
         if not self.action_temperature > 0.0:
             raise ValueError("'action_temperature' must be above 0")
 
     @property
     def predicts(self) -> bool:
-        """Whether the flow is told of actions by the predictor; MoGlow is told of past poses
+        """Whether the flow is given actions by the predictor; MoGlow is given past poses
         instead.
         """
-        return self.system != "moglow"
+        return self.system not in SYSTEMS or SYSTEMS[self.system].predicts
 
     @property
     def condition_size(self) -> int:
@@ -85,8 +90,8 @@ class ModelConfig:
         observation (and its mask).
         """
         way = self.ahead + self.ahead_mask
-        told = self.actions + VELOCITY_SIZE + way if self.predicts else self.scene_size
-        return told + self.code + POSE_SIZE + (22 if self.mask else 0)
+        inputs = self.actions + VELOCITY_SIZE + way if self.predicts else self.scene_size
+        return inputs + self.code + POSE_SIZE + (len(JOINTS) if self.mask else 0)
 
     @property
     def scene_size(self) -> int:

@@ -1,32 +1,55 @@
-"""The two-part normalizing flow (paper, sections 3 and 4.3, Appendix A; flow step after MoGlow and
-Glow).
+"""The normalizing flow over poses (paper, sections 3 and 4.3, Appendix A; flow step after MoGlow
+and Glow).
 
-Every transform keeps one small contract. ``forward(x, condition)`` goes from pose to noise and
-returns (y, log_det, state), ``inverse(y, condition)`` from noise to pose and returns (x, state).
-Sequences are (batch, time, features); log_det is (batch, time); ``state`` is what the recurrent
-part must be given to go on with the next frames, None at the start.
+Every transform keeps one contract, for sequences x, y (B, T, features) of one batch:
+
+- ``forward(x, *condition, state)`` goes from pose to noise and returns ``Forward(y, log_det,
+  state)``, log_det (B, T) of the Jacobian at each frame;
+- ``inverse(y, *condition, state)`` goes from noise to pose and returns ``Inverse(x, state)``.
+
+``condition`` are tensors (B, T, …): one for what makes up a flow step, two for ``PartFlow``, which
+encodes the second, the occupancy, and more for ``BodyFlow``. ``state`` is the memory of the frames
+before, None at the start of a sequence; what is given back goes in with the next frames. A
+transform without a condition or a memory takes them all the same, and gives the state back as it
+came.
 """
 
 import math
-from typing import cast
+from typing import Any, NamedTuple, cast
 
 import torch
 from torch import Tensor, nn
 
-from ..core.sampler import Sampler
 from .config import SENSOR_SIZE, ModelConfig
+from .systems import system_named
 
 __all__ = [
     "ActNorm",
-    "InvertibleLinear",
-    "Coupling",
-    "PartFlow",
-    "EnvironmentEncoder",
     "BodyFlow",
-    "TwoPartFlow",
+    "Coupling",
+    "EnvironmentEncoder",
+    "Forward",
+    "InvertibleLinear",
+    "Inverse",
+    "PartFlow",
 ]
 
 LSTMState = tuple[Tensor, Tensor]
+
+
+class Forward(NamedTuple):
+    """Noise ``y``, the log-determinant of the way to it, and the state to go on with."""
+
+    y: Tensor
+    log_det: Tensor
+    state: Any
+
+
+class Inverse(NamedTuple):
+    """A pose ``x``, and the state to go on with."""
+
+    x: Tensor
+    state: Any
 
 
 class ActNorm(nn.Module):
@@ -48,12 +71,16 @@ class ActNorm(nn.Module):
         self.bias.copy_(-flat.mean(0))
         self.log_scale.copy_(-flat.std(0).clamp_min(0.05).log())
 
-    def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(
+        self, x: Tensor, condition: Tensor | None = None, state: LSTMState | None = None
+    ) -> Forward:
         log_det = self.log_scale.sum().expand(x.shape[:-1])
-        return (x + self.bias) * self.log_scale.exp(), log_det
+        return Forward((x + self.bias) * self.log_scale.exp(), log_det, state)
 
-    def inverse(self, y: Tensor) -> Tensor:
-        return y * (-self.log_scale).exp() - self.bias
+    def inverse(
+        self, y: Tensor, condition: Tensor | None = None, state: LSTMState | None = None
+    ) -> Inverse:
+        return Inverse(y * (-self.log_scale).exp() - self.bias, state)
 
 
 class InvertibleLinear(nn.Module):
@@ -92,8 +119,10 @@ class InvertibleLinear(nn.Module):
         lower, upper = self.factors()
         return self.permutation @ lower @ upper
 
-    def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        return x @ self.weight().T, self.log_s.sum().expand(x.shape[:-1])
+    def forward(
+        self, x: Tensor, condition: Tensor | None = None, state: LSTMState | None = None
+    ) -> Forward:
+        return Forward(x @ self.weight().T, self.log_s.sum().expand(x.shape[:-1]), state)
 
     def inverse_weight(self) -> Tensor:
         """W⁻¹ by two triangular solves."""
@@ -103,8 +132,10 @@ class InvertibleLinear(nn.Module):
         )
         return torch.linalg.solve_triangular(upper, half, upper=True)
 
-    def inverse(self, y: Tensor) -> Tensor:
-        return y @ self.inverse_weight().T
+    def inverse(
+        self, y: Tensor, condition: Tensor | None = None, state: LSTMState | None = None
+    ) -> Inverse:
+        return Inverse(y @ self.inverse_weight().T, state)
 
 
 class Coupling(nn.Module):
@@ -134,25 +165,23 @@ class Coupling(nn.Module):
         shift, raw = self.out(hidden).chunk(2, dim=-1)
         return shift, torch.sigmoid(raw + 2.0) + 1e-6, state
 
-    def forward(
-        self, x: Tensor, condition: Tensor, state: LSTMState | None = None
-    ) -> tuple[Tensor, Tensor, LSTMState]:
+    def forward(self, x: Tensor, condition: Tensor, state: LSTMState | None = None) -> Forward:
         passed, changed = x[..., : self.passes], x[..., self.passes :]
         shift, scale, state = self._affine(passed, condition, state)
-        return torch.cat([passed, (changed + shift) * scale], dim=-1), scale.log().sum(-1), state
+        y = torch.cat([passed, (changed + shift) * scale], dim=-1)
+        return Forward(y, scale.log().sum(-1), state)
 
-    def inverse(
-        self, y: Tensor, condition: Tensor, state: LSTMState | None = None
-    ) -> tuple[Tensor, LSTMState]:
+    def inverse(self, y: Tensor, condition: Tensor, state: LSTMState | None = None) -> Inverse:
         passed, changed = y[..., : self.passes], y[..., self.passes :]
         shift, scale, state = self._affine(passed, condition, state)
-        return torch.cat([passed, changed / scale - shift], dim=-1), state
+        return Inverse(torch.cat([passed, changed / scale - shift], dim=-1), state)
 
 
 class PartFlow(nn.Module):
     """K flow steps over one part of the body, with what encodes the environment for them.
 
-    ``condition`` (B, T, C): all that is known beside the environment; ``occupancy`` (B, T, 2640).
+    Its condition is all that is known beside the environment (B, T, C), and the occupancy (B, T,
+    2640). Its state is a list of the steps' states.
     """
 
     def __init__(self, size: int, steps: int, config: ModelConfig) -> None:
@@ -173,6 +202,51 @@ class PartFlow(nn.Module):
             list(zip(self.norms, self.linears, self.couplings, strict=True)),
         )
 
+    def forward(
+        self,
+        x: Tensor,
+        condition: Tensor,
+        occupancy: Tensor,
+        state: list[LSTMState] | None = None,
+        initialise: bool = False,
+    ) -> Forward:
+        """``initialise``: the activation norms are set to whiten this batch, step by step."""
+        return self._to_noise(x, self._conditions(condition, occupancy), state, initialise)
+
+    def inverse(
+        self, y: Tensor, condition: Tensor, occupancy: Tensor, state: list[LSTMState] | None = None
+    ) -> Inverse:
+        return self._to_pose(y, self._conditions(condition, occupancy), state)
+
+    def log_likelihood(
+        self, x: Tensor, condition: Tensor, occupancy: Tensor, initialise: bool = False
+    ) -> Tensor:
+        """Log density (B, T) in standardised units (equation 2)."""
+        z, log_det, _ = self(x, condition, occupancy, initialise=initialise)
+        return _log_density(z, log_det)
+
+    def free_run(
+        self, x: Tensor, condition: Tensor, occupancy: Tensor, z: Tensor, kept: int
+    ) -> tuple[Tensor, Tensor]:
+        """Log density (B, T) of ``x``, and what the noise ``z`` (B, size), held constant, makes of
+        the frames after the first ``kept`` (B, T − kept, size), with the memory that those have
+        left.
+
+        No pose enters the flow but through its memory, so making all frames costs what measuring
+        them does.
+        """
+        conditions = self._conditions(condition, occupancy)
+        before = [each[:, :kept] for each in conditions]
+        after = [each[:, kept:] for each in conditions]
+
+        z_before, det_before, state = self._to_noise(x[:, :kept], before, None)
+        z_after, det_after, _ = self._to_noise(x[:, kept:], after, state)
+        held = z[:, None].expand(-1, x.shape[1] - kept, -1)
+        poses, _ = self._to_pose(held, after, state)
+
+        densities = [_log_density(z_before, det_before), _log_density(z_after, det_after)]
+        return torch.cat(densities, dim=1), poses
+
     def _conditions(self, condition: Tensor, occupancy: Tensor) -> list[Tensor]:
         """One condition for each step: with a shared encoder, the same one."""
         each = [torch.cat([condition, encoder(occupancy)], dim=-1) for encoder in self.encoders]
@@ -184,69 +258,29 @@ class PartFlow(nn.Module):
         conditions: list[Tensor],
         states: list[LSTMState] | None,
         initialise: bool = False,
-    ) -> tuple[Tensor, Tensor, list[LSTMState]]:
+    ) -> Forward:
         total = x.new_zeros(x.shape[:-1])
         after = []
-        for k, (norm, linear, coupling) in enumerate(self.steps()):
+        for k, step in enumerate(self.steps()):
             if initialise:
-                norm.initialise(x)
-            x, a = norm(x)
-            x, b = linear(x)
-            x, c, state = coupling(x, conditions[k], None if states is None else states[k])
-            total = total + a + b + c
+                step[0].initialise(x)
+            state = None if states is None else states[k]
+            for transform in step:
+                x, log_det, state = transform(x, conditions[k], state)
+                total = total + log_det
             after.append(state)
-        return x, total, after
+        return Forward(x, total, after)
 
     def _to_pose(
         self, z: Tensor, conditions: list[Tensor], states: list[LSTMState] | None
-    ) -> tuple[Tensor, list[LSTMState]]:
-        after: list[LSTMState] = []
-        for k, (norm, linear, coupling) in reversed(list(enumerate(self.steps()))):
-            z, state = coupling.inverse(z, conditions[k], None if states is None else states[k])
-            z = norm.inverse(linear.inverse(z))
-            after.insert(0, state)
-        return z, after
-
-    def forward(
-        self,
-        x: Tensor,
-        condition: Tensor,
-        occupancy: Tensor,
-        states: list[LSTMState] | None = None,
-        initialise: bool = False,
-    ) -> tuple[Tensor, Tensor, list[LSTMState]]:
-        return self._to_noise(x, self._conditions(condition, occupancy), states, initialise)
-
-    def inverse(
-        self, z: Tensor, condition: Tensor, occupancy: Tensor, states: list[LSTMState] | None = None
-    ) -> tuple[Tensor, list[LSTMState]]:
-        return self._to_pose(z, self._conditions(condition, occupancy), states)
-
-    def log_likelihood(
-        self, x: Tensor, condition: Tensor, occupancy: Tensor, initialise: bool = False
-    ) -> Tensor:
-        """Log density (B, T) in standardised units (equation 2)."""
-        z, log_det, _ = self(x, condition, occupancy, initialise=initialise)
-        return _log_density(z, log_det)
-
-    def run_on(
-        self, x: Tensor, condition: Tensor, occupancy: Tensor, z: Tensor, kept: int
-    ) -> tuple[Tensor, Tensor]:
-        """Log density (B, T) of ``x``, and what the noise ``z`` (B, size), held constant, makes of
-        the frames after the first ``kept`` (B, T − kept, size), with the memory that those have
-        left.
-
-        No pose enters the flow but through its memory, so making all frames costs what measuring
-        them does.
-        """
-        conditions = self._conditions(condition, occupancy)
-        before, after = [c[:, :kept] for c in conditions], [c[:, kept:] for c in conditions]
-        z_before, det_before, states = self._to_noise(x[:, :kept], before, None)
-        z_after, det_after, _ = self._to_noise(x[:, kept:], after, states)
-        made, _ = self._to_pose(z[:, None].expand(-1, x.shape[1] - kept, -1), after, states)
-        return torch.cat(
-            [_log_density(z_before, det_before), _log_density(z_after, det_after)], dim=1
-        ), made
+    ) -> Inverse:
+        after = []
+        for k, step in reversed(list(enumerate(self.steps()))):
+            state = None if states is None else states[k]
+            for transform in reversed(step):
+                z, state = transform.inverse(z, conditions[k], state)
+            after.append(state)
+        return Inverse(z, after[::-1])
 
 
 def _log_density(z: Tensor, log_det: Tensor) -> Tensor:
@@ -272,36 +306,37 @@ class EnvironmentEncoder(nn.Module):
 
 class BodyFlow(nn.Module):
     """One flow for each part of the body, made one after another: a part's observation is updated
-    by the parts before it.
+    by the parts before it (paper, figure 5). Which parts, ``config.system`` says.
 
-    Everything here is standardised. ``pose`` (B, T, 66): the upper body first, in the order of
-    ``skeleton.UPPER``; ``base`` (B, T, K + 3): action probabilities and root velocity;
-    ``occupancy`` (B, T, 2640); ``observation`` (B, T, 66): in the order of a pose, zero where free;
-    ``given`` (B, T, 22): 1 where a joint of that order is given.
+    Everything here is standardised. A pose (B, T, 66) is in the model's order, the upper body
+    first. The condition: ``base`` (B, T, K + 3), action probabilities and root velocity, of MoGlow
+    (B, T, 693), past poses and velocities; ``occupancy`` (B, T, 2640); ``observation`` (B, T, 66),
+    in the order of a pose, zero where free; ``given`` (B, T, 22), 1 where a joint of that order is
+    given. The state is a dictionary of the parts' states.
+
+    Raises InputError where the system is unknown.
     """
-
-    places: dict[str, slice]
-    """The parts in the order of sampling, and their places in a pose."""
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
         self.config = config
-        for name, columns in self.places.items():
+        self.partition = system_named(config.system).partition
+        for name, columns in self.partition.items():
             steps = getattr(config, f"steps_{name}")
             self.add_module(name, PartFlow(columns.stop - columns.start, steps, config))
 
     def parts(self) -> dict[str, PartFlow]:
-        """The flows by name, in the order of sampling."""
-        return {name: getattr(self, name) for name in self.places}
+        """The flows by name, in the order of making."""
+        return {name: getattr(self, name) for name in self.partition}
 
     def condition(
         self, part: str, base: Tensor, observation: Tensor, given: Tensor, pose: Tensor
     ) -> Tensor:
-        """What a part is told beside the environment (B, T, K + 3 + 66 [+ 22]): the slots of the
+        """What a part is given beside the environment (B, T, K + 3 + 66 [+ 22]): the slots of the
         parts before it are those of ``pose``, which is the true one, or the one being made.
         """
         observation, given = observation.clone(), given.clone()
-        for name, columns in self.places.items():
+        for name, columns in self.partition.items():
             if name == part:
                 break
             observation[..., columns] = pose[..., columns]
@@ -310,50 +345,43 @@ class BodyFlow(nn.Module):
             [base, observation, given] if self.config.mask else [base, observation], dim=-1
         )
 
-
-class TwoPartFlow(BodyFlow):
-    """The upper body's flow, then the lower's, whose observation is updated by the upper body
-    (paper, figure 5).
-    """
-
-    places = Sampler.parts
-    upper: PartFlow
-    lower: PartFlow
-
     def forward(
         self,
-        upper: Tensor,
-        lower: Tensor,
+        x: Tensor,
         base: Tensor,
         occupancy: Tensor,
         observation: Tensor,
         given: Tensor,
-    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Noise of both parts (B, T, 42), (B, T, 24) and both log-determinants (B, T)."""
-        pose = torch.cat([upper, lower], dim=-1)
-        z_upper, det_upper, _ = self.upper(
-            upper, self.condition("upper", base, observation, given, pose), occupancy
-        )
-        z_lower, det_lower, _ = self.lower(
-            lower, self.condition("lower", base, observation, given, pose), occupancy
-        )
-        return z_upper, z_lower, det_upper, det_lower
+        state: dict[str, list[LSTMState]] | None = None,
+    ) -> Forward:
+        noise, total = torch.zeros_like(x), x.new_zeros(x.shape[:-1])
+        after = {}
+        for name, part in self.parts().items():
+            columns = self.partition[name]
+            known = self.condition(name, base, observation, given, x)
+            before = None if state is None else state[name]
+            noise[..., columns], log_det, after[name] = part(
+                x[..., columns], known, occupancy, before
+            )
+            total = total + log_det
+        return Forward(noise, total, after)
 
     def inverse(
         self,
-        z_upper: Tensor,
-        z_lower: Tensor,
+        y: Tensor,
         base: Tensor,
         occupancy: Tensor,
         observation: Tensor,
         given: Tensor,
-    ) -> Tensor:
-        """Pose (B, T, 66), upper part first, of noise: one part, then the other under or over
-        it.
-        """
-        noise = torch.cat([z_upper, z_lower], dim=-1)
-        pose = torch.zeros_like(noise)
-        for name, columns in self.places.items():
-            told = self.condition(name, base, observation, given, pose)
-            pose[..., columns], _ = self.parts()[name].inverse(noise[..., columns], told, occupancy)
-        return pose
+        state: dict[str, list[LSTMState]] | None = None,
+    ) -> Inverse:
+        pose = torch.zeros_like(y)
+        after = {}
+        for name, part in self.parts().items():
+            columns = self.partition[name]
+            known = self.condition(name, base, observation, given, pose)
+            before = None if state is None else state[name]
+            pose[..., columns], after[name] = part.inverse(
+                y[..., columns], known, occupancy, before
+            )
+        return Inverse(pose, after)

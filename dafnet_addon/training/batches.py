@@ -11,13 +11,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..core.sampler import model_order
 from ..core.sensor import RADIUS, REACH, SPHERES
-from ..core.skeleton import END_EFFECTORS, MODEL_ORDER, UPPER
+from ..core.skeleton import END_EFFECTORS, MODEL_ORDER, UPPER, UPPER_SIZE, model_order
 from ..data.flesh import NO_BANK
 from ..data.prepare import POSE_UNIT, load_pool
 from ..data.shapes import ShapeBank
-from ..model.config import UPPER_SIZE, ModelConfig
+from ..model.config import ModelConfig
 from .placed_shapes import DeviceBank
 
 __all__ = ["Statistics", "Pool", "Batch", "past_of", "observation_for", "occupancy_of", "seen"]

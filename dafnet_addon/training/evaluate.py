@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ..baselines.samplers import sampler_of
 from ..core import liveliness
 from ..core.cleanup import CleanUp
 from ..core.conditions import PREROLL, Shot, shot_steps
@@ -42,6 +41,7 @@ from ..core.take import MODES, Controls
 from ..core.threads import one_thread
 from ..core.weights import Weights
 from ..data.held_out import HeldClip
+from ..model.systems import sampler_of
 from .processes import spread_out
 
 __all__ = [

@@ -295,12 +295,13 @@ def _followed(sampler: Sampler, task: tuple[HeldClip, np.ndarray | None]) -> _Fo
     poses = sampler.standardised(poses + rng.normal(0.0, NOISE, poses.shape)).astype(np.float32)
     sampler.start(shot.conditions)
     seen, nats = [], []
-    metres = float(np.log(sampler.pose_std).sum())
+    metres = float(np.log(sampler.network.normalisation.pose_std).sum())
     for t, pose in enumerate(poses[:, None]):
         other = None if actions is None or t < PREROLL else actions[t - PREROLL, None]
-        noise, told, log_det = sampler.absorb(t, pose, other)
-        seen.append(told[0, : sampler.actions])
-        nats.append(float(0.5 * (noise**2 + np.log(2.0 * np.pi)).sum() - log_det[0]) + metres)
+        frame = sampler.encode(t, pose, other)
+        seen.append(frame.inputs[0, : sampler.actions])
+        gaussian = 0.5 * (frame.noise**2 + np.log(2.0 * np.pi)).sum()
+        nats.append(float(gaussian - frame.log_det[0]) + metres)
     return _Followed(clip, np.array(seen[PREROLL:]), np.array(nats[PREROLL:]))
 
 

@@ -11,7 +11,7 @@ differ. The paper's draw from N(0, I) is temperature 1 of weights that hold no s
 import numpy as np
 import torch
 
-from ..model.config import POSE_SIZE
+from ..core.skeleton import POSE_SIZE
 from ..model.flow import BodyFlow
 from ..model.predictor import ActionPredictor
 from .batches import Batch, Pool, Statistics
@@ -36,10 +36,10 @@ def noise_along(
         told = torch.cat([predictor(batch.past, batch.occupancy), batch.root], dim=-1)
     pose = torch.cat([batch.upper, batch.lower], dim=-1)
     conditions = {
-        name: flow.condition(name, told, observation, given, pose) for name in flow.places
+        name: flow.condition(name, told, observation, given, pose) for name in flow.partition
     }
     return {
-        name: part(pose[..., flow.places[name]], conditions[name], batch.occupancy)[0]
+        name: part(pose[..., flow.partition[name]], conditions[name], batch.occupancy)[0]
         for name, part in flow.parts().items()
     }
 

@@ -24,23 +24,21 @@ import numpy as np
 import torch
 from torch import nn
 
-from ..baselines.flows import flow_of, parts_of
 from ..core.errors import InputError
+from ..core.skeleton import LOWER_SIZE, POSE_SIZE, UPPER_SIZE
 from ..core.threads import cores
 from ..core.weights import Weights
 from ..data.prepare import bank_in
 from ..model.config import (
     AHEAD_SIZE,
-    LOWER_SIZE,
     PAPER,
-    POSE_SIZE,
     SMALL,
-    UPPER_SIZE,
     VELOCITY_SIZE,
     ModelConfig,
 )
 from ..model.flow import BodyFlow, Coupling, EnvironmentEncoder
 from ..model.predictor import GMVAE, ActionPredictor, gumbel_temperature
+from ..model.systems import system_named
 from . import precision, ranks
 from .batches import Batch, Pool, Statistics, observation_for
 from .checkpoints import (
@@ -195,7 +193,7 @@ class Run:
         self.device = torch.device(device)
         self.config = replace(config, mixed=config.mixed and precision.mixes(device))
         self.gmvae = GMVAE(model).to(self.device)
-        self.flow = flow_of(model).to(self.device)
+        self.flow = BodyFlow(model).to(self.device)
         for module in self.flow.modules():
             if isinstance(module, Coupling | EnvironmentEncoder):
                 module.mixed = self.config.mixed
@@ -307,10 +305,10 @@ class Run:
         """
         kept = Checkpoint.read(checkpoint_file(folder, name or part))
         model = kept.settings(ModelConfig, "model")
-        if part != "predictor" and part not in parts_of(model):
+        if part != "predictor" and part not in system_named(model.system).partition:
             raise kept.refused(f"its model has no part '{part}'")
         with torch.device("meta"):
-            gmvae, flow = GMVAE(model), flow_of(model)
+            gmvae, flow = GMVAE(model), BodyFlow(model)
             if (
                 sum(p.numel() for network in (gmvae, flow) for p in network.parameters())
                 > _MOST_NUMBERS
@@ -369,7 +367,7 @@ class Run:
         kept = 1 if float(torch.rand(())) < self.config.cold else self.config.captured
         calm = torch.rand(len(x), device=self.device) < self.config.calm
         z = torch.randn(len(x), x.shape[-1], device=self.device) * ~calm[:, None]
-        density, made = part.run_on(x, condition, occupancy, z, kept)
+        density, made = part.free_run(x, condition, occupancy, z, kept)
         led = self._free_run(made, x[:, kept:], calm, batch, given, kept)
         return -density.mean() + self.config.free_run * led
 
@@ -389,7 +387,7 @@ class Run:
                 torch.rand(*poses.shape[:-1], 1, device=self.device) >= self.config.slot_dropout
             )
         pose = torch.cat([batch.upper, batch.lower], dim=-1)
-        return pose[..., self.flow.places[self.part]], self.flow.condition(
+        return pose[..., self.flow.partition[self.part]], self.flow.condition(
             self.part, base, observation, given, pose
         )
 
@@ -653,7 +651,7 @@ def train(
     whole = max(config.minutes_predictor + config.minutes_flow, 1e-9)
     first = config.minutes_predictor / whole
     report = lambda part, share, loss: progress(first * share)  # noqa: E731
-    names = parts_of(model)
+    names = tuple(system_named(model.system).partition)
     if model.predicts:
         train_part(
             "predictor",

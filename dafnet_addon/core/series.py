@@ -1,0 +1,28 @@
+"""A series of frames: how many there are to a second, its runs, and soft changes along it."""
+
+import numpy as np
+
+__all__ = ["MODEL_FPS", "runs", "smoothstep"]
+
+MODEL_FPS = 30.0
+"""Frames a second inside the model."""
+
+
+def smoothstep(x: np.ndarray) -> np.ndarray:
+    """From 0 to 1 as ``x`` goes there, beginning and ending softly."""
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * (3.0 - 2.0 * x)
+
+
+def runs(flags: np.ndarray, at_least: int = 1, gap: int = 0) -> list[tuple[int, int]]:
+    """The (start, stop) of runs of at least ``at_least`` frames in which the flags (T,) are set;
+    stop is exclusive. Runs with no more than ``gap`` frames between them are one.
+    """
+    edges = np.flatnonzero(np.diff(np.asarray(flags, bool), prepend=False, append=False))
+    found: list[tuple[int, int]] = []
+    for start, stop in edges.reshape(-1, 2).tolist():
+        if found and start - found[-1][1] <= gap:
+            found[-1] = found[-1][0], stop
+        else:
+            found.append((start, stop))
+    return [(start, stop) for start, stop in found if stop - start >= at_least]
