@@ -11,7 +11,7 @@ import os
 import signal
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -50,37 +50,39 @@ if importlib.util.find_spec("hypothesis"):
 _state = {"enabled": False, "status": 0}
 
 
-@pytest.fixture(scope="session")
-def extension() -> Iterator[str]:
-    """Name of the enabled extension's package."""
-    bpy = pytest.importorskip("bpy")
-    import addon_utils
+def enable_extension() -> None:
+    """Enable this working tree as an extension, in the profile made above."""
+    import bpy
 
+    addon_utils = importlib.import_module("addon_utils")  # which is found once bpy is loaded
     link = Path(bpy.utils.user_resource("EXTENSIONS", path="user_default", create=True), "dafnet")
     if not link.exists():
         link.symlink_to(ROOT, target_is_directory=True)
     addon_utils.extensions_refresh(ensure_wheels=True)
     assert bpy.ops.preferences.addon_enable(module=EXTENSION) == {"FINISHED"}
     _state["enabled"] = True
-    yield EXTENSION
-    addon_utils.disable(EXTENSION)
+
+
+if importlib.util.find_spec("bpy"):
+    # Before any test is collected, so that tests import the very modules that Blender has loaded.
+    enable_extension()
 
 
 @pytest.fixture
-def blender(extension: str) -> ModuleType:
+def blender() -> ModuleType:
     """The module ``bpy`` with an empty scene and the extension enabled."""
-    import bpy
-
+    bpy = pytest.importorskip("bpy")
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     return bpy
 
 
 @pytest.fixture
-def addon(extension: str):
-    """Import a module of the extension by its path in the repository, as
-    ``addon("dafnet_addon.blender.baker")``.
+def addon() -> Callable[[str], ModuleType]:
+    """A module that Blender has loaded, by its path in the repository; new tests import it by its
+    name.
     """
-    return lambda name: importlib.import_module(f"{extension}.{name}")
+    pytest.importorskip("bpy")
+    return lambda name: importlib.import_module(f"{EXTENSION}.{name}")
 
 
 @pytest.fixture
@@ -94,6 +96,8 @@ def dataset(tmp_path: Path) -> Path:
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    if _state["enabled"]:
+        importlib.import_module("addon_utils").disable(EXTENSION)
     _state["status"] = int(exitstatus)
 
 

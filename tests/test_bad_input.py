@@ -13,103 +13,57 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon import load_weights
+from bl_ext.user_default.dafnet.dafnet_addon.blender import job
+from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import (
+    metres_per_unit,
+)
+from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
+from bl_ext.user_default.dafnet.dafnet_addon.cli import main
+from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+
+from kit.stage import Stage, key
 
 Change = Callable[["Shot"], object]
 
-CORNERS = [(x, y, z) for x in (-0.25, 0.25) for y in (-0.25, 0.25) for z in (0.0, 0.45)]
-FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 NAN = float("nan")
 
 
-class Shot:
+class Shot(Stage):
     """A character that walks half a metre towards a chair in 12 frames; ``unit``: metres in a
     Blender unit.
     """
 
-    def __init__(
-        self, bpy: ModuleType, addon: Callable[[str], Any], tmp_path: Path, unit: float = 1.0
-    ) -> None:
-        self.bpy, self.addon, self.tmp_path = bpy, addon, tmp_path
-        self.scene = bpy.context.scene
-        self.scene.unit_settings.scale_length = unit
-        self.scene.frame_end = 12
-        self.ann = addon("dafnet_addon.blender.armature").create_character(bpy.context, "Ann", 1.7)
-        self.own = self.ann.dafnet
-        self.own.furniture = self.furniture = self.collection("Furniture", self.scene.collection)
-        self.chair = self.mesh("Chair", location=(0, 0.9 / unit, 0), scale=(1 / unit,) * 3)
-        for frame, y in ((1, 0.0), (12, 0.45 / unit)):
-            self.key(self.own.root, frame, location=(0, y, 0))
+    def __init__(self, folder: Path, unit: float = 1.0) -> None:
+        super().__init__(height=1.7, frames=(1, 12), unit=unit)
+        self.folder = folder
+        self.chair = self.seat("Chair", location=(0, 0.9 / unit, 0), scale=(1 / unit,) * 3)
+        self.walk((1, 0.0), (12, 0.45 / unit))
         self.scene.frame_set(5)
-
-    def put(self, name: str, data: Any = None, **properties: Any) -> Any:
-        made = self.bpy.data.objects.new(name, data)
-        for key, value in properties.items():
-            setattr(made, key, value)
-        self.furniture.objects.link(made)
-        return made
-
-    def mesh(self, name: str, corners=CORNERS, edges=(), faces=FACES, **properties: Any) -> Any:
-        made = self.bpy.data.meshes.new(name)
-        made.from_pydata(corners, edges, faces)
-        return self.put(name, made, **properties)
-
-    def collection(self, name: str, parent: Any = None) -> Any:
-        made = self.bpy.data.collections.new(name)
-        if parent:
-            parent.children.link(made)
-        return made
-
-    def key(self, made: Any, frame: int, **properties: Any) -> None:
-        for path, value in properties.items():
-            setattr(made, path, value)
-            made.keyframe_insert(path, frame=frame)
 
     def shown(self, *names: str) -> Any:
         """A collection as the view layer sees it."""
-        found = self.bpy.context.view_layer.layer_collection
+        found = bpy.context.view_layer.layer_collection
         for name in names:
             found = found.children[name]
         return found
 
     def curves(self, made: Any) -> list[Any]:
-        return self.addon("dafnet_addon.blender.compat").action_curves(made)
+        return action_curves(made)
 
     def edit_bones(self, change: Callable[[Any], None]) -> None:
-        self.bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.object.mode_set(mode="EDIT")
         change(self.ann.data.edit_bones)
-        self.bpy.ops.object.mode_set(mode="OBJECT")
-
-    def state(self) -> dict[str, object]:
-        """What must not change when something fails."""
-        data, layer = self.bpy.data, self.bpy.context.view_layer
-        layer.update()
-        return {
-            "data": [
-                sorted(b.name for b in kind)
-                for kind in (data.actions, data.objects, data.meshes, data.curves)
-            ],
-            "keys": {
-                o.name: [len(c.keyframe_points) for c in self.curves(o)] for o in data.objects
-            },
-            "frame": (self.scene.frame_current, self.scene.frame_subframe),
-            "selected": (
-                sorted(o.name for o in layer.objects.selected),
-                layer.objects.active,
-                self.bpy.context.mode,
-            ),
-            "places": repr([[tuple(row) for row in o.matrix_world] for o in data.objects]),
-            "pose": repr(
-                [tuple(v for row in b.matrix_basis for v in row) for b in self.ann.pose.bones]
-            ),
-        }
+        bpy.ops.object.mode_set(mode="OBJECT")
 
     def refused(self) -> str:
         """The sentence with which *Generate* refuses; nothing has changed by then."""
         before = self.state()
         with pytest.raises(RuntimeError) as caught:
-            self.bpy.ops.dafnet.generate()
+            bpy.ops.dafnet.generate()
         assert self.state() == before
         said = str(caught.value).strip().removeprefix("Error: ")
         assert said.endswith(".") and said.count(". ") == 0 and "\n" not in said
@@ -119,7 +73,7 @@ class Shot:
         """What the tooltip of the grey button says; pressing it changes nothing."""
         before = self.state()
         with pytest.raises(RuntimeError, match="poll") as caught:
-            self.bpy.ops.dafnet.generate()
+            bpy.ops.dafnet.generate()
         assert self.state() == before
         return str(caught.value)
 
@@ -127,34 +81,27 @@ class Shot:
         """Save the scene and bake it with the command: exit code, standard output, last line of
         standard error.
         """
-        file = self.tmp_path / "scene.blend"
-        self.bpy.ops.wm.save_as_mainfile(filepath=str(file))
+        file = self.folder / "scene.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(file))
         capfd.readouterr()
-        arguments = ["bake", str(file), "-o", str(self.tmp_path / "out.blend"), "--json", *options]
-        code = self.addon("dafnet_addon.cli").main(arguments)
+        arguments = ["bake", str(file), "-o", str(self.folder / "out.blend"), "--json", *options]
+        code = main(arguments)
         out, err = capfd.readouterr()
         return code, out, err.strip().splitlines()[-1]
 
     def heads(self) -> np.ndarray:
         """The bones' heads (12, 22, 3), metres, as Blender plays them."""
-        unit = self.addon("dafnet_addon.blender.armature").metres_per_unit(self.scene)
-        joints = self.addon("dafnet_addon.core.skeleton").JOINTS
-        heads = []
-        for frame in range(1, 13):
-            self.scene.frame_set(frame)
-            played = self.ann.evaluated_get(self.bpy.context.evaluated_depsgraph_get())
-            heads.append([played.matrix_world @ played.pose.bones[name].head for name in joints])
-        return unit * np.array(heads)
+        return metres_per_unit(self.scene) * self.played()
 
 
 @pytest.fixture
-def shot(blender, addon, tmp_path) -> Shot:
-    return Shot(blender, addon, tmp_path)
+def shot(blender: ModuleType, tmp_path: Path) -> Shot:
+    return Shot(tmp_path)
 
 
 def _spoil_key(shot: Shot, made: Any) -> None:
-    shot.key(made, 1, location=tuple(made.location))
-    shot.curves(made)[0].keyframe_points[-1].co.y = NAN
+    key(made, "location", (1, tuple(made.location)))
+    action_curves(made)[0].keyframe_points[-1].co.y = NAN
 
 
 def _edited_parent(bones: Any) -> None:
@@ -162,7 +109,7 @@ def _edited_parent(bones: Any) -> None:
 
 
 def _solo(shot: Shot) -> None:
-    shot.bpy.ops.dafnet.generate()
+    bpy.ops.dafnet.generate()
     data = shot.ann.animation_data
     track = data.nla_tracks.new()
     track.strips.new("Take", 1, data.action)
@@ -170,7 +117,7 @@ def _solo(shot: Shot) -> None:
 
 
 def _tweaked(shot: Shot) -> None:
-    shot.bpy.ops.dafnet.generate()
+    bpy.ops.dafnet.generate()
     data = shot.ann.animation_data
     track = data.nla_tracks.new()
     track.strips.new("Take", 1, data.action).select = True
@@ -187,7 +134,7 @@ ERRORS: dict[str, tuple[Change, str]] = {
     "meshes without faces": (lambda s: s.chair.data.clear_geometry(), "have no faces"),
     "disabled furniture": (lambda s: setattr(s.chair, "hide_viewport", True), "no visible mesh"),
     "the character's own meshes only": (
-        lambda s: setattr(s.own, "furniture", s.bpy.data.collections["Ann"]),
+        lambda s: setattr(s.own, "furniture", bpy.data.collections["Ann"]),
         "no visible mesh besides the character's",
     ),
     "excluded furniture": (
@@ -260,7 +207,7 @@ def test_errors_are_the_same_sentence_at_both_doors(
     assert re.search(words, said), said
     code, out, err = shot.command(capfd)
     assert (code, out, err) == (1, "", f"dafnet: {said}")
-    assert not (shot.tmp_path / "out.blend").exists()
+    assert not (shot.folder / "out.blend").exists()
 
 
 def test_no_root(shot: Shot, capfd: pytest.CaptureFixture[str]) -> None:
@@ -277,10 +224,10 @@ def test_where_the_button_is_grey_the_command_still_works(
     capfd: pytest.CaptureFixture[str],
     active: str,
 ) -> None:
-    objects = shot.bpy.context.view_layer.objects
+    objects = bpy.context.view_layer.objects
     objects.active = {"nothing": None, "the chair": shot.chair, "edit mode": shot.chair}[active]
     if active == "edit mode":
-        shot.bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.object.mode_set(mode="EDIT")
     assert "Select a character" in shot.refused_by_poll()
     code, out, _ = shot.command(capfd)
     assert code == 0 and json.loads(out)["warnings"] == []
@@ -292,8 +239,7 @@ def test_linked_and_overridden_characters(
     capfd: pytest.CaptureFixture[str],
     override: bool,
 ) -> None:
-    bpy = shot.bpy
-    library = str(shot.tmp_path / "library.blend")
+    library = str(shot.folder / "library.blend")
     bpy.data.libraries.write(library, {bpy.data.collections["Ann"], shot.furniture})
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     with bpy.data.libraries.load(library, link=True) as (_, wanted):
@@ -342,10 +288,10 @@ def test_weights_that_cannot_be_used(
     spoilt: Callable[[bytes], bytes] | None,
     words: str,
 ) -> None:
-    file = shot.tmp_path / "weights.safetensors"
+    file = shot.folder / "weights.safetensors"
     if spoilt:
-        file.write_bytes(spoilt(shot.addon("dafnet_addon").load_weights().path.read_bytes()))
-    preferences = shot.bpy.context.preferences.addons["bl_ext.user_default.dafnet"].preferences
+        file.write_bytes(spoilt(load_weights().path.read_bytes()))
+    preferences = bpy.context.preferences.addons["bl_ext.user_default.dafnet"].preferences
     preferences.weights = str(file)
     try:
         said = shot.refused()
@@ -358,9 +304,9 @@ def test_weights_that_cannot_be_used(
 
 def _delete(shot: Shot, made: Any) -> None:
     """As a user does: what a setting names lives on outside the scene."""
-    for each in shot.bpy.context.view_layer.objects:
+    for each in bpy.context.view_layer.objects:
         each.select_set(each == made)
-    shot.bpy.ops.object.delete()
+    bpy.ops.object.delete()
 
 
 DELETED: dict[str, Callable[[Shot], Any]] = {
@@ -380,34 +326,28 @@ def test_what_is_deleted_while_a_take_is_made(
     """While the scene is read and while poses are made; deleted in the scene or gone from the
     file.
     """
-    job = shot.addon("dafnet_addon.blender.job")
     made = DELETED[which](shot)
     shot.scene.frame_end = 40
-    steps = job.steps(shot.bpy.context, job.settings_of(shot.ann, shot.scene))
+    steps = job.steps(bpy.context, job.settings_of(shot.ann, shot.scene))
     while next(steps) < until:
         pass
     if removed:
-        shot.bpy.data.objects.remove(made)
+        bpy.data.objects.remove(made)
     else:
         _delete(shot, made)
-    actions = [action.name for action in shot.bpy.data.actions]
-    with pytest.raises(shot.addon("dafnet_addon.core.errors").InputError, match="generate again"):
+    actions = [action.name for action in bpy.data.actions]
+    with pytest.raises(InputError, match="generate again"):
         for _ in steps:
             pass
-    assert [
-        action.name for action in shot.bpy.data.actions
-    ] == actions and shot.scene.frame_current == 5
+    assert [action.name for action in bpy.data.actions] == actions and shot.scene.frame_current == 5
 
 
 def test_the_furniture_collection_is_removed_while_a_take_is_made(shot: Shot) -> None:
-    job = shot.addon("dafnet_addon.blender.job")
-    steps = job.steps(shot.bpy.context, job.settings_of(shot.ann, shot.scene))
+    steps = job.steps(bpy.context, job.settings_of(shot.ann, shot.scene))
     while next(steps) < 0.5:
         pass
-    shot.bpy.data.collections.remove(shot.furniture)
-    with pytest.raises(
-        shot.addon("dafnet_addon.core.errors").InputError, match="is not in the scene any more"
-    ):
+    bpy.data.collections.remove(shot.furniture)
+    with pytest.raises(InputError, match="is not in the scene any more"):
         for _ in steps:
             pass
 
@@ -424,7 +364,7 @@ def _crowd(shot: Shot) -> None:
 
 def _jump(shot: Shot) -> None:
     for frame, y in ((6, 0.0), (7, 5.0), (12, 5.2)):
-        shot.key(shot.own.root, frame, location=(0, y, 0))
+        key(shot.root, "location", (frame, (0, y, 0)))
 
 
 WARNINGS: dict[str, tuple[Change, str]] = {
@@ -443,7 +383,7 @@ WARNINGS: dict[str, tuple[Change, str]] = {
         "'Chair' is scaled to zero",
     ),
     "furniture that grows from nothing": (
-        lambda s: [s.key(s.chair, 1, scale=(0, 0, 0)), s.key(s.chair, 9, scale=(1, 1, 1))],
+        lambda s: key(s.chair, "scale", (1, (0, 0, 0)), (9, (1, 1, 1))),
         "scale of 'Chair' is animated",
     ),
     "bone constraints": (
@@ -464,7 +404,7 @@ def test_warnings_are_the_same_at_both_doors(
     change, words = WARNINGS[case]
     change(shot)
     capfd.readouterr()
-    assert shot.bpy.ops.dafnet.generate() == {"FINISHED"}
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
     reported = [
         line.removeprefix("Warning: ")
         for line in capfd.readouterr().out.splitlines()
@@ -472,7 +412,7 @@ def test_warnings_are_the_same_at_both_doors(
     ]
     assert re.search(words, " ".join(reported)), reported
     assert shot.scene.frame_current == 5
-    values = [point.co for curve in shot.curves(shot.ann) for point in curve.keyframe_points]
+    values = [point.co for curve in action_curves(shot.ann) for point in curve.keyframe_points]
     assert len(values) == (6 + 3 + 22 * 4) * shot.scene.frame_end and np.isfinite(values).all()
     code, out, _ = shot.command(capfd)
     assert code == 0 and json.loads(out)["warnings"] == reported
@@ -485,29 +425,25 @@ def _own_things_in_furniture(shot: Shot) -> None:
 
 def _nested_and_unseen(shot: Shot) -> None:
     for name in ("Excluded", "Closed Eye"):
-        shot.mesh(name, location=(0.3, 0.3, 0)).users_collection[0].objects.unlink(
-            shot.bpy.data.objects[name]
-        )
-        shot.collection(name, shot.furniture).objects.link(shot.bpy.data.objects[name])
+        shot.seat(name, shot.collection(name, shot.furniture), location=(0.3, 0.3, 0))
     shot.shown("Furniture", "Excluded").exclude = True
     shot.shown("Furniture", "Closed Eye").hide_viewport = True
-    shot.mesh("Hidden", location=(0.3, 0.3, 0)).hide_set(True)
+    shot.seat("Hidden", location=(0.3, 0.3, 0)).hide_set(True)
 
 
 def _nothing_solid(shot: Shot) -> None:
-    shot.mesh("Edges", faces=[], edges=[(0, 1)])
-    shot.mesh("Nothing", corners=[], faces=[])
-    shot.mesh(
-        "Sliver", corners=[(0, 0.5, 0), (0, 0.5, 1), (0, 0.5, 1)], faces=[(0, 1, 2)]
-    ).location = (9, 9, 0)
-    curve = shot.bpy.data.curves.new("Line", "CURVE")
+    shot.mesh("Edges", [(0, 0, 0), (0, 0, 1)], [], edges=[(0, 1)])
+    shot.mesh("Nothing", [], [])
+    sliver = [(0, 0.5, 0), (0, 0.5, 1), (0, 0.5, 1)]
+    shot.mesh("Sliver", sliver, [(0, 1, 2)], location=(9, 9, 0))
+    curve = bpy.data.curves.new("Line", "CURVE")
     curve.splines.new("POLY").points.add(3)
     for data in (
         curve,
-        shot.bpy.data.lights.new("Lamp", "POINT"),
-        shot.bpy.data.volumes.new("Smoke"),
+        bpy.data.lights.new("Lamp", "POINT"),
+        bpy.data.volumes.new("Smoke"),
     ):
-        shot.put(data.name, data)
+        shot.put(bpy.data.objects.new(data.name, data))
 
 
 def _posed_by_hand(shot: Shot) -> None:
@@ -517,7 +453,7 @@ def _posed_by_hand(shot: Shot) -> None:
 
 
 def _nla_below_an_added_action(shot: Shot) -> None:
-    shot.bpy.ops.dafnet.generate()
+    bpy.ops.dafnet.generate()
     data = shot.ann.animation_data
     data.nla_tracks.new().strips.new("Take", 1, data.action)
     data.action_blend_type, data.action_influence = "ADD", 0.5
@@ -534,7 +470,7 @@ UNHARMED: dict[str, Change] = {
         setattr(s.shown("Ann"), "hide_viewport", True),
     ],
     "a disabled armature": lambda s: setattr(s.ann, "hide_viewport", True),
-    "pose mode": lambda s: s.bpy.ops.object.mode_set(mode="POSE"),
+    "pose mode": lambda s: bpy.ops.object.mode_set(mode="POSE"),
     "a scaled, mirrored root": lambda s: setattr(s.own.root, "scale", (-3, 0.5, 2)),
     "the root as a hand that is not asked for": lambda s: setattr(s.own, "hand_left", s.own.root),
     "centimetres": lambda s: s.ann.dimensions,
@@ -542,15 +478,12 @@ UNHARMED: dict[str, Change] = {
 }
 
 
-def test_what_makes_no_difference(
-    shot: Shot, blender: ModuleType, addon: Callable[[str], Any], tmp_path: Path
-) -> None:
-    job = addon("dafnet_addon.blender.job")
+def test_what_makes_no_difference(shot: Shot, blender: ModuleType, tmp_path: Path) -> None:
     assert blender.ops.dafnet.generate() == {"FINISHED"}
     expected = shot.heads()
     for case, change in UNHARMED.items():
         blender.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-        other = Shot(blender, addon, tmp_path, unit=0.01 if case == "centimetres" else 1.0)
+        other = Shot(tmp_path, unit=0.01 if case == "centimetres" else 1.0)
         change(other)
         result = job.run(blender.context, job.settings_of(other.ann, other.scene))
         other.ann.hide_viewport = False
@@ -565,14 +498,14 @@ def test_one_empty_for_root_and_hand_crouches(shot: Shot) -> None:
         None,
         None,
     )
-    assert shot.bpy.ops.dafnet.generate() == {"FINISHED"}
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
     heads = shot.heads()
     assert np.isfinite(heads).all() and heads[..., 0, 2].min() > 0.2
 
 
 def test_whatever_becomes_a_mesh_is_read_and_moves(shot: Shot) -> None:
     """Curves with a bevel, text, metaballs, surfaces."""
-    data = shot.bpy.data
+    data = bpy.data
     text = data.curves.new("Text", "FONT")
     text.body, text.extrude = "Sofa", 0.1
     balls = data.metaballs.new("Balls")
@@ -582,13 +515,9 @@ def test_whatever_becomes_a_mesh_is_read_and_moves(shot: Shot) -> None:
     rail.splines.new("POLY").points.add(1)
     rail.splines[0].points[1].co = (2, 0, 0, 1)
     for made in (text, balls, rail):
-        thing = shot.put(made.name, made)
-        shot.key(thing, 1, location=(0, 5, 0))
-        shot.key(thing, 12, location=(3, 5, 0))
-    job = shot.addon("dafnet_addon.blender.job")
-    read = shot.addon("dafnet_addon.blender.scene_reader").read_scene(
-        shot.bpy.context, job.settings_of(shot.ann, shot.scene)
-    )
+        thing = shot.put(bpy.data.objects.new(made.name, made))
+        key(thing, "location", (1, (0, 5, 0)), (12, (3, 5, 0)))
+    read = shot.read()
     solids = {solid.name: solid for solid in read.scene.solids}
     assert set(solids) == {"Chair", "Text", "Balls", "Rail"}
     for name in ("Text", "Balls", "Rail"):
@@ -607,7 +536,7 @@ def test_an_output_that_cannot_be_written(
     output: str,
     words: str,
 ) -> None:
-    (shot.tmp_path / "file").write_text("in the way", encoding="utf-8")
-    (shot.tmp_path / "folder.blend").mkdir()
-    code, out, err = shot.command(capfd, "-o", output.format(tmp=shot.tmp_path))
+    (shot.folder / "file").write_text("in the way", encoding="utf-8")
+    (shot.folder / "folder.blend").mkdir()
+    code, out, err = shot.command(capfd, "-o", output.format(tmp=shot.folder))
     assert code == 1 and out == "" and words in err and err.startswith("dafnet: ")

@@ -9,13 +9,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender import compat
+from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import (
+    character_scale,
+    create_character,
+)
+from bl_ext.user_default.dafnet.dafnet_addon.blender.baker import bake
+from bl_ext.user_default.dafnet.dafnet_addon.core import root, rotations, skeleton
+from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+from bl_ext.user_default.dafnet.dafnet_addon.core.take import Take
+
+from kit.stage import bone_heads
 
 
-def made_take(addon, frames: int = 40, fps: float = 30.0, scale: float = 1.0, seed: int = 0):
+def made_take(frames: int = 40, fps: float = 30.0, scale: float = 1.0, seed: int = 0):
     """A take of smooth random rotations on a curved root path that turns more than once."""
-    rotations = addon("dafnet_addon.core.rotations")
-    root = addon("dafnet_addon.core.root")
-    skeleton = addon("dafnet_addon.core.skeleton")
     rng = np.random.default_rng(seed)
     t = np.linspace(0.0, 1.0, frames)[:, None, None]
     q = rotations.normalised(rng.normal(size=(22, 4)) * (1 - t) + rng.normal(size=(22, 4)) * t)
@@ -29,8 +37,7 @@ def made_take(addon, frames: int = 40, fps: float = 30.0, scale: float = 1.0, se
         parent = skeleton.PARENTS[j]
         frame[:, j] = frame[:, parent] @ local[:, j]
         joints[:, j] = joints[:, parent] + frame[:, parent] @ (scale * skeleton.OFFSETS[j])
-    take = addon("dafnet_addon.core.take").Take
-    return take(
+    return Take(
         fps=fps,
         joints=joints,
         rotations=q,
@@ -42,23 +49,14 @@ def made_take(addon, frames: int = 40, fps: float = 30.0, scale: float = 1.0, se
     )
 
 
-def bone_heads(bpy: ModuleType, addon, armature, frame: int, subframe: float = 0.0) -> np.ndarray:
-    """World heads (22, 3) of the evaluated bones, in the order of the joints."""
-    bpy.context.scene.frame_set(frame, subframe=subframe)
-    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    joints = addon("dafnet_addon.core.skeleton").JOINTS
-    return np.array([evaluated.matrix_world @ evaluated.pose.bones[name].head for name in joints])
+def character(bpy: ModuleType, **options):
+    return create_character(bpy.context, "Ann", **options)
 
 
-def character(bpy: ModuleType, addon, **options):
-    return addon("dafnet_addon.blender.armature").create_character(bpy.context, "Ann", **options)
-
-
-def test_character_stands_in_the_rest_pose(blender, addon) -> None:
-    skeleton = addon("dafnet_addon.core.skeleton")
+def test_character_stands_in_the_rest_pose(blender) -> None:
     blender.context.scene.cursor.location = (1.0, 2.0, 0.5)
-    ann = character(blender, addon, height=1.4)
-    heads = bone_heads(blender, addon, ann, 1)
+    ann = character(blender, height=1.4)
+    heads = bone_heads(ann, 1)
     assert sorted(bone.name for bone in ann.data.bones) == sorted(skeleton.JOINTS)
     assert np.abs(heads - (0.8 * skeleton.REST + np.array([1.0, 2.0, 0.5]))).max() < 1e-5, (
         "looks along +y, left at -x"
@@ -73,10 +71,10 @@ def test_character_stands_in_the_rest_pose(blender, addon) -> None:
     assert None not in (ann.dafnet.head, ann.dafnet.hand_left, ann.dafnet.hand_right)
 
 
-def test_build_makes_the_body_stouter_and_leaves_the_bones(blender, addon) -> None:
+def test_build_makes_the_body_stouter_and_leaves_the_bones(blender) -> None:
     wide = {}
     for build in (0.8, 1.0, 1.4):
-        ann = character(blender, addon, build=build)
+        ann = character(blender, build=build)
         body = next(child for child in ann.children if child.type == "MESH")
         points = np.array([v.co for v in body.data.vertices])
         waist = points[(np.abs(points[:, 2] - 1.1) < 0.05) & (np.abs(points[:, 0]) < 0.3)]
@@ -90,8 +88,8 @@ def test_build_makes_the_body_stouter_and_leaves_the_bones(blender, addon) -> No
 
 
 @pytest.mark.parametrize("build", [0.7, 1.0, 1.4])
-def test_body_is_a_closed_person_of_the_stature(blender, addon, build: float) -> None:
-    ann = character(blender, addon, height=1.6, build=build)
+def test_body_is_a_closed_person_of_the_stature(blender, build: float) -> None:
+    ann = character(blender, height=1.6, build=build)
     body = next(child for child in ann.children if child.type == "MESH")
     points = np.array([v.co for v in body.data.vertices])
     assert np.ptp(points[:, 2]) == pytest.approx(1.6, abs=0.01)
@@ -113,14 +111,14 @@ def test_body_is_a_closed_person_of_the_stature(blender, addon, build: float) ->
 
 
 @pytest.mark.parametrize(("fps", "base"), [(24, 1.0), (25, 1.0), (30, 1.001), (60, 1.0)])
-def test_bone_heads_play_the_joints(blender, addon, fps: int, base: float) -> None:
+def test_bone_heads_play_the_joints(blender, fps: int, base: float) -> None:
     scene = blender.context.scene
     scene.render.fps, scene.render.fps_base = fps, base
-    ann = character(blender, addon)
-    take = made_take(addon, fps=fps / base)
-    addon("dafnet_addon.blender.baker").bake(take, ann, 7, "Walk")
+    ann = character(blender)
+    take = made_take(fps=fps / base)
+    bake(take, ann, 7, "Walk")
     for i in range(len(take)):
-        assert np.abs(bone_heads(blender, addon, ann, 7 + i) - take.joints[i]).max() < 1e-3
+        assert np.abs(bone_heads(ann, 7 + i) - take.joints[i]).max() < 1e-3
     assert (scene.render.fps, scene.render.fps_base) == (fps, pytest.approx(base))
 
 
@@ -128,72 +126,67 @@ SIZES = [(0.01, 1.75, 1.0), (1.0, 1.4, 1.0), (1.0, 1.75, 1.3), (0.5, 1.9, 0.7)]
 
 
 @pytest.mark.parametrize(("unit", "height", "object_scale"), SIZES)
-def test_units_and_sizes(blender, addon, unit: float, height: float, object_scale: float) -> None:
+def test_units_and_sizes(blender, unit: float, height: float, object_scale: float) -> None:
     blender.context.scene.unit_settings.scale_length = unit
-    ann = character(blender, addon, height=height)
+    ann = character(blender, height=height)
     ann.scale = (object_scale,) * 3
-    size = addon("dafnet_addon.blender.armature").character_scale(ann, unit)
+    size = character_scale(ann, unit)
     assert size == pytest.approx(object_scale * height / 1.75, rel=1e-5)
-    take = made_take(addon, scale=size)
-    addon("dafnet_addon.blender.baker").bake(take, ann, 1, "Walk", unit)
+    take = made_take(scale=size)
+    bake(take, ann, 1, "Walk", unit)
     for i in (0, 11, len(take) - 1):
-        assert np.abs(unit * bone_heads(blender, addon, ann, 1 + i) - take.joints[i]).max() < 1e-3
+        assert np.abs(unit * bone_heads(ann, 1 + i) - take.joints[i]).max() < 1e-3
 
 
-def test_bones_may_have_other_rolls_and_tails(blender, addon) -> None:
-    ann = character(blender, addon)
+def test_bones_may_have_other_rolls_and_tails(blender) -> None:
+    ann = character(blender)
     blender.ops.object.mode_set(mode="EDIT")
     for k, bone in enumerate(ann.data.edit_bones):
         bone.roll += 0.3 * k
     ann.data.edit_bones["head"].tail.y -= 0.1
     blender.ops.object.mode_set(mode="OBJECT")
-    take = made_take(addon)
-    addon("dafnet_addon.blender.baker").bake(take, ann, 1, "Walk")
-    assert np.abs(bone_heads(blender, addon, ann, 20) - take.joints[19]).max() < 1e-3
+    take = made_take()
+    bake(take, ann, 1, "Walk")
+    assert np.abs(bone_heads(ann, 20) - take.joints[19]).max() < 1e-3
 
 
-def test_it_is_smooth_between_frames(blender, addon) -> None:
+def test_it_is_smooth_between_frames(blender) -> None:
     """Quaternions and the heading keep their signs, so half-way poses lie between their
     neighbours.
     """
-    ann = character(blender, addon)
-    take = made_take(addon)
-    addon("dafnet_addon.blender.baker").bake(take, ann, 1, "Walk")
+    ann = character(blender)
+    take = made_take()
+    bake(take, ann, 1, "Walk")
     for i in range(len(take) - 1):
-        heads = bone_heads(blender, addon, ann, 1 + i, 0.5)
+        heads = bone_heads(ann, 1 + i, subframe=0.5)
         assert (
             np.linalg.norm(heads - 0.5 * (take.joints[i] + take.joints[i + 1]), axis=1).max() < 0.06
         )
 
 
-def test_every_take_is_kept_and_mode_keys_stay(blender, addon) -> None:
-    bake = addon("dafnet_addon.blender.baker").bake
-    compat = addon("dafnet_addon.blender.compat")
-    ann = character(blender, addon)
+def test_every_take_is_kept_and_mode_keys_stay(blender) -> None:
+    ann = character(blender)
     ann.dafnet.mode = "FREE"
     ann.dafnet.keyframe_insert("mode", frame=1)
     ann.dafnet.mode = "EE"
     ann.dafnet.keyframe_insert("mode", frame=20)
     mine = ann.animation_data.action
-    first = bake(made_take(addon, seed=1), ann, 1, "Take")
-    second = bake(made_take(addon, seed=2), ann, 1, "Take")
+    first = bake(made_take(seed=1), ann, 1, "Take")
+    second = bake(made_take(seed=2), ann, 1, "Take")
     assert len({mine.name, first.name, second.name}) == 3
     assert ann.animation_data.action == second
     assert all(action.use_fake_user for action in (mine, first, second))
     mode = next(curve for curve in compat.action_curves(ann) if curve.data_path == "dafnet.mode")
     assert [tuple(point.co) for point in mode.keyframe_points] == [(1.0, 0.0), (20.0, 1.0)]
     compat.assign_action(ann, first)
-    assert (
-        np.abs(bone_heads(blender, addon, ann, 5) - made_take(addon, seed=1).joints[4]).max() < 1e-3
-    )
+    assert np.abs(bone_heads(ann, 5) - made_take(seed=1).joints[4]).max() < 1e-3
 
 
-def test_all_other_curves_play_on_as_they_did(blender, addon) -> None:
+def test_all_other_curves_play_on_as_they_did(blender) -> None:
     """Muted ones, modifiers, extrapolation, handles, groups, samples, custom properties and bones
     that are no joints.
     """
-    compat = addon("dafnet_addon.blender.compat")
-    ann = character(blender, addon)
+    ann = character(blender)
     own = ann.dafnet
     blender.ops.object.mode_set(mode="EDIT")
     tail = ann.data.edit_bones.new("tail")
@@ -261,7 +254,7 @@ def test_all_other_curves_play_on_as_they_did(blender, addon) -> None:
     times = np.arange(-20.0, 120.0, 0.5)
     played = {place: [curve.evaluate(time) for time in times] for place, curve in curves.items()}
     said = scene_says()
-    addon("dafnet_addon.blender.baker").bake(made_take(addon), ann, 1, "Take")
+    bake(made_take(), ann, 1, "Take")
     assert scene_says() == said, "the properties that the curves move"
     found = {(c.data_path, c.array_index): c for c in compat.action_curves(ann)}
     for place, values in played.items():
@@ -276,29 +269,26 @@ def test_all_other_curves_play_on_as_they_did(blender, addon) -> None:
     assert [m.type for m in found['["sparkle"]', 0].modifiers] == ["GENERATOR", "STEPPED", "LIMITS"]
 
 
-def test_a_muted_group_mutes_what_is_carried_and_not_the_take(blender, addon) -> None:
-    compat = addon("dafnet_addon.blender.compat")
-    ann = character(blender, addon)
+def test_a_muted_group_mutes_what_is_carried_and_not_the_take(blender) -> None:
+    ann = character(blender)
     ann.keyframe_insert("dafnet.mode", frame=1, group="pelvis")
     ann.keyframe_insert("dafnet.head_influence", frame=1, group="Own")
     curves = {c.data_path: c for c in compat.action_curves(ann)}
     curves["dafnet.mode"].group.mute = curves["dafnet.head_influence"].group.mute = True
-    take = made_take(addon)
-    addon("dafnet_addon.blender.baker").bake(take, ann, 1, "Take")
+    take = made_take()
+    bake(take, ann, 1, "Take")
     curves = {c.data_path: c for c in compat.action_curves(ann)}
     assert curves["dafnet.mode"].mute and curves["dafnet.head_influence"].group.mute
-    assert np.abs(bone_heads(blender, addon, ann, 5) - take.joints[4]).max() < 1e-3
+    assert np.abs(bone_heads(ann, 5) - take.joints[4]).max() < 1e-3
 
 
-def test_what_cannot_be_baked_is_refused_and_left_alone(blender, addon, tmp_path) -> None:
-    bake = addon("dafnet_addon.blender.baker").bake
-    error = addon("dafnet_addon.core.errors").InputError
-    take = made_take(addon, frames=3)
-    ann = character(blender, addon)
+def test_what_cannot_be_baked_is_refused_and_left_alone(blender, tmp_path) -> None:
+    take = made_take(frames=3)
+    ann = character(blender)
 
     def refused(match: str, character=ann, take=take) -> None:
         actions = set(blender.data.actions)
-        with pytest.raises(error, match=match):
+        with pytest.raises(InputError, match=match):
             bake(take, character, 1, "Walk")
         assert set(blender.data.actions) == actions
         assert character.animation_data is None
@@ -320,9 +310,7 @@ def test_what_cannot_be_baked_is_refused_and_left_alone(blender, addon, tmp_path
     refused("armature", character=ann.dafnet.root)
     joints = take.joints.copy()
     joints[1, 3, 0] = np.nan
-    refused(
-        "not numbers", take=made_take(addon, frames=3).__class__(**{**vars(take), "joints": joints})
-    )
+    refused("not numbers", take=made_take(frames=3).__class__(**{**vars(take), "joints": joints}))
 
     blender.context.view_layer.objects.active = ann
     blender.ops.object.mode_set(mode="EDIT")
@@ -343,14 +331,14 @@ def test_what_cannot_be_baked_is_refused_and_left_alone(blender, addon, tmp_path
     refused("linked", character=linked.override_create())
 
 
-def test_a_longer_take_is_baked_in_as_many_calls(blender, addon) -> None:
+def test_a_longer_take_is_baked_in_as_many_calls(blender) -> None:
     """Keys are handed to Blender curve by curve; one by one they would take a hundred times as
     long.
     """
-    ann, bake = character(blender, addon), addon("dafnet_addon.blender.baker").bake
+    ann = character(blender)
     calls = []
     for frames in (30, 30, 300):
-        take, count = made_take(addon, frames=frames), itertools.count()
+        take, count = made_take(frames=frames), itertools.count()
         sys.setprofile(
             lambda frame, event, argument, count=count: (
                 next(count) if event.endswith("call") else None

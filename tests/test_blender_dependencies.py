@@ -6,98 +6,62 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
+import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender import job
+from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import create_character
+from bl_ext.user_default.dafnet.dafnet_addon.blender.furniture import furniture_now
+from bl_ext.user_default.dafnet.dafnet_addon.blender.path_sources import places_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.scene_reader import read_scene
+from bl_ext.user_default.dafnet.dafnet_addon.blender.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 
-CUBE = [(x, y, z) for x in (-0.25, 0.25) for y in (-0.25, 0.25) for z in (0, 0.45)]
-FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-
-
-class Stage:
-    """A character with a root before a chair, and short ways to add to the scene and to read it."""
-
-    def __init__(self, bpy: ModuleType, addon: Any) -> None:
-        self.bpy, self.addon, self.scene = bpy, addon, bpy.context.scene
-        self.error = addon("dafnet_addon.core.errors").InputError
-        self.furniture = bpy.data.collections.new("Furniture")
-        self.scene.collection.children.link(self.furniture)
-        self.ann = addon("dafnet_addon.blender.armature").create_character(bpy.context, "Ann")
-        self.body = next(o for o in self.ann.children if o.type == "MESH")
-        self.root, self.head = self.ann.dafnet.root, self.ann.dafnet.head
-        self.ann.dafnet.furniture = self.furniture
-        self.scene.frame_start, self.scene.frame_end = 1, 40
-        self.scene.frame_set(4)
-        self.chair = self.box("Chair", location=(0, 2, 0))
-
-    def box(self, name: str, collection: Any = None, **transform: Any) -> Any:
-        mesh = self.bpy.data.meshes.new(name)
-        mesh.from_pydata(CUBE, [], FACES)
-        return self.add(
-            self.bpy.data.objects.new(name, mesh), collection or self.furniture, **transform
-        )
-
-    def empty(self, name: str, **transform: Any) -> Any:
-        return self.add(self.bpy.data.objects.new(name, None), self.scene.collection, **transform)
-
-    def add(self, made: Any, collection: Any, **transform: Any) -> Any:
-        for key, value in transform.items():
-            setattr(made, key, value)
-        collection.objects.link(made)
-        return made
-
-    def drive(self, owner: Any, path: str, target: Any, read: str, index: int = -1) -> None:
-        curve = owner.driver_add(path, index) if index >= 0 else owner.driver_add(path)
-        variable = curve.driver.variables.new()
-        variable.name = "read"
-        variable.targets[0].id, variable.targets[0].data_path = target, read
-        curve.driver.expression = "read"
-
-    def settings(self, **overrides: Any) -> Any:
-        return self.addon("dafnet_addon.blender.settings").settings_of(
-            self.ann, self.scene, **overrides
-        )
-
-    def steps(self, **overrides: Any) -> Any:
-        return self.addon("dafnet_addon.blender.scene_reader").read_scene.steps(
-            self.bpy.context, self.settings(**overrides)
-        )
-
-    def read(self, **overrides: Any) -> Any:
-        return self.addon("dafnet_addon.core.progress").drained(self.steps(**overrides))
-
-    def names(self) -> set[str]:
-        return {solid.name for solid in self.read().scene.solids}
-
-    def refused(self, words: str) -> None:
-        with pytest.raises(self.error, match=words):
-            self.read()
-        assert self.scene.frame_current == 4
-
-    def falling(self, name: str, height: float = 20.0) -> Any:
-        """An active rigid body, and the frames' heights as the scene plays them."""
-        ball = self.box(name, self.scene.collection, location=(0, 0, height))
-        if self.scene.rigidbody_world is None:
-            self.bpy.ops.rigidbody.world_add()
-        for o in self.scene.objects:
-            o.select_set(o == ball)
-        self.bpy.context.view_layer.objects.active = ball
-        self.bpy.ops.rigidbody.object_add()
-        return ball
-
-    def played(self, follower: Any, axis: int, first: int, last: int) -> np.ndarray:
-        """Where Blender shows an object when the scene is played from its start."""
-        places = []
-        for frame in range(1, last + 1):
-            self.scene.frame_set(frame)
-            evaluated = follower.evaluated_get(self.bpy.context.evaluated_depsgraph_get())
-            places.append(evaluated.matrix_world.translation[axis])
-        self.scene.frame_set(4)
-        return np.array(places[first - 1 :])
+from kit.stage import Stage
 
 
 @pytest.fixture
-def stage(blender: ModuleType, addon: Any) -> Stage:
-    return Stage(blender, addon)
+def stage(blender: ModuleType) -> Stage:
+    """A character with a root before a chair."""
+    made = Stage()
+    made.chair = made.seat("Chair", location=(0, 2, 0))
+    made.scene.frame_set(4)
+    return made
+
+
+def drive(owner: Any, path: str, target: Any, read: str, index: int = -1) -> None:
+    """Let a property follow another by a driver."""
+    curve = owner.driver_add(path, index) if index >= 0 else owner.driver_add(path)
+    variable = curve.driver.variables.new()
+    variable.name = "read"
+    variable.targets[0].id, variable.targets[0].data_path = target, read
+    curve.driver.expression = "read"
+
+
+def falling(stage: Stage, name: str, height: float = 20.0) -> Any:
+    """An active rigid body."""
+    ball = stage.seat(name, stage.scene.collection, location=(0, 0, height))
+    if stage.scene.rigidbody_world is None:
+        bpy.ops.rigidbody.world_add()
+    stage.select(ball)
+    bpy.ops.rigidbody.object_add()
+    return ball
+
+
+def played(stage: Stage, follower: Any, axis: int, first: int, last: int) -> np.ndarray:
+    """Where Blender shows an object when the scene is played from its start."""
+    places = []
+    for frame in range(1, last + 1):
+        stage.scene.frame_set(frame)
+        evaluated = follower.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        places.append(evaluated.matrix_world.translation[axis])
+    stage.scene.frame_set(4)
+    return np.array(places[first - 1 :])
+
+
+def names(stage: Stage) -> set[str]:
+    """Of the furniture that is read."""
+    return {solid.name for solid in stage.read().scene.solids}
 
 
 def copies(
@@ -133,7 +97,7 @@ def by_a_constraint_switched_on_later(stage: Stage, follower: Any) -> None:
 
 
 def by_driver(stage: Stage, follower: Any) -> None:
-    stage.drive(follower, "location", stage.ann, 'pose.bones["left_wrist"].location[0]', 0)
+    drive(follower, "location", stage.ann, 'pose.bones["left_wrist"].location[0]', 0)
 
 
 def by_driven_distance(stage: Stage, follower: Any) -> None:
@@ -150,8 +114,8 @@ def by_a_driver_script(stage: Stage, follower: Any) -> None:
 def by_a_driven_property(stage: Stage, follower: Any) -> None:
     middle = stage.empty("Middle")
     middle["height"] = 0.0
-    stage.drive(middle, '["height"]', stage.ann, "location[2]")
-    stage.drive(follower, "location", middle, '["height"]', 2)
+    drive(middle, '["height"]', stage.ann, "location[2]")
+    drive(follower, "location", middle, '["height"]', 2)
 
 
 def by_a_chain(stage: Stage, follower: Any) -> None:
@@ -163,7 +127,7 @@ def by_a_chain(stage: Stage, follower: Any) -> None:
 
 def by_another_rig(stage: Stage, follower: Any) -> None:
     stage.scene.cursor.location = (3, 3, 0)
-    rig = stage.addon("dafnet_addon.blender.armature").create_character(stage.bpy.context, "Rig")
+    rig = create_character(bpy.context, "Rig")
     constraint = rig.pose.bones["head"].constraints.new("COPY_LOCATION")
     constraint.target, constraint.subtarget = stage.ann, "head"
     copies(stage, follower, rig, bone="left_wrist")
@@ -197,17 +161,15 @@ Way = Callable[[Stage, Any], None]
 
 @pytest.mark.parametrize("way", WAYS)
 def test_what_follows_the_character_is_no_furniture(stage: Stage, way: Way) -> None:
-    prop = stage.box("Cup", location=(0.3, 0.3, 1.0))
-    assert stage.names() == {"Chair", "Cup"}
+    prop = stage.seat("Cup", location=(0.3, 0.3, 1.0))
+    assert names(stage) == {"Chair", "Cup"}
     way(stage, prop)
     read = stage.read()
     assert {solid.name for solid in read.scene.solids} == {"Chair"}
     assert [each for each in read.warnings if "'Cup'" in each] == [
         "Moved by the character, so not there for it: 'Cup'."
     ]
-    found = stage.addon("dafnet_addon.blender.furniture").furniture_now(
-        stage.bpy.context, stage.settings()
-    )
+    found = furniture_now(bpy.context, stage.settings())
     assert set(found) == {"Chair"}, "the same for the overlays and for ways round the furniture"
 
 
@@ -215,35 +177,35 @@ def test_what_follows_the_character_is_no_furniture(stage: Stage, way: Way) -> N
 @pytest.mark.parametrize("role", ["root", "head"])
 def test_what_leads_the_character_may_not_follow_it(stage: Stage, way: Way, role: str) -> None:
     way(stage, getattr(stage.ann.dafnet, role))
-    stage.refused(f"{role}.* follows the character itself")
+    stage.cannot_be_read(f"{role}.* follows the character itself")
 
 
 def test_the_mode_may_not_be_driven_by_the_character(stage: Stage) -> None:
-    stage.drive(stage.ann, "dafnet.head_influence", stage.chair, "location[0]")
+    drive(stage.ann, "dafnet.head_influence", stage.chair, "location[0]")
     stage.read()
-    stage.drive(stage.ann, "dafnet.mode", stage.ann, "location[1]")
-    stage.refused("driver of mode or influences of 'Ann' reads the character itself")
+    drive(stage.ann, "dafnet.mode", stage.ann, "location[1]")
+    stage.cannot_be_read("driver of mode or influences of 'Ann' reads the character itself")
 
 
 def test_the_source_of_the_upper_body_may_not_follow_the_character(stage: Stage) -> None:
     stage.scene.cursor.location = (3, 3, 0)
-    bob = stage.addon("dafnet_addon.blender.armature").create_character(stage.bpy.context, "Bob")
+    bob = create_character(bpy.context, "Bob")
     stage.ann.dafnet.upper_body_source = bob
     constraint = bob.pose.bones["left_wrist"].constraints.new("IK")
     constraint.target, constraint.subtarget = stage.ann, "right_wrist"
     stage.read()  # FREE: nothing is copied
     stage.ann.dafnet.mode = "FULL"
-    stage.refused("source 'Bob' follows the character itself")
+    stage.cannot_be_read("source 'Bob' follows the character itself")
     constraint.mute = True
     stage.read()
 
 
 def test_a_character_of_another_scene_is_said(stage: Stage) -> None:
-    other = stage.bpy.data.scenes.new("Other")
+    other = bpy.data.scenes.new("Other")
     other.collection.objects.link(stage.ann)
-    settings = stage.addon("dafnet_addon.blender.settings").settings_of(stage.ann, other)
-    with pytest.raises(stage.error, match="scene 'Other' is not the active one; make it active"):
-        stage.addon("dafnet_addon.blender.scene_reader").read_scene(stage.bpy.context, settings)
+    settings = settings_of(stage.ann, other)
+    with pytest.raises(InputError, match="scene 'Other' is not the active one; make it active"):
+        read_scene(bpy.context, settings)
 
 
 def shaped_by_armature(stage: Stage, prop: Any) -> None:
@@ -255,8 +217,8 @@ def shaped_by_surface(stage: Stage, prop: Any) -> None:
 
 
 def shaped_by_lattice(stage: Stage, prop: Any) -> None:
-    lattice = stage.add(
-        stage.bpy.data.objects.new("Cage", stage.bpy.data.lattices.new("Cage")),
+    lattice = stage.put(
+        bpy.data.objects.new("Cage", bpy.data.lattices.new("Cage")),
         stage.scene.collection,
     )
     lattice.parent = stage.ann
@@ -264,7 +226,7 @@ def shaped_by_lattice(stage: Stage, prop: Any) -> None:
 
 
 def shaped_by_nodes(stage: Stage, prop: Any) -> None:
-    tree = stage.bpy.data.node_groups.new("Group", "GeometryNodeTree")
+    tree = bpy.data.node_groups.new("Group", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Object", in_out="INPUT", socket_type="NodeSocketObject")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
@@ -277,7 +239,7 @@ def shaped_by_nodes(stage: Stage, prop: Any) -> None:
 
 def shaped_inside_nodes(stage: Stage, prop: Any) -> None:
     inner, outer = (
-        stage.bpy.data.node_groups.new(name, "GeometryNodeTree") for name in ("Inner", "Outer")
+        bpy.data.node_groups.new(name, "GeometryNodeTree") for name in ("Inner", "Outer")
     )
     inner.nodes.new("GeometryNodeObjectInfo").inputs[0].default_value = stage.body
     outer.nodes.new("GeometryNodeGroup").node_tree = inner
@@ -291,7 +253,7 @@ def shaped_inside_nodes(stage: Stage, prop: Any) -> None:
 
 def shaped_by_driven_key(stage: Stage, prop: Any) -> None:
     prop.shape_key_add(name="Basis")
-    stage.drive(
+    drive(
         prop.shape_key_add(name="Pressed"), "value", stage.ann, 'pose.bones["pelvis"].location[1]'
     )
 
@@ -310,14 +272,14 @@ def shaped_by_driven_key(stage: Stage, prop: Any) -> None:
 def test_what_the_character_shapes_is_no_furniture_and_may_carry_a_root(
     stage: Stage, way: Way
 ) -> None:
-    prop = stage.box("Cup")
-    assert stage.names() == {"Chair", "Cup"}
+    prop = stage.seat("Cup")
+    assert names(stage) == {"Chair", "Cup"}
     way(stage, prop)
-    assert stage.names() == {"Chair"}
+    assert names(stage) == {"Chair"}
     stage.root.parent = prop
     stage.read()  # its place does not depend on its shape
     stage.root.parent_type = "VERTEX"
-    stage.refused("root.* follows the character itself")
+    stage.cannot_be_read("root.* follows the character itself")
 
 
 def test_what_only_knows_the_character_is_furniture_and_may_lead_it(stage: Stage) -> None:
@@ -326,17 +288,17 @@ def test_what_only_knows_the_character_is_furniture_and_may_lead_it(stage: Stage
     off = copies(stage, stage.chair, stage.ann)
     off.influence = 0.0
     stage.chair["owner"] = stage.ann
-    stage.drive(stage.chair, "color", stage.ann, "location[0]", 0)
+    drive(stage.chair, "color", stage.ann, "location[0]", 0)
     stage.ann["speed"] = 1.0
     stage.ann.update_tag()  # or its evaluated copy would not know the new property
-    stage.drive(stage.head, "location", stage.ann, '["speed"]', 2)
-    stage.drive(stage.chair, "location", stage.ann, "dafnet.head_influence", 2)
+    drive(stage.head, "location", stage.ann, '["speed"]', 2)
+    drive(stage.chair, "location", stage.ann, "dafnet.head_influence", 2)
     stage.scene.cursor.location = (3, 3, 0)
-    bob = stage.addon("dafnet_addon.blender.armature").create_character(stage.bpy.context, "Bob")
+    bob = create_character(bpy.context, "Bob")
     bob.dafnet.upper_body_source = stage.ann
     bob.dafnet.hand_left.constraints.new("COPY_LOCATION").target = stage.ann
     copies(stage, stage.ann.dafnet.hand_left, bob, bone="left_wrist")
-    cart = stage.box("Cart")
+    cart = stage.seat("Cart")
     cart.parent = stage.root
     read = stage.read()
     assert {solid.name for solid in read.scene.solids} == {"Chair", "Cart"}
@@ -349,33 +311,31 @@ def test_a_held_prop_leaves_the_next_take_as_it_was(stage: Stage) -> None:
     for frame, y in ((1, 0.0), (60, 1.2)):
         stage.root.location.y = y
         stage.root.keyframe_insert("location", frame=frame)
-    tray = stage.box("Tray", scale=(1, 1, 0.2))
+    tray = stage.seat("Tray", scale=(1, 1, 0.2))
     copies(stage, tray, stage.ann, "COPY_LOCATION", "left_wrist")
-    job = stage.addon("dafnet_addon.blender.job")
     first, second = (
-        job.run(stage.bpy.context, stage.settings(temperature=1.0)).take.joints for _ in range(2)
+        job.run(bpy.context, stage.settings(temperature=1.0)).take.joints for _ in range(2)
     )
     assert np.abs(first - second).max() == 0.0
 
 
 def test_a_root_on_a_rigid_body_is_read_as_it_falls(stage: Stage) -> None:
-    copies(stage, stage.root, stage.falling("Ball"))
+    copies(stage, stage.root, falling(stage, "Ball"))
     read = stage.read()
-    assert np.allclose(read.controls.root[:, 2, 3], stage.played(stage.root, 2, 1, 40), atol=1e-5)
+    assert np.allclose(read.controls.root[:, 2, 3], played(stage, stage.root, 2, 1, 40), atol=1e-5)
     assert np.ptp(read.controls.root[:, 2, 3]) > 6.0
 
 
 def test_the_shot_may_begin_while_a_rigid_body_falls(stage: Stage) -> None:
-    ball = stage.falling("Ball")
+    ball = falling(stage, "Ball")
     stage.furniture.objects.link(ball)
     read = stage.read(frame_start=18)
     falls = next(solid for solid in read.scene.solids if solid.name == "Ball").matrix[:, 2, 3]
-    assert np.allclose(falls, stage.played(ball, 2, 18, 40), atol=1e-5) and np.ptp(falls) > 4.0
+    assert np.allclose(falls, played(stage, ball, 2, 18, 40), atol=1e-5) and np.ptp(falls) > 4.0
     assert stage.scene.frame_current == 4
 
 
 def test_a_root_on_a_cloth_is_read_as_it_hangs(stage: Stage) -> None:
-    bpy = stage.bpy
     bpy.ops.mesh.primitive_grid_add(
         x_subdivisions=6, y_subdivisions=6, size=1.0, location=(0, 0, 30)
     )
@@ -384,15 +344,15 @@ def test_a_root_on_a_cloth_is_read_as_it_hangs(stage: Stage) -> None:
     cloth.modifiers.new("Cloth", "CLOTH")
     copies(stage, stage.root, cloth, bone="Middle")
     read = stage.read(frame_start=5)
-    assert np.allclose(read.controls.root[:, 2, 3], stage.played(stage.root, 2, 5, 40), atol=1e-4)
+    assert np.allclose(read.controls.root[:, 2, 3], played(stage, stage.root, 2, 5, 40), atol=1e-4)
     assert np.ptp(read.controls.root[:, 2, 3]) > 1.0
 
 
 def test_a_tablecloth_has_the_shape_that_it_has_fallen_into(stage: Stage) -> None:
-    stage.bpy.ops.mesh.primitive_grid_add(
+    bpy.ops.mesh.primitive_grid_add(
         x_subdivisions=6, y_subdivisions=6, size=1.0, location=(0, 0, 2)
     )
-    cloth = stage.bpy.context.object
+    cloth = bpy.context.object
     cloth.modifiers.new("Cloth", "CLOTH")
     stage.furniture.objects.link(cloth)
     read = stage.read(frame_start=20)
@@ -401,7 +361,7 @@ def test_a_tablecloth_has_the_shape_that_it_has_fallen_into(stage: Stage) -> Non
     )
     for frame in range(1, 21):
         stage.scene.frame_set(frame)
-    evaluated = cloth.evaluated_get(stage.bpy.context.evaluated_depsgraph_get())
+    evaluated = cloth.evaluated_get(bpy.context.evaluated_depsgraph_get())
     assert (
         low == pytest.approx(min(vertex.co.z for vertex in evaluated.data.vertices), abs=1e-4)
         and low < -0.5
@@ -411,7 +371,7 @@ def test_a_tablecloth_has_the_shape_that_it_has_fallen_into(stage: Stage) -> Non
 
 def test_a_simulation_zone_is_read_as_it_grows(stage: Stage) -> None:
     """Each frame lifts a plate's vertices by a centimetre; the root hangs on one of them."""
-    tree = stage.bpy.data.node_groups.new("Grows", "GeometryNodeTree")
+    tree = bpy.data.node_groups.new("Grows", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     kinds = (
@@ -431,51 +391,50 @@ def test_a_simulation_zone_is_read_as_it_grows(stage: Stage) -> None:
         (end.outputs["Geometry"], out.inputs[0]),
     ):
         tree.links.new(a, b)
-    plate = stage.box("Plate", stage.scene.collection)
+    plate = stage.seat("Plate", stage.scene.collection)
     plate.modifiers.new("Grows", "NODES").node_group = tree
     stage.root.parent, stage.root.parent_type = plate, "VERTEX"
     read = stage.read(frame_start=10)
-    assert np.allclose(read.controls.root[:, 2, 3], stage.played(stage.root, 2, 10, 40), atol=1e-5)
+    assert np.allclose(read.controls.root[:, 2, 3], played(stage, stage.root, 2, 10, 40), atol=1e-5)
     assert np.ptp(read.controls.root[:, 2, 3]) == pytest.approx(0.30, abs=1e-4)
 
 
 def test_reading_a_simulation_may_be_cancelled_and_notices_a_changed_frame(stage: Stage) -> None:
-    copies(stage, stage.root, stage.falling("Ball"))
-    steps = stage.steps()
+    copies(stage, stage.root, falling(stage, "Ball"))
+    steps = read_scene.steps(bpy.context, stage.settings())
     for _ in range(2):
         next(steps)
     steps.close()
     assert stage.scene.frame_current == 4
-    steps = stage.steps()
+    steps = read_scene.steps(bpy.context, stage.settings())
     next(steps)
     stage.scene.frame_set(2)
-    with pytest.raises(stage.error, match="frame was changed"):
+    with pytest.raises(InputError, match="frame was changed"):
         list(steps)
     assert stage.scene.frame_current == 4
 
 
 def test_a_simulation_that_the_character_pushes_is_to_be_baked(stage: Stage) -> None:
-    ball = stage.falling("Ball")
+    ball = falling(stage, "Ball")
     stage.furniture.objects.link(ball)
     assert not stage.read().warnings
-    shin = stage.box("Shin", stage.scene.collection)
+    shin = stage.seat("Shin", stage.scene.collection)
     shin.parent, shin.parent_type, shin.parent_bone = stage.ann, "BONE", "left_knee"
-    stage.falling("Other").rigid_body.type = "PASSIVE"
+    falling(stage, "Other").rigid_body.type = "PASSIVE"
     stage.scene.rigidbody_world.collection.objects.link(shin)
     assert any(
         "push 'Ball'" in each and "bake the simulation" in each for each in stage.read().warnings
     )
     copies(stage, stage.root, ball)
-    stage.refused("push 'Ball', which moves the root 'Ann Root'; bake the simulation")
+    stage.cannot_be_read("push 'Ball', which moves the root 'Ann Root'; bake the simulation")
     stage.scene.rigidbody_world.point_cache.frame_end = 40
-    stage.bpy.ops.ptcache.bake_all(bake=True)
+    bpy.ops.ptcache.bake_all(bake=True)
     stage.scene.frame_set(4)
     assert not any("bake" in each for each in stage.read().warnings)
 
 
 def test_find_furniture_and_root_from_object_see_what_is_played(stage: Stage) -> None:
-    ball = stage.falling("Ball")
-    places = stage.addon("dafnet_addon.blender.path_sources").places_of
-    found = places(stage.bpy.context, ball, [10, 25, 40])[:, 2]
-    played = stage.played(ball, 2, 1, 40)
-    assert np.allclose(found, played[[9, 24, 39]], atol=1e-5) and np.ptp(found) > 4.0
+    ball = falling(stage, "Ball")
+    found = places_of(bpy.context, ball, [10, 25, 40])[:, 2]
+    shown = played(stage, ball, 2, 1, 40)
+    assert np.allclose(found, shown[[9, 24, 39]], atol=1e-5) and np.ptp(found) > 4.0

@@ -4,117 +4,74 @@ nothing.
 
 from types import ModuleType
 
+import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet import dafnet_addon
+from bl_ext.user_default.dafnet.dafnet_addon.blender import job, running
+from bl_ext.user_default.dafnet.dafnet_addon.blender.baker import bake
+from bl_ext.user_default.dafnet.dafnet_addon.blender.job import run
+from bl_ext.user_default.dafnet.dafnet_addon.blender.scene_reader import read_scene
+from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+from bl_ext.user_default.dafnet.panels.main import DAFNET_PT_character
 
 from kit.panels import drawn_by
-
-
-class Shot:
-    """A character before a chair, its root walking for a second."""
-
-    def __init__(self, bpy: ModuleType, addon) -> None:
-        self.bpy, self.addon = bpy, addon
-        self.scene = bpy.context.scene
-        self.scene.render.fps = 24
-        self.scene.frame_start, self.scene.frame_end = 1, 24
-        assert bpy.ops.dafnet.add_character(name="Ann", height=1.7) == {"FINISHED"}
-        self.ann = bpy.context.object
-        furniture = bpy.data.collections.new("Furniture")
-        self.scene.collection.children.link(furniture)
-        mesh = bpy.data.meshes.new("Chair")
-        corners = [(x, y, z) for x in (-0.25, 0.25) for y in (-0.25, 0.25) for z in (0, 0.45)]
-        faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-        mesh.from_pydata(corners, [], faces)
-        chair = bpy.data.objects.new("Chair", mesh)
-        chair.location = (0, 1.5, 0)
-        furniture.objects.link(chair)
-        self.ann.dafnet.furniture = furniture
-        root = self.ann.dafnet.root
-        for frame, y in ((1, 0.0), (24, 0.9)):
-            root.location.y = y
-            root.keyframe_insert("location", frame=frame)
-        self.scene.frame_set(5)
-
-    def settings(self, **overrides):
-        return self.addon("dafnet_addon.blender.job").settings_of(self.ann, self.scene, **overrides)
-
-    def keys(self) -> dict[tuple[str, int], np.ndarray]:
-        curves = self.addon("dafnet_addon.blender.compat").action_curves(self.ann)
-        return {
-            (c.data_path, c.array_index): np.array([p.co for p in c.keyframe_points])
-            for c in curves
-        }
-
-    def state(self) -> dict[str, object]:
-        """What must not change when something fails."""
-        self.bpy.context.view_layer.update()
-        return {
-            "actions": sorted(action.name for action in self.bpy.data.actions),
-            "objects": sorted(o.name for o in self.bpy.data.objects),
-            "meshes": sorted(m.name for m in self.bpy.data.meshes),
-            "playing": [
-                o.name
-                for o in self.bpy.data.objects
-                if o.animation_data and o.animation_data.action
-            ],
-            "frame": (self.scene.frame_current, self.scene.frame_subframe, self.scene.render.fps),
-            "places": {
-                o.name: tuple(v for row in o.matrix_world for v in row) for o in self.scene.objects
-            },
-            "pose": [tuple(b.rotation_quaternion) for b in self.ann.pose.bones],
-        }
+from kit.stage import Stage, bone_heads, keys_of
 
 
 @pytest.fixture
-def shot(blender, addon) -> Shot:
-    return Shot(blender, addon)
+def shot(blender: ModuleType) -> Stage:
+    """A character before a chair, its root walking for a second."""
+    made = Stage(height=1.7, fps=24, frames=(1, 24))
+    made.seat("Chair", location=(0, 1.5, 0))
+    made.walk((1, 0.0), (24, 0.9))
+    made.scene.frame_set(5)
+    return made
 
 
-def test_generate_bakes_a_take_that_plays(shot: Shot) -> None:
-    assert shot.bpy.ops.dafnet.generate() == {"FINISHED"}
-    keys = shot.keys()
+def test_generate_bakes_a_take_that_plays(shot: Stage) -> None:
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
+    keys = keys_of(shot.ann)
     assert keys["location", 0][:, 0].tolist() == list(range(1, 25))
     assert shot.scene.frame_current == 5 and shot.scene.render.fps == 24
-    first, last = (_heads(shot, frame) for frame in (1, 24))
+    first, last = (bone_heads(shot.ann, frame) for frame in (1, 24))
     assert 0.6 < (last - first)[0, 1] < 1.2, "the pelvis goes with the root"
     assert np.isfinite(last).all() and 1.3 < last[15, 2] < 1.7
     before = shot.ann.animation_data.action
-    assert shot.bpy.ops.dafnet.generate() == {"FINISHED"}
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
     assert (
         before.use_fake_user
-        and before.name in shot.bpy.data.actions
+        and before.name in bpy.data.actions
         and shot.ann.animation_data.action != before
     )
 
 
-def test_operator_and_api_give_the_same_keys(shot: Shot, addon) -> None:
+def test_operator_and_api_give_the_same_keys(shot: Stage) -> None:
     """The button, the job and the three stages by hand are one path."""
-    api = addon("dafnet_addon")
+    api = dafnet_addon
     weights = api.load_weights()
     shot.ann.dafnet.seed, shot.ann.dafnet.temperature = 3, 0.5
-    shot.bpy.ops.dafnet.generate()
-    button = shot.keys()
-    addon("dafnet_addon.blender.job").run(shot.bpy.context, shot.settings(), weights)
-    job = shot.keys()
-    read = addon("dafnet_addon.blender.scene_reader").read_scene(shot.bpy.context, shot.settings())
+    bpy.ops.dafnet.generate()
+    button = keys_of(shot.ann)
+    run(bpy.context, shot.settings(), weights)
+    job = keys_of(shot.ann)
+    read = read_scene(bpy.context, shot.settings())
     take = api.generate(
         read.scene, read.controls, weights, seed=3, temperature=0.5, clean_up=api.CleanUp(1.0, 1.0)
     )
-    addon("dafnet_addon.blender.baker").bake(take, shot.ann, 1, "By hand")
-    by_hand = shot.keys()
+    bake(take, shot.ann, 1, "By hand")
+    by_hand = keys_of(shot.ann)
     assert button.keys() == job.keys() == by_hand.keys() and len(button) == 6 + 3 + 22 * 4
     for name in button:
         assert np.array_equal(button[name], job[name]) and np.array_equal(
             button[name], by_hand[name]
         )
-    assert np.abs(take.joints[9] - _heads(shot, 10)).max() < 1e-3
+    assert np.abs(take.joints[9] - bone_heads(shot.ann, 10)).max() < 1e-3
 
 
-def test_the_job_tells_progress_seconds_and_warnings(shot: Shot, addon) -> None:
-    job = addon("dafnet_addon.blender.job")
+def test_the_job_tells_progress_seconds_and_warnings(shot: Stage) -> None:
     shot.ann.dafnet.furniture = None
-    steps = job.steps(shot.bpy.context, shot.settings())
+    steps = job.steps(bpy.context, shot.settings())
     progress = []
     try:
         while True:
@@ -128,43 +85,39 @@ def test_the_job_tells_progress_seconds_and_warnings(shot: Shot, addon) -> None:
     assert result.action == shot.ann.animation_data.action and len(result.take) == 24
 
 
-def test_cancelling_anywhere_leaves_the_scene_as_it_was(shot: Shot, addon) -> None:
+def test_cancelling_anywhere_leaves_the_scene_as_it_was(shot: Stage) -> None:
     before = shot.state()
-    job = addon("dafnet_addon.blender.job")
     for until in (0.05, 0.2, 0.6, 0.9):
-        steps = job.steps(shot.bpy.context, shot.settings())
+        steps = job.steps(bpy.context, shot.settings())
         while next(steps) < until:
             pass
         steps.close()
         assert shot.state() == before
 
 
-def test_what_is_deleted_while_it_runs(shot: Shot, addon) -> None:
-    job = addon("dafnet_addon.blender.job")
-    steps = job.steps(shot.bpy.context, shot.settings())
+def test_what_is_deleted_while_it_runs(shot: Stage) -> None:
+    steps = job.steps(bpy.context, shot.settings())
     while next(steps) < 0.3:
         pass
-    shot.bpy.ops.object.select_all(action="DESELECT")
+    bpy.ops.object.select_all(action="DESELECT")
     shot.ann.select_set(True)
-    shot.bpy.ops.object.delete()
-    actions = [action.name for action in shot.bpy.data.actions]
-    with pytest.raises(
-        addon("dafnet_addon.core.errors").InputError, match="'Ann' is not in the scene"
-    ):
+    bpy.ops.object.delete()
+    actions = [action.name for action in bpy.data.actions]
+    with pytest.raises(InputError, match="'Ann' is not in the scene"):
         for _ in steps:
             pass
-    assert [action.name for action in shot.bpy.data.actions] == actions
+    assert [action.name for action in bpy.data.actions] == actions
 
 
-def test_errors_are_reported_and_change_nothing(shot: Shot, tmp_path) -> None:
+def test_errors_are_reported_and_change_nothing(shot: Stage, tmp_path) -> None:
     def fails(match: str) -> None:
         before = shot.state()
         with pytest.raises(RuntimeError, match=match):
-            shot.bpy.ops.dafnet.generate()
+            bpy.ops.dafnet.generate()
         assert shot.state() == before
 
     own = shot.ann.dafnet
-    furniture, own.furniture = own.furniture, shot.bpy.data.collections.new("Empty")
+    furniture, own.furniture = own.furniture, bpy.data.collections.new("Empty")
     fails("'Empty' has no visible mesh")
     own.furniture = furniture
     own.use_scene_range, own.frame_start, own.frame_end = False, 9, 2
@@ -176,7 +129,7 @@ def test_errors_are_reported_and_change_nothing(shot: Shot, tmp_path) -> None:
     own.mode = "FULL"
     fails("no source")
     own.mode = "FREE"
-    preferences = shot.bpy.context.preferences.addons["bl_ext.user_default.dafnet"].preferences
+    preferences = bpy.context.preferences.addons["bl_ext.user_default.dafnet"].preferences
     preferences.weights = str(tmp_path / "gone.safetensors")
     try:
         fails("gone.safetensors")
@@ -184,41 +137,40 @@ def test_errors_are_reported_and_change_nothing(shot: Shot, tmp_path) -> None:
         preferences.weights = ""
 
 
-def test_buttons_say_what_is_missing(shot: Shot) -> None:
-    generate, add = shot.bpy.ops.dafnet.generate, shot.bpy.ops.dafnet.add_character
+def test_buttons_say_what_is_missing(shot: Stage) -> None:
+    generate, add = bpy.ops.dafnet.generate, bpy.ops.dafnet.add_character
     for belongs in (shot.ann, shot.ann.dafnet.root, shot.ann.dafnet.head, shot.ann.children[0]):
-        shot.bpy.context.view_layer.objects.active = belongs
+        bpy.context.view_layer.objects.active = belongs
         assert generate.poll()
-    shot.bpy.context.view_layer.objects.active = shot.ann.dafnet.furniture.objects[0]
+    bpy.context.view_layer.objects.active = shot.ann.dafnet.furniture.objects[0]
     assert not generate.poll()
-    shot.bpy.context.view_layer.objects.active = shot.ann
-    shot.bpy.ops.object.mode_set(mode="POSE")
+    bpy.context.view_layer.objects.active = shot.ann
+    bpy.ops.object.mode_set(mode="POSE")
     assert generate.poll() and not add.poll()
-    shot.bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.object.mode_set(mode="EDIT")
     assert not generate.poll()
-    shot.bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.ops.object.mode_set(mode="OBJECT")
     shot.ann.dafnet.root = None
     assert not generate.poll()
 
 
-def test_one_undo_step(shot: Shot) -> None:
-    shot.bpy.ops.ed.undo_push(message="Before")
-    assert shot.bpy.ops.dafnet.generate("EXEC_DEFAULT", True) == {"FINISHED"}
-    assert shot.bpy.data.objects["Ann"].animation_data.action
-    shot.bpy.ops.ed.undo()
-    data = shot.bpy.data.objects["Ann"].animation_data
+def test_one_undo_step(shot: Stage) -> None:
+    bpy.ops.ed.undo_push(message="Before")
+    assert bpy.ops.dafnet.generate("EXEC_DEFAULT", True) == {"FINISHED"}
+    assert bpy.data.objects["Ann"].animation_data.action
+    bpy.ops.ed.undo()
+    data = bpy.data.objects["Ann"].animation_data
     assert data is None or data.action is None
-    shot.bpy.ops.ed.redo()
-    assert shot.bpy.data.objects["Ann"].animation_data.action
+    bpy.ops.ed.redo()
+    assert bpy.data.objects["Ann"].animation_data.action
 
 
-def test_the_panel_draws(shot: Shot, addon) -> None:
+def test_the_panel_draws(shot: Stage) -> None:
     """In each of its states."""
-    panel = addon("panels.main").DAFNET_PT_character
-    running = addon("dafnet_addon.blender.running")
+    panel = DAFNET_PT_character
 
     def drawn() -> list[str]:
-        return drawn_by(panel, shot.bpy.context).words()
+        return drawn_by(panel, bpy.context).words()
 
     shot.ann.dafnet.mode = "FREE"
     free = drawn()
@@ -236,15 +188,8 @@ def test_the_panel_draws(shot: Shot, addon) -> None:
             and "dafnet.cancel" in drawn()
             and "dafnet.generate" not in drawn()
         )
-        assert not shot.bpy.ops.dafnet.generate.poll()
+        assert not bpy.ops.dafnet.generate.poll()
     finally:
         running.end_job()
-    shot.bpy.context.view_layer.objects.active = None
+    bpy.context.view_layer.objects.active = None
     assert "dafnet.add_character" in drawn() and "root" not in drawn()
-
-
-def _heads(shot: Shot, frame: int) -> np.ndarray:
-    shot.scene.frame_set(frame)
-    evaluated = shot.ann.evaluated_get(shot.bpy.context.evaluated_depsgraph_get())
-    names = shot.addon("dafnet_addon.core.skeleton").JOINTS
-    return np.array([evaluated.matrix_world @ evaluated.pose.bones[name].head for name in names])

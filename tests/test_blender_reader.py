@@ -2,55 +2,23 @@
 
 from types import ModuleType
 
+import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import create_character
+from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
+from bl_ext.user_default.dafnet.dafnet_addon.blender.scene_reader import read_scene
+from bl_ext.user_default.dafnet.dafnet_addon.blender.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.core import skeleton
 
-CUBE = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-
-
-class Stage:
-    """A scene with a character, a furniture collection and short ways to fill and read it."""
-
-    def __init__(self, bpy: ModuleType, addon) -> None:
-        self.bpy, self.addon = bpy, addon
-        self.error = addon("dafnet_addon.core.errors").InputError
-        self.scene = bpy.context.scene
-        self.furniture = bpy.data.collections.new("Furniture")
-        self.scene.collection.children.link(self.furniture)
-        self.ann = addon("dafnet_addon.blender.armature").create_character(bpy.context, "Ann")
-        self.ann.dafnet.furniture = self.furniture
-        self.scene.frame_start, self.scene.frame_end = 1, 10
-        self.scene.frame_set(4)
-
-    def cube(self, name: str = "Cube", faces=FACES, collection=None, **transform):
-        mesh = self.bpy.data.meshes.new(name)
-        mesh.from_pydata(CUBE, [], faces)
-        return self.put(self.bpy.data.objects.new(name, mesh), collection, **transform)
-
-    def put(self, made, collection=None, **transform):
-        for key, value in transform.items():
-            setattr(made, key, value)
-        (collection or self.furniture).objects.link(made)
-        return made
-
-    def read(self, **overrides):
-        settings = self.addon("dafnet_addon.blender.settings").settings_of(
-            self.ann, self.scene, **overrides
-        )
-        return self.addon("dafnet_addon.blender.scene_reader").read_scene(
-            self.bpy.context, settings
-        )
-
-    def refused(self, match: str, **overrides) -> None:
-        with pytest.raises(self.error, match=match):
-            self.read(**overrides)
-        assert self.scene.frame_current == 4
+from kit.stage import Stage, box_corners, key
 
 
 @pytest.fixture
-def stage(blender, addon) -> Stage:
-    return Stage(blender, addon)
+def stage(blender: ModuleType) -> Stage:
+    made = Stage(frames=(1, 10))
+    made.scene.frame_set(4)
+    return made
 
 
 def corners(solid, frame: int = 0) -> np.ndarray:
@@ -62,22 +30,14 @@ def box(points: np.ndarray) -> np.ndarray:
     return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
-def key(made, path: str, *values: tuple[int, object]) -> None:
-    for frame, value in values:
-        setattr(made, path, value)
-        made.keyframe_insert(path, frame=frame)
-
-
 def test_transformed_and_modified_meshes(stage: Stage) -> None:
-    parent = stage.put(
-        stage.bpy.data.objects.new("Parent", None), location=(5, 0, 0), scale=(2, 2, -2)
-    )
-    stage.cube("Child", parent=parent, location=(1, 0, 0), scale=(1, 3, 1))
-    array = stage.cube("Array", location=(0, 0, 4)).modifiers.new("Array", "ARRAY")
+    parent = stage.put(bpy.data.objects.new("Parent", None), location=(5, 0, 0), scale=(2, 2, -2))
+    stage.box("Child", parent=parent, location=(1, 0, 0), scale=(1, 3, 1))
+    array = stage.box("Array", location=(0, 0, 4)).modifiers.new("Array", "ARRAY")
     array.count = 3
-    nested = stage.bpy.data.collections.new("Nested")
+    nested = bpy.data.collections.new("Nested")
     stage.furniture.children.link(nested)
-    stage.cube("Deep", collection=nested, location=(0, 9, 0))
+    stage.box("Deep", collection=nested, location=(0, 9, 0))
     solids = {solid.name: solid for solid in stage.read().scene.solids}
     assert set(solids) == {"Child", "Array", "Deep"}
     assert np.allclose(box(corners(solids["Child"])), [[5, -6, -2], [9, 6, 2]])
@@ -90,15 +50,15 @@ def test_transformed_and_modified_meshes(stage: Stage) -> None:
 
 
 def test_collection_and_geometry_nodes_instances(stage: Stage) -> None:
-    chairs = stage.bpy.data.collections.new("Chairs")
-    stage.cube("Leg", collection=chairs, location=(0, 0, 1), scale=(0.1, 0.1, 1))
-    stage.cube("Seat", collection=chairs, location=(0, 0, 2))
-    instancer = stage.put(stage.bpy.data.objects.new("Chair", None), instance_type="COLLECTION")
+    chairs = bpy.data.collections.new("Chairs")
+    stage.box("Leg", collection=chairs, location=(0, 0, 1), scale=(0.1, 0.1, 1))
+    stage.box("Seat", collection=chairs, location=(0, 0, 2))
+    instancer = stage.put(bpy.data.objects.new("Chair", None), instance_type="COLLECTION")
     instancer.instance_collection = chairs
     key(instancer, "location", (1, (0, 0, 0)), (10, (9, 0, 0)))
 
-    grid = stage.cube("Grid")
-    tree = stage.bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
+    grid = stage.box("Grid")
+    tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     kinds = (
@@ -127,24 +87,24 @@ def test_collection_and_geometry_nodes_instances(stage: Stage) -> None:
 
 
 def test_curves_text_and_hidden_objects(stage: Stage) -> None:
-    curve = stage.bpy.data.curves.new("Rail", "CURVE")
+    curve = bpy.data.curves.new("Rail", "CURVE")
     curve.dimensions = "3D"
     curve.bevel_depth = 0.1
     curve.splines.new("POLY").points.add(1)
     curve.splines[0].points[1].co = (2, 0, 0, 1)
-    stage.put(stage.bpy.data.objects.new("Rail", curve), location=(0, 0, 1))
-    stage.cube("Hidden").hide_viewport = True
-    stage.cube("Unrendered").hide_render = True
+    stage.put(bpy.data.objects.new("Rail", curve), location=(0, 0, 1))
+    stage.box("Hidden").hide_viewport = True
+    stage.box("Unrendered").hide_render = True
     assert {solid.name for solid in stage.read().scene.solids} == {"Rail", "Unrendered"}
 
 
 def test_moving_furniture_has_a_matrix_for_each_frame(stage: Stage) -> None:
-    chair = stage.cube("Chair")
+    chair = stage.box("Chair")
     key(chair, "location", (1, (0, 0, 0)), (10, (9, 0, 0)))
-    for curve in stage.addon("dafnet_addon.blender.compat").action_curves(chair):
+    for curve in action_curves(chair):
         for point in curve.keyframe_points:
             point.interpolation = "LINEAR"
-    still = stage.cube("Still")
+    still = stage.box("Still")
     still.scale = (2, 1, 1)
     read = {solid.name: solid for solid in stage.read(frame_start=2, frame_end=6).scene.solids}
     assert read["Chair"].matrix.shape == (5, 4, 4)
@@ -156,24 +116,22 @@ def test_moving_furniture_has_a_matrix_for_each_frame(stage: Stage) -> None:
 def test_the_character_and_its_empties_are_no_furniture(stage: Stage) -> None:
     for made in (stage.ann, *stage.ann.children, stage.ann.dafnet.root, stage.ann.dafnet.head):
         stage.furniture.objects.link(made)
-    hat = stage.cube("Hat")
+    hat = stage.box("Hat")
     hat.parent, hat.parent_type, hat.parent_bone = stage.ann, "BONE", "head"
-    coat = stage.cube("Coat")
+    coat = stage.box("Coat")
     coat.modifiers.new("Armature", "ARMATURE").object = stage.ann
-    stage.cube("Chair")
+    stage.box("Chair")
     assert [solid.name for solid in stage.read().scene.solids] == ["Chair"]
 
 
 def test_units(stage: Stage) -> None:
     stage.scene.unit_settings.system = "METRIC"
     stage.scene.unit_settings.scale_length = 0.01
-    bob = stage.addon("dafnet_addon.blender.armature").create_character(
-        stage.bpy.context, "Bob", 1.75
-    )
+    bob = create_character(bpy.context, "Bob", 1.75)
     bob.dafnet.furniture, stage.ann = stage.furniture, bob
     bob.dafnet.root.location = (100, 200, 0)
     bob.dafnet.head.location = (0, 0, 150)
-    stage.cube("Chair", location=(300, 0, 0), scale=(50, 50, 50))
+    stage.box("Chair", location=(300, 0, 0), scale=(50, 50, 50))
     read = stage.read()
     assert read.controls.scale == pytest.approx(1.0, abs=1e-5)
     assert np.allclose(read.controls.root[0, :3, 3], (1, 2, 0))
@@ -185,9 +143,7 @@ def test_units(stage: Stage) -> None:
 
 
 def test_the_root_follows_whatever_drives_it(stage: Stage) -> None:
-    cart = stage.put(
-        stage.bpy.data.objects.new("Cart", None), stage.scene.collection, scale=(3, 3, 3)
-    )
+    cart = stage.put(bpy.data.objects.new("Cart", None), stage.scene.collection, scale=(3, 3, 3))
     key(cart, "rotation_euler", (1, (0, 0, 0)), (10, (0, 0, 3)))
     key(cart, "location", (1, (0, 0, 0)), (10, (9, 0, 0)))
     constraint = stage.ann.dafnet.root.constraints.new("COPY_TRANSFORMS")
@@ -211,18 +167,18 @@ def test_a_hidden_root_moves_and_a_disabled_one_is_refused(stage: Stage) -> None
     root.hide_set(True)
     assert np.ptp(stage.read().controls.root[:, 0, 3]) == pytest.approx(9.0)
     root.hide_viewport = True
-    stage.refused("'Ann Root'.*disabled in viewports")
+    stage.cannot_be_read("'Ann Root'.*disabled in viewports")
     root.hide_viewport = False
-    stage.bpy.context.view_layer.layer_collection.children["Ann"].exclude = True
-    stage.refused("'Ann'.*disabled in viewports")
+    bpy.context.view_layer.layer_collection.children["Ann"].exclude = True
+    stage.cannot_be_read("'Ann'.*disabled in viewports")
 
 
 def test_targets_and_when_their_rotation_counts(stage: Stage) -> None:
     own = stage.ann.dafnet
-    stage.cube("Chair")
+    stage.box("Chair")
     own.hand_right = None
     cart = stage.put(
-        stage.bpy.data.objects.new("Cart", None), stage.scene.collection, rotation_euler=(0, 0, 1)
+        bpy.data.objects.new("Cart", None), stage.scene.collection, rotation_euler=(0, 0, 1)
     )
     own.hand_left.parent = cart
     own.hand_left.location = (1, 0, 0)
@@ -237,7 +193,7 @@ def test_targets_and_when_their_rotation_counts(stage: Stage) -> None:
 
 
 def test_the_mode_of_each_frame(stage: Stage) -> None:
-    stage.cube("Chair")
+    stage.box("Chair")
     assert stage.read().controls.mode == "FREE"
     stage.ann.dafnet.mode = "EE"
     assert stage.read().controls.mode == "EE"
@@ -250,16 +206,13 @@ def test_the_mode_of_each_frame(stage: Stage) -> None:
 
 def test_the_upper_body_of_another_character(stage: Stage) -> None:
     """A source on its own root is carried to ours; its size and its place do not matter."""
-    skeleton = stage.addon("dafnet_addon.core.skeleton")
     stage.scene.cursor.location = (4, 5, 0.2)
-    bob = stage.addon("dafnet_addon.blender.armature").create_character(
-        stage.bpy.context, "Bob", 1.4
-    )
+    bob = create_character(bpy.context, "Bob", 1.4)
     bob.rotation_euler.z += 0.7
     bob.pose.bones["left_shoulder"].rotation_quaternion = (0.9, 0.1, 0.4, 0.1)
     stage.ann.dafnet.root.location = (1, 0, 0)
     stage.ann.dafnet.upper_body_source = bob
-    stage.cube("Chair")
+    stage.box("Chair")
     stage.ann.dafnet.mode = "FULL"
     upper = stage.read().controls.upper_body
     assert upper.shape == (10, 14, 3)
@@ -275,7 +228,7 @@ def test_the_upper_body_of_another_character(stage: Stage) -> None:
         "the root is found from hips and shoulders"
     )
     stage.ann.dafnet.upper_body_source = None
-    stage.refused("no source")
+    stage.cannot_be_read("no source")
 
 
 @pytest.mark.parametrize(
@@ -286,8 +239,8 @@ def test_changing_shapes_are_warned_about(
     stage: Stage, values: tuple[tuple[int, float], ...]
 ) -> None:
     """Also where the shape is the first one again in the middle and at the end."""
-    stage.cube("Rigid")
-    soft = stage.cube("Soft")
+    stage.box("Rigid")
+    soft = stage.box("Soft")
     soft.shape_key_add(name="Basis")
     pressed = soft.shape_key_add(name="Pressed")
     pressed.data[0].co.z += 0.5
@@ -299,21 +252,21 @@ def test_changing_shapes_are_warned_about(
 
 def test_shapes_that_others_change_and_instances_are_warned_about(stage: Stage) -> None:
     """A modifier's object moves; a node group builds another mesh from frame 4 on."""
-    plate = stage.cube("Plate")
-    hook = stage.put(stage.bpy.data.objects.new("Hook", None), stage.scene.collection)
+    plate = stage.box("Plate")
+    hook = stage.put(bpy.data.objects.new("Hook", None), stage.scene.collection)
     key(hook, "location", (1, (0, 0, 0)), (4, (0, 0, 1)), (5, (0, 0, 0)))
     modifier = plate.modifiers.new("Hook", "HOOK")
     modifier.object, modifier.strength = hook, 1.0
     modifier.vertex_indices_set([0, 1, 2])
-    chairs = stage.bpy.data.collections.new("Chairs")
-    seat = stage.cube("Seat", collection=chairs)
+    chairs = bpy.data.collections.new("Chairs")
+    seat = stage.box("Seat", collection=chairs)
     seat.shape_key_add(name="Basis")
     sunk = seat.shape_key_add(name="Sunk")
     sunk.data[0].co.z -= 0.5
     key(sunk, "value", (1, 0.0), (6, 1.0), (7, 0.0))
-    chair = stage.put(stage.bpy.data.objects.new("Chair", None), instance_type="COLLECTION")
+    chair = stage.put(bpy.data.objects.new("Chair", None), instance_type="COLLECTION")
     chair.instance_collection = chairs
-    array = stage.cube("Row").modifiers.new("Array", "ARRAY")
+    array = stage.box("Row").modifiers.new("Array", "ARRAY")
     key(array, "count", (1, 2), (8, 3), (9, 2))
     changed = [each for each in stage.read().warnings if "shape" in each]
     assert len(changed) == 3 and all(
@@ -322,8 +275,8 @@ def test_shapes_that_others_change_and_instances_are_warned_about(stage: Stage) 
 
 
 def test_what_is_shown_or_hidden_during_the_shot_is_said(stage: Stage) -> None:
-    stage.cube("Always")
-    leaves, comes, flickers = (stage.cube(name) for name in ("Leaves", "Comes", "Flickers"))
+    stage.box("Always")
+    leaves, comes, flickers = (stage.box(name) for name in ("Leaves", "Comes", "Flickers"))
     key(leaves, "hide_viewport", (1, False), (6, True))
     key(comes, "hide_viewport", (1, True), (6, False))
     key(flickers, "hide_viewport", (1, False), (4, True), (5, False))
@@ -338,11 +291,11 @@ def test_what_is_shown_or_hidden_during_the_shot_is_said(stage: Stage) -> None:
 
 
 def test_instances_that_come_and_go_are_said(stage: Stage) -> None:
-    chairs = stage.bpy.data.collections.new("Chairs")
-    blinking = stage.cube("Seat", collection=chairs)
-    stage.cube("Leg", collection=chairs)
+    chairs = bpy.data.collections.new("Chairs")
+    blinking = stage.box("Seat", collection=chairs)
+    stage.box("Leg", collection=chairs)
     key(blinking, "hide_viewport", (1, False), (5, True), (6, False))
-    chair = stage.put(stage.bpy.data.objects.new("Chair", None), instance_type="COLLECTION")
+    chair = stage.put(bpy.data.objects.new("Chair", None), instance_type="COLLECTION")
     chair.instance_collection = chairs
     read = stage.read()
     assert len(read.scene.solids) == 2
@@ -353,20 +306,20 @@ def test_helpers_are_no_furniture_and_doubtful_objects_are_named(stage: Stage) -
     """What no picture shows and the viewport draws through, or what cuts, is there for the modeller
     alone.
     """
-    wall = stage.cube("Wall")
+    wall = stage.box("Wall")
     modifier = wall.modifiers.new("Door", "BOOLEAN")
-    modifier.object = stage.cube("Cutter", display_type="WIRE", hide_render=True)
-    cutters = stage.bpy.data.collections.new("Cutters")
+    modifier.object = stage.box("Cutter", display_type="WIRE", hide_render=True)
+    cutters = bpy.data.collections.new("Cutters")
     stage.furniture.children.link(cutters)
     cutters.hide_render = True
-    stage.cube("Window Cutter", collection=cutters)
+    stage.box("Window Cutter", collection=cutters)
     second = wall.modifiers.new("Windows", "BOOLEAN")
     second.operand_type, second.collection = "COLLECTION", cutters
-    stage.cube("Cage", display_type="BOUNDS", hide_render=True)
-    stage.cube("Heavy Sofa", display_type="BOUNDS")
-    stage.cube("Proxy", hide_render=True)
+    stage.box("Cage", display_type="BOUNDS", hide_render=True)
+    stage.box("Heavy Sofa", display_type="BOUNDS")
+    stage.box("Proxy", hide_render=True)
     union = wall.modifiers.new("Shelf", "BOOLEAN")
-    union.object, union.operation = stage.cube("Shelf"), "UNION"
+    union.object, union.operation = stage.box("Shelf"), "UNION"
     read = stage.read()
     assert {solid.name for solid in read.scene.solids} == {"Wall", "Heavy Sofa", "Proxy", "Shelf"}
     helpers, doubtful = read.warnings
@@ -375,44 +328,40 @@ def test_helpers_are_no_furniture_and_doubtful_objects_are_named(stage: Stage) -
 
 
 def test_bad_input_is_refused_in_one_sentence(stage: Stage) -> None:
-    stage.refused("no visible mesh")
-    stage.cube("Wire", faces=[])
-    stage.refused("no faces")
-    chair = stage.cube("Chair")
+    stage.cannot_be_read("no visible mesh")
+    stage.mesh("Wire", box_corners((-1, -1, -1), (1, 1, 1)), [])
+    stage.cannot_be_read("no faces")
+    chair = stage.box("Chair")
     chair.location.x = np.nan
-    stage.refused("'Chair'.*not a number")
+    stage.cannot_be_read("'Chair'.*not a number")
     chair.location.x = 0.0
     own = stage.ann.dafnet
     own.root.location.x = np.nan
-    stage.refused("root.*not a number")
+    stage.cannot_be_read("root.*not a number")
     own.root.location.x = 0.0
     own.head.location.x = np.nan
-    stage.refused("head target.*not a number")
+    stage.cannot_be_read("head target.*not a number")
     own.head.location.x = 0.0
-    stage.refused("before its start", frame_start=10, frame_end=9)
-    stage.refused("unknown", mode="FRE")
-    stage.refused("no root", root=None)
-    stage.refused("'Gone' is not in the scene", root="Gone")
-    stage.refused("'Gone' is not in this file", furniture="Gone")
-    stage.bpy.ops.object.select_all(action="DESELECT")
+    stage.cannot_be_read("before its start", frame_start=10, frame_end=9)
+    stage.cannot_be_read("unknown", mode="FRE")
+    stage.cannot_be_read("no root", root=None)
+    stage.cannot_be_read("'Gone' is not in the scene", root="Gone")
+    stage.cannot_be_read("'Gone' is not in this file", furniture="Gone")
+    bpy.ops.object.select_all(action="DESELECT")
     own.head.select_set(True)
-    stage.bpy.ops.object.delete()
+    bpy.ops.object.delete()
     assert own.head is not None, "the property still holds the deleted object"
-    stage.refused("head target.*is not in the scene")
+    stage.cannot_be_read("head target.*is not in the scene")
     own.head = None
     assert len(stage.read().scene.solids) == 1
 
 
 def test_the_frame_is_kept_while_reading(stage: Stage) -> None:
-    stage.cube("Chair")
+    stage.box("Chair")
     stage.scene.frame_set(3, subframe=0.25)
-    settings = stage.addon("dafnet_addon.blender.settings").settings_of(
-        stage.ann, stage.scene, frame_end=100
-    )
+    settings = settings_of(stage.ann, stage.scene, frame_end=100)
     progress = []
-    for share in stage.addon("dafnet_addon.blender.scene_reader").read_scene.steps(
-        stage.bpy.context, settings
-    ):
+    for share in read_scene.steps(bpy.context, settings):
         progress.append(share)
         assert (stage.scene.frame_current, stage.scene.frame_subframe) == (3, 0.25)
     assert len(progress) > 5 and progress == sorted(progress) and progress[-1] == 1.0

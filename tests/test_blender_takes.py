@@ -8,71 +8,58 @@ from types import ModuleType
 from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
+import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender import job, preferences
+from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
+from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay_data import drawings
+from bl_ext.user_default.dafnet.dafnet_addon.blender.properties import _is_take
+from bl_ext.user_default.dafnet.dafnet_addon.blender.takes import (
+    PACKED,
+    frames_of,
+    stored,
+    takes_of,
+)
+from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import UPPER
+
+from kit.stage import Stage
 
 
-class Shot:
+class Shot(Stage):
     """A character that walks 1.2 m in a second and a half past a box."""
 
-    def __init__(self, bpy: ModuleType, addon) -> None:
-        self.bpy, self.addon, self.scene = bpy, addon, bpy.context.scene
-        self.scene.render.fps = 30
-        self.scene.frame_start, self.scene.frame_end = 11, 55
-        bpy.ops.dafnet.add_character(name="Ann")
-        self.ann = bpy.context.object
-        furniture = bpy.data.collections.new("Furniture")
-        self.scene.collection.children.link(furniture)
-        bpy.ops.mesh.primitive_cube_add(size=0.5, location=(0.7, 0.6, 0.25))
-        box = bpy.context.object
-        self.scene.collection.objects.unlink(box)
-        furniture.objects.link(box)
-        self.ann.dafnet.furniture = furniture
-        for frame, y in ((11, 0.0), (55, 1.2)):
-            self.ann.dafnet.root.location.y = y
-            self.ann.dafnet.root.keyframe_insert("location", frame=frame)
-        self.choose()
-
-    @property
-    def takes(self):
-        return self.addon("dafnet_addon.blender.takes")
+    def __init__(self) -> None:
+        super().__init__(fps=30, frames=(11, 55))
+        self.box("Box", (-0.25, -0.25, -0.25), (0.25, 0.25, 0.25), location=(0.7, 0.6, 0.25))
+        self.walk((11, 0.0), (55, 1.2))
 
     def choose(self) -> None:
-        self.bpy.context.view_layer.objects.active = self.ann
+        bpy.context.view_layer.objects.active = self.ann
 
-    def listed(self) -> list:
-        return self.takes.takes_of(self.ann)
+    def listed(self) -> list[Any]:
+        return takes_of(self.ann)
 
-    def motion(self, action) -> np.ndarray:
+    def motion(self, action: Any) -> np.ndarray:
         """Joints (T, 22, 3) that the stored take has."""
-        return self.takes.stored(action)[0].joints
-
-    def played(self) -> np.ndarray:
-        """Bone heads (T, 22, 3) in the world, as the armature plays them."""
-        names = self.addon("dafnet_addon.core.skeleton").JOINTS
-        frames = []
-        for frame in range(self.scene.frame_start, self.scene.frame_end + 1):
-            self.scene.frame_set(frame)
-            ann = self.ann.evaluated_get(self.bpy.context.evaluated_depsgraph_get())
-            frames.append([ann.matrix_world @ ann.pose.bones[name].head for name in names])
-        return np.array(frames)
+        return stored(action)[0].joints
 
 
 @pytest.fixture
-def shot(blender, addon) -> Shot:
-    return Shot(blender, addon)
+def shot(blender: ModuleType) -> Shot:
+    return Shot()
 
 
 def test_several_takes_in_one_go_are_listed_and_the_first_plays(shot: Shot) -> None:
     own = shot.ann.dafnet
     own.take_count, own.seed = 3, 7
-    assert shot.bpy.ops.dafnet.generate() == {"FINISHED"}
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
     takes = shot.listed()
     assert [(a.dafnet.seed, a.dafnet.temperature) for a in takes] == [(7, 0.0), (8, 1.0), (9, 1.0)]
     assert shot.ann.animation_data.action == takes[0] and own.active_take == 0
     assert all(
-        a.use_fake_user and a.dafnet.frame_start == 11 and shot.takes.frames_of(a) == (11, 55)
-        for a in takes
+        a.use_fake_user and a.dafnet.frame_start == 11 and frames_of(a) == (11, 55) for a in takes
     )
     assert takes[0].dafnet.log_likelihood > takes[1].dafnet.log_likelihood
     assert (
@@ -83,13 +70,13 @@ def test_several_takes_in_one_go_are_listed_and_the_first_plays(shot: Shot) -> N
 
 
 def test_takes_are_played_judged_and_renamed_and_none_is_lost(shot: Shot) -> None:
-    ops, own = shot.bpy.ops.dafnet, shot.ann.dafnet
-    mine = shot.bpy.data.actions.new("Mine")
+    ops, own = bpy.ops.dafnet, shot.ann.dafnet
+    mine = bpy.data.actions.new("Mine")
     shot.ann.animation_data_create().action = mine
     own.take_count = 3
     ops.generate()
     one, two, three = shot.listed()
-    assert mine.use_fake_user and "Mine" in shot.bpy.data.actions
+    assert mine.use_fake_user and "Mine" in bpy.data.actions
     ops.play_take(index=2)
     assert shot.ann.animation_data.action == three and own.active_take == 2
     assert np.abs(shot.played() - shot.motion(three)).max() < 2e-3
@@ -100,11 +87,7 @@ def test_takes_are_played_judged_and_renamed_and_none_is_lost(shot: Shot) -> Non
     three.name, three.dafnet.accepted = "The one", True
     own.active_take = 1
     ops.reject_take()
-    assert (
-        shot.listed() == [one, three]
-        and not two.use_fake_user
-        and two.name in shot.bpy.data.actions
-    )
+    assert shot.listed() == [one, three] and not two.use_fake_user and two.name in bpy.data.actions
     ops.keep_accepted()
     assert (
         shot.listed() == [three]
@@ -120,36 +103,36 @@ def test_takes_are_played_judged_and_renamed_and_none_is_lost(shot: Shot) -> Non
 
 def test_rejecting_the_take_that_plays_plays_another(shot: Shot) -> None:
     shot.ann.dafnet.take_count = 2
-    shot.bpy.ops.dafnet.generate()
+    bpy.ops.dafnet.generate()
     one, two = shot.listed()
-    shot.bpy.ops.dafnet.reject_take()
+    bpy.ops.dafnet.reject_take()
     assert (
         shot.ann.animation_data.action == two
         and shot.listed() == [two]
-        and one.name in shot.bpy.data.actions
+        and one.name in bpy.data.actions
     )
 
 
 def test_a_deleted_action_leaves_a_row_that_can_be_removed(shot: Shot) -> None:
     shot.ann.dafnet.take_count = 2
-    shot.bpy.ops.dafnet.generate()
-    shot.bpy.data.actions.remove(shot.listed()[1])
+    bpy.ops.dafnet.generate()
+    bpy.data.actions.remove(shot.listed()[1])
     assert len(shot.listed()) == 1 and len(shot.ann.dafnet.takes) == 2
     with pytest.raises(RuntimeError, match="was deleted"):
-        shot.bpy.ops.dafnet.play_take(index=1)
+        bpy.ops.dafnet.play_take(index=1)
     shot.ann.dafnet.active_take = 1
     for task in ("LEGS", "ONWARD"):
         with pytest.raises(RuntimeError, match="Choose a take"):
-            shot.bpy.ops.dafnet.generate(task=task)
-    shot.bpy.ops.dafnet.reject_take()
+            bpy.ops.dafnet.generate(task=task)
+    bpy.ops.dafnet.reject_take()
     assert len(shot.ann.dafnet.takes) == 1
 
 
 def test_legs_vary_under_the_same_upper_body(shot: Shot) -> None:
     shot.ann.dafnet.seed, shot.ann.dafnet.temperature = 4, 0.6
-    shot.bpy.ops.dafnet.generate()
+    bpy.ops.dafnet.generate()
     shot.ann.dafnet.seed, shot.ann.dafnet.temperature = 9, 0.0
-    shot.bpy.ops.dafnet.generate(task="LEGS")
+    bpy.ops.dafnet.generate(task="LEGS")
     first, second = shot.listed()
     assert (second.dafnet.seed, second.dafnet.lower_seed, round(second.dafnet.temperature, 3)) == (
         4,
@@ -158,36 +141,34 @@ def test_legs_vary_under_the_same_upper_body(shot: Shot) -> None:
     )
     apart = np.abs(shot.motion(first) - shot.motion(second)).mean(axis=(0, 2))
     assert apart[[4, 5, 7, 8]].mean() > apart[[9, 12, 15]].mean() > 0
-    shot.bpy.ops.dafnet.generate(task="LEGS")
+    bpy.ops.dafnet.generate(task="LEGS")
     assert shot.listed()[2].dafnet.lower_seed == 6
 
 
 def test_from_here_on_keeps_what_comes_before(shot: Shot) -> None:
-    shot.bpy.ops.dafnet.generate()
+    bpy.ops.dafnet.generate()
     first = shot.listed()[0]
     shot.ann.dafnet.seed, shot.ann.dafnet.temperature = 3, 1.5
     shot.scene.frame_set(40)
-    shot.bpy.ops.dafnet.generate(task="ONWARD")
+    bpy.ops.dafnet.generate(task="ONWARD")
     second = shot.listed()[1]
-    apart = np.abs(shot.takes.stored(first)[0].poses - shot.takes.stored(second)[0].poses).max(
-        axis=1
-    )[70:]
+    apart = np.abs(stored(first)[0].poses - stored(second)[0].poses).max(axis=1)[70:]
     assert apart[:28].max() < 1e-5 and apart[-3:].max() > 0.01 and shot.scene.frame_current == 40
     shot.scene.frame_set(200)
     with pytest.raises(RuntimeError, match="go to a frame in it"):
-        shot.bpy.ops.dafnet.generate(task="ONWARD")
+        bpy.ops.dafnet.generate(task="ONWARD")
 
 
 def test_from_here_on_counts_seconds_where_the_rate_has_changed(shot: Shot) -> None:
-    shot.bpy.ops.dafnet.generate()
+    bpy.ops.dafnet.generate()
     first = shot.listed()[0]
-    before = shot.takes.stored(first)[0]
+    before = stored(first)[0]
     shot.ann.dafnet.seed, shot.ann.dafnet.temperature = 3, 1.5
     shot.scene.render.fps *= 2
     at = shot.ann.dafnet.frame_end if not shot.ann.dafnet.use_scene_range else shot.scene.frame_end
     shot.scene.frame_set(at - 10)
-    shot.bpy.ops.dafnet.generate(task="ONWARD")
-    after = shot.takes.stored(shot.listed()[1])[0]
+    bpy.ops.dafnet.generate(task="ONWARD")
+    after = stored(shot.listed()[1])[0]
     assert after.fps == 2 * before.fps
     kept = (at - 10 - first.dafnet.frame_start) // 2
     assert np.abs(after.poses[:70] - before.poses[:70]).max() < 1e-5
@@ -204,51 +185,47 @@ def test_from_here_on_counts_seconds_where_the_rate_has_changed(shot: Shot) -> N
 def test_cleaned_again_makes_a_new_take_and_leaves_the_old(shot: Shot) -> None:
     own = shot.ann.dafnet
     own.plant_feet = 0.0
-    shot.bpy.ops.dafnet.generate()
+    bpy.ops.dafnet.generate()
     own.plant_feet = 1.0
     before = {
         name: np.array([p.co for p in c.keyframe_points]) for name, c in _curves(shot).items()
     }
-    assert shot.bpy.ops.dafnet.clean_again() == {"FINISHED"}
+    assert bpy.ops.dafnet.clean_again() == {"FINISHED"}
     raw, clean = shot.listed()
     assert shot.ann.animation_data.action == clean and clean.dafnet.sliding < raw.dafnet.sliding
     assert clean.dafnet.raw_sliding == pytest.approx(raw.dafnet.sliding)
-    assert np.abs(shot.takes.stored(raw)[0].poses - shot.takes.stored(clean)[0].poses).max() == 0
-    shot.bpy.ops.dafnet.play_take(index=0)
+    assert np.abs(stored(raw)[0].poses - stored(clean)[0].poses).max() == 0
+    bpy.ops.dafnet.play_take(index=0)
     after = {name: np.array([p.co for p in c.keyframe_points]) for name, c in _curves(shot).items()}
     assert all(np.array_equal(before[name], after[name]) for name in before)
 
 
 def test_takes_are_there_when_the_file_is_opened_again(shot: Shot, tmp_path: Path) -> None:
     shot.ann.dafnet.take_count = 2
-    shot.bpy.ops.dafnet.generate()
+    bpy.ops.dafnet.generate()
     motion = [shot.motion(action) for action in shot.listed()]
-    shot.bpy.ops.dafnet.play_take(index=1)
+    bpy.ops.dafnet.play_take(index=1)
     file = str(tmp_path / "takes.blend")
-    shot.bpy.ops.wm.save_as_mainfile(filepath=file)
-    shot.bpy.ops.wm.open_mainfile(filepath=file)
-    ann = shot.bpy.data.objects["Ann"]
-    takes = shot.takes.takes_of(ann)
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    ann = bpy.data.objects["Ann"]
+    takes = takes_of(ann)
     assert len(takes) == 2 and ann.animation_data.action == takes[1]
     for action, joints in zip(takes, motion, strict=True):
         assert np.abs(shot.motion(action) - joints).max() < 1e-6
-    shot.bpy.context.view_layer.objects.active = ann
-    assert shot.bpy.ops.dafnet.clean_again() == {"FINISHED"}, (
-        "what is needed to go on is in the file"
-    )
+    bpy.context.view_layer.objects.active = ann
+    assert bpy.ops.dafnet.clean_again() == {"FINISHED"}, "what is needed to go on is in the file"
 
 
 def test_all_takes_are_one_undo_step(shot: Shot) -> None:
     shot.ann.dafnet.take_count = 3
-    shot.bpy.ops.ed.undo_push(message="Before")
-    shot.bpy.ops.dafnet.generate("EXEC_DEFAULT", True)
-    assert len(shot.bpy.data.objects["Ann"].dafnet.takes) == 3
-    shot.bpy.ops.ed.undo()
-    assert len(shot.bpy.data.objects["Ann"].dafnet.takes) == 0 and not shot.bpy.data.actions.get(
-        "Ann take"
-    )
-    shot.bpy.ops.ed.redo()
-    assert len(shot.takes.takes_of(shot.bpy.data.objects["Ann"])) == 3
+    bpy.ops.ed.undo_push(message="Before")
+    bpy.ops.dafnet.generate("EXEC_DEFAULT", True)
+    assert len(bpy.data.objects["Ann"].dafnet.takes) == 3
+    bpy.ops.ed.undo()
+    assert len(bpy.data.objects["Ann"].dafnet.takes) == 0 and not bpy.data.actions.get("Ann take")
+    bpy.ops.ed.redo()
+    assert len(takes_of(bpy.data.objects["Ann"])) == 3
 
 
 def test_influence_and_blend_are_read_from_the_scene(shot: Shot) -> None:
@@ -258,75 +235,68 @@ def test_influence_and_blend_are_read_from_the_scene(shot: Shot) -> None:
     for frame, share in ((20, 0.0), (30, 1.0)):
         own.hand_left_influence = share
         own.keyframe_insert("hand_left_influence", frame=frame)
-    job, reader = (
-        shot.addon("dafnet_addon.blender.job"),
-        shot.addon("dafnet_addon.blender.scene_reader"),
-    )
-    read = reader.read_scene(shot.bpy.context, job.settings_of(shot.ann, shot.scene)).controls
+    read = shot.read().controls
     assert (
         read.hand_left_influence[[0, 9, 19, 44]].tolist() == [0, 0, 1, 1]
         and 0 < read.hand_left_influence[14] < 1
     )
     assert read.head_influence is None and read.blend == pytest.approx(0.2)
-    shot.bpy.ops.dafnet.generate()
-    shot.bpy.ops.dafnet.generate()
+    bpy.ops.dafnet.generate()
+    bpy.ops.dafnet.generate()
     assert any(c.data_path == "dafnet.hand_left_influence" for c in _curves(shot).values()), (
         "keys come along to the new action"
     )
 
 
 def test_an_engine_that_is_not_there_is_said(shot: Shot, monkeypatch: pytest.MonkeyPatch) -> None:
-    preferences = shot.bpy.context.preferences.addons["bl_ext.user_default.dafnet"].preferences
-    module = shot.addon("dafnet_addon.blender.preferences")
+    own = bpy.context.preferences.addons["bl_ext.user_default.dafnet"].preferences
     try:
-        preferences.engine = "mps"
+        own.engine = "mps"
         with pytest.raises(RuntimeError, match="preferences"):
-            shot.bpy.ops.dafnet.generate()
-        preferences.engine = "cpu"
-        monkeypatch.setattr(module.importlib.util, "find_spec", lambda name: None)
+            bpy.ops.dafnet.generate()
+        own.engine = "cpu"
+        monkeypatch.setattr(preferences.importlib.util, "find_spec", lambda name: None)
         with pytest.raises(RuntimeError, match="PyTorch is not installed"):
-            shot.bpy.ops.dafnet.generate()
+            bpy.ops.dafnet.generate()
     finally:
-        preferences.engine = "NUMPY"
+        own.engine = "NUMPY"
     assert not shot.listed()
 
 
 def _curves(shot: Shot) -> dict:
-    curves = shot.addon("dafnet_addon.blender.compat").action_curves(shot.ann)
+    curves = action_curves(shot.ann)
     return {(c.data_path, c.array_index): c for c in curves}
 
 
 @pytest.mark.parametrize("before", [True, False])
 def test_cancelled_between_two_bakes_none_is_left(shot: Shot, before: bool) -> None:
     if before:
-        shot.bpy.ops.dafnet.generate()
-    listed, actions = shot.listed(), {action.name for action in shot.bpy.data.actions}
-    job = shot.addon("dafnet_addon.blender.job")
-    steps = job.steps(shot.bpy.context, job.settings_of(shot.ann, shot.scene, take_count=4))
-    while {action.name for action in shot.bpy.data.actions} == actions:
+        bpy.ops.dafnet.generate()
+    listed, actions = shot.listed(), {action.name for action in bpy.data.actions}
+    steps = job.steps(bpy.context, job.settings_of(shot.ann, shot.scene, take_count=4))
+    while {action.name for action in bpy.data.actions} == actions:
         next(steps)
     next(steps)
     assert len(shot.listed()) == len(listed) + 2
     steps.close()
-    assert shot.listed() == listed and {action.name for action in shot.bpy.data.actions} == actions
+    assert shot.listed() == listed and {action.name for action in bpy.data.actions} == actions
     data = shot.ann.animation_data
     assert data.action in listed if before else data is None
 
 
 def test_deleted_between_two_bakes_none_is_left(shot: Shot) -> None:
-    actions = {action.name for action in shot.bpy.data.actions}
-    job = shot.addon("dafnet_addon.blender.job")
-    steps = job.steps(shot.bpy.context, job.settings_of(shot.ann, shot.scene, take_count=4))
-    while {action.name for action in shot.bpy.data.actions} == actions:
+    actions = {action.name for action in bpy.data.actions}
+    steps = job.steps(bpy.context, job.settings_of(shot.ann, shot.scene, take_count=4))
+    while {action.name for action in bpy.data.actions} == actions:
         next(steps)
-    shot.bpy.data.objects.remove(shot.ann)
-    with pytest.raises(shot.addon("dafnet_addon.core.errors").InputError, match="not in the scene"):
+    bpy.data.objects.remove(shot.ann)
+    with pytest.raises(InputError, match="not in the scene"):
         next(steps)
-    assert {action.name for action in shot.bpy.data.actions} == actions
+    assert {action.name for action in bpy.data.actions} == actions
 
 
 def test_presets_set_how_takes_are_made(shot: Shot) -> None:
-    own, folders = shot.ann.dafnet, shot.bpy.utils.preset_paths("dafnet")
+    own, folders = shot.ann.dafnet, bpy.utils.preset_paths("dafnet")
     shipped = {file.stem: file for folder in folders for file in Path(folder).glob("*.py")}
     assert {"calm", "lively", "raw", "tidy"} <= set(shipped)
     for name, expected in (
@@ -334,19 +304,15 @@ def test_presets_set_how_takes_are_made(shot: Shot) -> None:
         ("raw", (0.0, 1, 0.0, 0.0)),
         ("tidy", (0.0, 1, 1.0, 1.0)),
     ):
-        shot.bpy.ops.script.execute_preset(
-            filepath=str(shipped[name]), menu_idname="DAFNET_MT_presets"
-        )
+        bpy.ops.script.execute_preset(filepath=str(shipped[name]), menu_idname="DAFNET_MT_presets")
         assert (own.temperature, own.take_count, own.plant_feet, own.clear_furniture) == expected
     own.temperature = 0.7
-    assert shot.bpy.ops.dafnet.add_preset(name="Mine") == {"FINISHED"}
+    assert bpy.ops.dafnet.add_preset(name="Mine") == {"FINISHED"}
     own.temperature = 0.0
     mine = next(
-        file
-        for folder in shot.bpy.utils.preset_paths("dafnet")
-        for file in Path(folder).glob("Mine.py")
+        file for folder in bpy.utils.preset_paths("dafnet") for file in Path(folder).glob("Mine.py")
     )
-    shot.bpy.ops.script.execute_preset(filepath=str(mine), menu_idname="DAFNET_MT_presets")
+    bpy.ops.script.execute_preset(filepath=str(mine), menu_idname="DAFNET_MT_presets")
     assert own.temperature == pytest.approx(0.7)
     mine.unlink()
 
@@ -354,24 +320,22 @@ def test_presets_set_how_takes_are_made(shot: Shot) -> None:
 def test_full_copies_the_upper_body_of_a_take(shot: Shot) -> None:
     own = shot.ann.dafnet
     own.temperature, own.seed, own.plant_feet = 1.0, 2, 0.0
-    shot.bpy.ops.dafnet.generate()
+    bpy.ops.dafnet.generate()
     source = shot.listed()[0]
-    assert not shot.addon("dafnet_addon.blender.properties")._is_take(
-        own, shot.bpy.data.actions.new("Mine")
-    )
+    assert not _is_take(own, bpy.data.actions.new("Mine"))
     own.mode, own.upper_body_take, own.seed, own.temperature = "FULL", source, 8, 0.0
-    shot.bpy.ops.dafnet.generate()
-    upper = list(shot.addon("dafnet_addon.core.skeleton").UPPER)
+    bpy.ops.dafnet.generate()
+    upper = list(UPPER)
     apart = np.linalg.norm(
         shot.motion(source)[5:, upper] - shot.motion(shot.listed()[1])[5:, upper], axis=-1
     )
     assert apart.mean() < 0.02
     shot.scene.frame_end = 70
     with pytest.raises(RuntimeError, match="does not cover"):
-        shot.bpy.ops.dafnet.generate()
+        bpy.ops.dafnet.generate()
     shot.scene.frame_end, shot.scene.render.fps = 55, 24
     with pytest.raises(RuntimeError, match="30 frames a second, the scene 24"):
-        shot.bpy.ops.dafnet.generate()
+        bpy.ops.dafnet.generate()
 
 
 def _of_zeros(data: bytes) -> bytes:
@@ -394,20 +358,20 @@ def _of_zeros(data: bytes) -> bytes:
 def test_a_damaged_take_is_told_in_a_sentence_wherever_it_is_used(
     shot: Shot, spoil, words: str
 ) -> None:
-    shot.bpy.ops.dafnet.generate()
+    bpy.ops.dafnet.generate()
     own, take = shot.ann.dafnet, shot.listed()[0]
-    packed = shot.addon("dafnet_addon.blender.takes").PACKED
+    packed = PACKED
     data = spoil(take[packed])
     del take[packed]  # Blender writes over bytes that are there up to the first zero
     take[packed] = data
-    before, curves = [a.name for a in shot.bpy.data.actions], shot.played()
+    before, curves = [a.name for a in bpy.data.actions], shot.played()
     shot.scene.frame_set(30)
-    shot.addon("dafnet_addon.blender.overlay_data").drawings(shot.bpy.context, ("reach", "ghosts"))
+    drawings(bpy.context, ("reach", "ghosts"))
     uses = [
-        shot.bpy.ops.dafnet.clean_again,
-        lambda: shot.bpy.ops.dafnet.generate(task="LEGS"),
-        lambda: shot.bpy.ops.dafnet.generate(task="ONWARD"),
-        shot.bpy.ops.dafnet.mark_frames,
+        bpy.ops.dafnet.clean_again,
+        lambda: bpy.ops.dafnet.generate(task="LEGS"),
+        lambda: bpy.ops.dafnet.generate(task="ONWARD"),
+        bpy.ops.dafnet.mark_frames,
     ]
     for use in uses:
         with pytest.raises(RuntimeError) as caught:
@@ -421,7 +385,5 @@ def test_a_damaged_take_is_told_in_a_sentence_wherever_it_is_used(
         )
     own.mode, own.upper_body_take = "FULL", take
     with pytest.raises(RuntimeError, match="cannot be read"):
-        shot.bpy.ops.dafnet.generate()
-    assert [a.name for a in shot.bpy.data.actions] == before and np.array_equal(
-        shot.played(), curves
-    )
+        bpy.ops.dafnet.generate()
+    assert [a.name for a in bpy.data.actions] == before and np.array_equal(shot.played(), curves)

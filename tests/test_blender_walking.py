@@ -4,61 +4,41 @@ them.
 
 from types import ModuleType
 
+import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender import path_sources, root_keys, walking
+from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import sent
+from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
+from bl_ext.user_default.dafnet.dafnet_addon.blender.demo_room import build_room
+from bl_ext.user_default.dafnet.dafnet_addon.blender.examples import add_example
+from bl_ext.user_default.dafnet.dafnet_addon.blender.scene_reader import read_scene
+from bl_ext.user_default.dafnet.dafnet_addon.blender.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.core.conditions import shot_steps
+from bl_ext.user_default.dafnet.dafnet_addon.core.progress import drained
+
+from kit.stage import Stage
 
 
-class Room:
+class Room(Stage):
     """A character of 1.6 m, and a chair that looks at it from 3 m away, at 24 frames a second."""
 
-    def __init__(self, bpy: ModuleType, addon) -> None:
-        self.bpy, self.addon, self.scene = bpy, addon, bpy.context.scene
-        self.scene.render.fps, self.scene.frame_end = 24, 40
-        assert bpy.ops.dafnet.add_character(name="Ann", height=1.6) == {"FINISHED"}
-        self.ann = bpy.context.object
-        self.furniture = bpy.data.collections.new("Furniture")
-        self.scene.collection.children.link(self.furniture)
+    def __init__(self) -> None:
+        super().__init__(height=1.6, fps=24)
+        self.own.furniture = None
         self.chair = self.box("Chair", (-0.22, 3.0, 0.0), (0.22, 3.44, 0.45))
-        back = self.box("Back", (-0.22, 3.44, 0.0), (0.22, 3.48, 0.95))
-        back.parent = self.chair
-        self.root = self.ann.dafnet.root
-
-    def box(self, name: str, low: tuple[float, float, float], high: tuple[float, float, float]):
-        mesh = self.bpy.data.meshes.new(name)
-        corners = [
-            (x, y, z)
-            for x in (low[0], high[0])
-            for y in (low[1], high[1])
-            for z in (low[2], high[2])
-        ]
-        mesh.from_pydata(
-            corners,
-            [],
-            [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)],
-        )
-        made = self.bpy.data.objects.new(name, mesh)
-        self.furniture.objects.link(made)
-        return made
-
-    def select(self, *objects) -> None:
-        for o in self.scene.objects:
-            o.select_set(o in objects)
-        self.bpy.context.view_layer.objects.active = objects[0] if objects else None
-
-    def place(self, frame: float) -> np.ndarray:
-        self.scene.frame_set(int(frame))
-        return np.array([*self.root.location, self.root.rotation_euler[2]])
+        self.box("Back", (-0.22, 3.44, 0.0), (0.22, 3.48, 0.95), parent=self.chair)
 
 
 @pytest.fixture
-def room(blender, addon) -> Room:
-    return Room(blender, addon)
+def room(blender: ModuleType) -> Room:
+    return Room()
 
 
 def test_sent_to_a_chair_the_character_sits_on_it(room: Room) -> None:
     room.scene.frame_set(7)
     room.select(room.chair)
-    assert room.bpy.ops.dafnet.walk_to(goal="SEAT", seconds=2.0) == {"FINISHED"}
+    assert bpy.ops.dafnet.walk_to(goal="SEAT", seconds=2.0) == {"FINISHED"}
     assert room.ann.dafnet.furniture == room.furniture, "it had none"
     assert room.scene.frame_current == 7 and room.scene.frame_end > 80
     first, last = room.place(7), room.place(room.scene.frame_end)
@@ -70,7 +50,7 @@ def test_sent_to_a_chair_the_character_sits_on_it(room: Room) -> None:
         "it rests for two seconds"
     )
     room.select(room.ann)
-    assert room.bpy.ops.dafnet.generate() == {"FINISHED"}
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
     room.scene.frame_set(room.scene.frame_end)
     pelvis = room.ann.matrix_world @ room.ann.pose.bones["pelvis"].head
     assert abs(pelvis.z - (0.45 + 0.12 * 1.6 / 1.75)) < 0.1
@@ -78,12 +58,12 @@ def test_sent_to_a_chair_the_character_sits_on_it(room: Room) -> None:
 
 def test_walks_go_on_from_the_last_key_and_leave_the_earlier_ones(room: Room) -> None:
     room.select(room.chair, room.ann)
-    assert room.bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
+    assert bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
     end = room.scene.frame_end
     before = [room.place(frame) for frame in range(1, end + 1)]
     room.scene.cursor.location = (2.0, 1.0, 0.0)
     room.select(room.ann)
-    assert room.bpy.ops.dafnet.walk_to(goal="CURSOR", seconds=0.5) == {"FINISHED"}
+    assert bpy.ops.dafnet.walk_to(goal="CURSOR", seconds=0.5) == {"FINISHED"}
     assert np.allclose([room.place(frame) for frame in range(1, end + 1)], before, atol=1e-3)
     assert np.allclose(room.place(room.scene.frame_end)[:2], (2.0, 1.0), atol=1e-3)
     path = np.array([room.place(frame) for frame in range(1, room.scene.frame_end + 1)])
@@ -96,7 +76,7 @@ def test_walks_go_on_from_the_last_key_and_leave_the_earlier_ones(room: Room) ->
 def test_what_cannot_be_walked_to_changes_nothing(room: Room) -> None:
     def refused(words: str, goal: str = "SEAT") -> None:
         with pytest.raises(RuntimeError, match=words):
-            room.bpy.ops.dafnet.walk_to(goal=goal)
+            bpy.ops.dafnet.walk_to(goal=goal)
         assert not room.root.animation_data or not room.root.animation_data.action
         assert room.scene.frame_end == 40
 
@@ -106,7 +86,7 @@ def test_what_cannot_be_walked_to_changes_nothing(room: Room) -> None:
     room.ann.dafnet.furniture = room.furniture
     room.select(tower, room.ann)
     refused("'Tower' has no level surface")
-    other = room.bpy.data.collections.new("Other")
+    other = bpy.data.collections.new("Other")
     room.scene.collection.children.link(other)
     room.ann.dafnet.furniture = other
     other.objects.link(tower)
@@ -126,7 +106,6 @@ def test_what_cannot_be_walked_to_changes_nothing(room: Room) -> None:
 
 
 def test_it_sits_on_a_chair_that_physics_has_dropped(room: Room) -> None:
-    bpy = room.bpy
     floor = room.box("Floor", (-5.0, -1.0, -0.2), (5.0, 6.0, 0.0))
     for each in (room.chair, *room.chair.children):
         bpy.data.objects.remove(each)
@@ -152,7 +131,7 @@ def keyed(room: Room, frames: tuple[int, ...] = (1, 6)) -> list:
     for frame in frames:
         for path in ("location", "rotation_euler"):
             room.root.keyframe_insert(path, frame=frame, group="Way")
-    return room.addon("dafnet_addon.blender.compat").action_curves(room.root)
+    return action_curves(room.root)
 
 
 def locked(room: Room) -> None:
@@ -181,7 +160,7 @@ def sampled(room: Room) -> None:
 
 def linked(room: Room) -> None:
     keyed(room)
-    data, bpy = room.root.animation_data, room.bpy
+    data = room.root.animation_data
     name, slots = data.action.name, hasattr(data, "action_slot")
     file = str(room.folder / "way.blend")
     bpy.data.libraries.write(file, {data.action})
@@ -194,7 +173,7 @@ def linked(room: Room) -> None:
 
 def shared(room: Room) -> None:
     keyed(room)
-    other = room.bpy.data.objects.new("Other", None)
+    other = bpy.data.objects.new("Other", None)
     room.scene.collection.objects.link(other)
     mine, theirs = room.root.animation_data, other.animation_data_create()
     theirs.action = mine.action
@@ -257,11 +236,11 @@ def pushed(room: Room) -> None:
     ball = room.box("Ball", (0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
     room.scene.collection.objects.link(ball)
     room.furniture.objects.unlink(ball)
-    room.bpy.ops.rigidbody.world_add()
+    bpy.ops.rigidbody.world_add()
     room.select(ball)
-    room.bpy.ops.rigidbody.object_add()
+    bpy.ops.rigidbody.object_add()
     room.ann.dafnet.root = room.root = ball
-    room.bpy.context.view_layer.update()
+    bpy.context.view_layer.update()
 
 
 def animation(owner) -> tuple:
@@ -328,26 +307,25 @@ def test_a_root_that_cannot_be_keyed_is_said_and_left_alone(
     room.folder = tmp_path
     way(room)
     if button == "CURVE":
-        data = room.bpy.data.curves.new("Path", "CURVE")
+        data = bpy.data.curves.new("Path", "CURVE")
         data.dimensions = "3D"
         data.splines.new("POLY").points.add(1)
         data.splines[0].points[0].co, data.splines[0].points[1].co = (
             (0.0, 0.0, 0.0, 1.0),
             (-2.0, 0.0, 0.0, 1.0),
         )
-        curve = room.bpy.data.objects.new("Path", data)
+        curve = bpy.data.objects.new("Path", data)
         room.scene.collection.objects.link(curve)
     room.select(room.chair if button == "SEAT" else curve, room.ann)
     room.scene.frame_set(1)
-    before, actions = animation(room.root), {action.name for action in room.bpy.data.actions}
+    before, actions = animation(room.root), {action.name for action in bpy.data.actions}
     with pytest.raises(RuntimeError, match=words):
         if button == "SEAT":
-            room.bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0)
+            bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0)
         else:
-            room.bpy.ops.dafnet.walk_along_curve()
+            bpy.ops.dafnet.walk_along_curve()
     assert (
-        animation(room.root) == before
-        and {action.name for action in room.bpy.data.actions} == actions
+        animation(room.root) == before and {action.name for action in bpy.data.actions} == actions
     )
     assert (
         room.scene.frame_current == 1
@@ -365,7 +343,7 @@ def with_an_old_parent_inverse(room: Room) -> None:
 
 
 def where_only_needed_keys_are_wanted(room: Room) -> None:
-    room.bpy.context.preferences.edit.use_keyframe_insert_needed = True
+    bpy.context.preferences.edit.use_keyframe_insert_needed = True
 
 
 def with_an_active_keying_set(room: Room) -> None:
@@ -402,13 +380,11 @@ def test_what_does_not_move_the_root_does_not_keep_it_from_the_seat(room: Room, 
     way(room)
     room.select(room.chair, room.ann)
     try:
-        assert room.bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
+        assert bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
     finally:
-        room.bpy.context.preferences.edit.use_keyframe_insert_needed = False
+        bpy.context.preferences.edit.use_keyframe_insert_needed = False
     room.scene.frame_set(room.scene.frame_end)
-    place = room.root.evaluated_get(
-        room.bpy.context.evaluated_depsgraph_get()
-    ).matrix_world.translation
+    place = room.root.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation
     assert abs(place.x) < 0.05 and 3.1 < place.y < 3.35
 
 
@@ -416,7 +392,7 @@ def test_what_fails_while_it_is_keyed_leaves_the_root_as_it_was(
     room: Room, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also its action where that is an NLA strip as well, and a place that has no keys."""
-    keys = room.addon("dafnet_addon.blender.root_keys")
+    keys = root_keys
     keyed(room)
     data = room.root.animation_data
     data.action.use_fake_user = True
@@ -429,7 +405,7 @@ def test_what_fails_while_it_is_keyed_leaves_the_root_as_it_was(
         room.root.keyframe_insert("location", frame=50)
         room.root.keyframe_insert("scale", frame=50)
         raise ZeroDivisionError
-    assert animation(room.root) == before and len(room.bpy.data.actions) == 1
+    assert animation(room.root) == before and len(bpy.data.actions) == 1
     assert data.nla_tracks[0].strips[0].action == data.action and data.action.use_fake_user
     room.scene.frame_set(6)
     assert room.root.location.x == pytest.approx(0.0), "it plays"
@@ -441,21 +417,20 @@ def test_an_action_whose_slot_is_missing_gets_one(room: Room) -> None:
     if hasattr(data, "action_slot"):
         data.action_slot = None
     room.select(room.chair, room.ann)
-    assert room.bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
+    assert bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
     assert room.place(room.scene.frame_end)[1] > 3.0
 
 
 def test_the_panel_offers_the_selected_seat(room: Room) -> None:
-    sent = room.addon("dafnet_addon.blender.armature").sent
     room.select(room.chair)
-    assert sent(room.bpy.context) == (room.ann, room.chair)
+    assert sent(bpy.context) == (room.ann, room.chair)
     room.select(room.ann, room.chair)
-    assert sent(room.bpy.context) == (room.ann, room.chair)
+    assert sent(bpy.context) == (room.ann, room.chair)
     room.select(room.ann)
-    assert sent(room.bpy.context) == (room.ann, None)
-    room.bpy.ops.dafnet.add_character(name="Bob")
+    assert sent(bpy.context) == (room.ann, None)
+    bpy.ops.dafnet.add_character(name="Bob")
     room.select(room.chair)
-    assert sent(room.bpy.context)[0] is None and not room.bpy.ops.dafnet.walk_to.poll()
+    assert sent(bpy.context)[0] is None and not bpy.ops.dafnet.walk_to.poll()
 
 
 def _table(room: Room, near: float) -> None:
@@ -473,71 +448,55 @@ def test_a_chair_under_a_table_is_refused_before_anything_is_keyed(room: Room) -
         with pytest.raises(
             RuntimeError, match="'Table' stands where one comes to sit on 'Chair'; pull 'Chair' out"
         ):
-            room.bpy.ops.dafnet.walk_to(goal="SEAT")
+            bpy.ops.dafnet.walk_to(goal="SEAT")
         assert (
             not room.root.animation_data
             and room.ann.dafnet.furniture is None
             and room.scene.frame_end == 40
         )
-        room.bpy.data.objects.remove(room.bpy.data.objects["Table"])
+        bpy.data.objects.remove(bpy.data.objects["Table"])
     _table(room, 2.5)
-    assert room.bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
-    walking = room.addon("dafnet_addon.blender.walking")
-    assert walking.walk(room.bpy.context, room.ann, None).warnings == ()
+    assert bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
+    assert walking.walk(bpy.context, room.ann, None).warnings == ()
 
 
 def test_what_a_walk_leads_through_is_said(room: Room) -> None:
-    walking, sources = (
-        room.addon(f"dafnet_addon.blender.{name}") for name in ("walking", "path_sources")
-    )
     room.ann.dafnet.furniture = room.furniture
     _table(room, 2.0)
     room.scene.cursor.location = (0.0, 1.7, 0.0)
-    (warning,) = walking.walk(room.bpy.context, room.ann, None).warnings
+    (warning,) = walking.walk(bpy.context, room.ann, None).warnings
     assert "leads through furniture, 'Table' from frame" in warning
     room.root.animation_data_clear()
-    curve = room.bpy.data.curves.new("Line", "CURVE")
+    curve = bpy.data.curves.new("Line", "CURVE")
     curve.dimensions = "3D"
     points = curve.splines.new("POLY").points
     points.add(1)
     points[0].co, points[1].co = (0.0, 0.0, 0.0, 1.0), (0.0, 2.6, 0.0, 1.0)
-    line = room.bpy.data.objects.new("Line", curve)
+    line = bpy.data.objects.new("Line", curve)
     room.scene.collection.objects.link(line)
-    (warning,) = sources.along_curve(room.bpy.context, room.ann, line).warnings
+    (warning,) = path_sources.along_curve(bpy.context, room.ann, line).warnings
     assert "'Table' from frame" in warning
 
 
 @pytest.mark.parametrize("kind", ["DESK", "WHITEBOARD", "SOFA", "BED"])
-def test_examples_lead_through_nothing(blender, addon, kind: str) -> None:
-    examples, job, reader = (
-        addon(f"dafnet_addon.blender.{name}") for name in ("examples", "job", "scene_reader")
-    )
-    conditions, progress = (
-        addon(f"dafnet_addon.core.{name}") for name in ("conditions", "progress")
-    )
-    armature = examples.add_example(blender.context, kind)
-    read = reader.read_scene(blender.context, job.settings_of(armature, blender.context.scene))
-    shot = progress.drained(conditions.shot_steps(read.scene, read.controls))
+def test_examples_lead_through_nothing(blender, kind: str) -> None:
+    armature = add_example(blender.context, kind)
+    read = read_scene(blender.context, settings_of(armature, blender.context.scene))
+    shot = drained(shot_steps(read.scene, read.controls))
     assert not [warning for warning in shot.warnings if "runs through" in warning]
 
 
-def test_the_demo_leads_through_nothing(blender, addon) -> None:
-    demo_room, job, reader = (
-        addon(f"dafnet_addon.blender.{name}") for name in ("demo_room", "job", "scene_reader")
-    )
-    conditions, progress = (
-        addon(f"dafnet_addon.core.{name}") for name in ("conditions", "progress")
-    )
-    room = demo_room.build_room(blender.context)
-    read = reader.read_scene(blender.context, job.settings_of(room.armature, blender.context.scene))
-    shot = progress.drained(conditions.shot_steps(read.scene, read.controls))
+def test_the_demo_leads_through_nothing(blender) -> None:
+    room = build_room(blender.context)
+    read = read_scene(blender.context, settings_of(room.armature, blender.context.scene))
+    shot = drained(shot_steps(read.scene, read.controls))
     assert not [warning for warning in shot.warnings if "runs through" in warning]
 
 
 def test_scenes_of_the_wrong_unit_and_far_goals_are_refused_in_a_sentence(room: Room) -> None:
     def refused(words: str, goal: str) -> None:
         with pytest.raises(RuntimeError, match=words):
-            room.bpy.ops.dafnet.walk_to(goal=goal)
+            bpy.ops.dafnet.walk_to(goal=goal)
         assert not room.root.animation_data
 
     room.ann.dafnet.furniture = room.furniture

@@ -6,19 +6,19 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
+import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon import cli, demo
+from bl_ext.user_default.dafnet.dafnet_addon.blender.demo_room import build_room
 
 from dafnet_addon.cli import main
 from dafnet_addon.core.weights import load_weights
 from kit.places import ROOT
-
-Addon = Callable[[str], Any]
+from kit.stage import Stage, keys_of
 
 
 def test_wrong_command_lines_return_2_and_help_returns_0(
@@ -53,66 +53,42 @@ def test_info_says_what_a_file_is(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.fixture
-def scene_file(blender: ModuleType, addon: Addon, tmp_path: Path) -> Path:
+def scene_file(blender: ModuleType, tmp_path: Path) -> Path:
     """A character whose root walks a metre in 20 frames, beside a box to sit on, saved to a
     file.
     """
-    bpy = blender
-    bpy.context.scene.frame_end = 20
-    armature = addon("dafnet_addon.blender.armature").create_character(bpy.context)
-    root = armature.dafnet.root
-    for frame, y in ((1, 0.0), (20, 1.0)):
-        root.location.y = y
-        root.keyframe_insert("location", frame=frame)
-    furniture = bpy.data.collections.new("Furniture")
-    bpy.context.scene.collection.children.link(furniture)
-    mesh = bpy.data.meshes.new("Box")
-    corners = [(x, y, z) for x in (0.3, 0.7) for y in (0.8, 1.2) for z in (0.0, 0.45)]
-    mesh.from_pydata(
-        corners,
-        [],
-        [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)],
-    )
-    furniture.objects.link(bpy.data.objects.new("Box", mesh))
-    armature.dafnet.furniture = furniture
+    stage = Stage(frames=(1, 20))
+    stage.walk((1, 0.0), (20, 1.0))
+    stage.box("Box", (0.3, 0.8, 0.0), (0.7, 1.2, 0.45))
     file = tmp_path / "scene.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
     return file
 
 
-def keys(bpy: ModuleType, addon: Addon) -> dict[tuple[str, int], np.ndarray]:
-    """The key values of what the only armature plays, by data path and index."""
-    armature = next(ob for ob in bpy.context.scene.objects if ob.type == "ARMATURE")
-    found = {}
-    for curve in addon("dafnet_addon.blender.compat").action_curves(armature):
-        values = np.empty(2 * len(curve.keyframe_points))
-        curve.keyframe_points.foreach_get("co", values)
-        found[curve.data_path, curve.array_index] = values
-    return found
+def played() -> dict[tuple[str, int], np.ndarray]:
+    """The keys of what the only armature plays."""
+    return keys_of(next(ob for ob in bpy.context.scene.objects if ob.type == "ARMATURE"))
 
 
 def test_bake_saves_the_keys_that_the_operator_makes(
     blender: ModuleType,
-    addon: Addon,
     scene_file: Path,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    bpy = blender
     bpy.ops.wm.open_mainfile(filepath=str(scene_file))
     assert bpy.ops.dafnet.generate() == {"FINISHED"}
-    by_operator = keys(bpy, addon)
+    by_operator = played()
 
-    command = addon("dafnet_addon.cli").main
     out = tmp_path / "made" / "out.blend"
     capfd.readouterr()
-    assert command(["bake", str(scene_file), "-o", str(out), "--json"]) == 0
+    assert cli.main(["bake", str(scene_file), "-o", str(out), "--json"]) == 0
     report = json.loads(capfd.readouterr().out)
     assert {"reading", "conditions", "sampling", "baking"} <= set(report["seconds"])
     assert report["takes"][0]["frames"] == 20
 
     bpy.ops.wm.open_mainfile(filepath=str(out))
-    by_command = keys(bpy, addon)
+    by_command = played()
     assert by_command.keys() == by_operator.keys() and len(by_command) > 90
     for key, values in by_operator.items():
         np.testing.assert_array_equal(by_command[key], values, err_msg=str(key))
@@ -120,7 +96,6 @@ def test_bake_saves_the_keys_that_the_operator_makes(
 
 def test_several_takes_are_kept_and_the_first_one_plays(
     blender: ModuleType,
-    addon: Addon,
     scene_file: Path,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -140,7 +115,7 @@ def test_several_takes_are_kept_and_the_first_one_plays(
         "3:9",
         "--json",
     ]
-    assert addon("dafnet_addon.cli").main(arguments) == 0
+    assert cli.main(arguments) == 0
     takes = json.loads(capfd.readouterr().out)["takes"]
     made = [(take["seed"], take["temperature"], take["frames"]) for take in takes]
     assert made == [(5, 0.0, 7), (6, 1.0, 7), (7, 1.0, 7)]
@@ -184,7 +159,6 @@ def test_several_takes_are_kept_and_the_first_one_plays(
     ],
 )
 def test_bake_says_what_is_wrong(
-    addon: Addon,
     scene_file: Path,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -194,14 +168,13 @@ def test_bake_says_what_is_wrong(
     out = tmp_path / "out.blend"
     capfd.readouterr()
     filled = [argument.format(scene=scene_file, out=out) for argument in arguments]
-    assert addon("dafnet_addon.cli").main(["bake", *filled]) == 1
+    assert cli.main(["bake", *filled]) == 1
     assert said in capfd.readouterr().err
     assert not out.exists()
 
 
-def test_the_demo_room_has_its_seats_at_their_heights(blender: ModuleType, addon: Addon) -> None:
-    room = addon("dafnet_addon.blender.demo_room").build_room(blender.context)
-    demo = addon("dafnet_addon.demo")
+def test_the_demo_room_has_its_seats_at_their_heights(blender: ModuleType) -> None:
+    room = build_room(blender.context)
     blender.context.view_layer.update()
     depsgraph = blender.context.evaluated_depsgraph_get()
     furniture = {ob.name: ob for ob in blender.data.collections["Furniture"].objects}

@@ -6,32 +6,33 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon import cli
+from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import create_character
+from bl_ext.user_default.dafnet.dafnet_addon.blender.preview import render_film
 
 from dafnet_addon.cli import main
 from kit.places import ROOT
 from kit.processes import without_blenders
 
-Addon = Callable[[str], Any]
 _RUN = "import sys; sys.argv[0] = 'dafnet'; from dafnet_addon.cli import run; run()"
 
 
 @pytest.fixture(autouse=True)
-def _module_of_its_own(extension: str) -> None:
-    if __import__("bpy").app.binary_path:
+def _module_of_its_own(blender: ModuleType) -> None:
+    if blender.app.binary_path:
         pytest.skip("runs Blender's Python module in processes of its own")
 
 
 @pytest.fixture
-def scene(blender: ModuleType, addon: Addon, tmp_path: Path) -> Path:
+def scene(blender: ModuleType, tmp_path: Path) -> Path:
     """A file whose character, of a Japanese name, walks a metre in 20 frames."""
     blender.context.scene.frame_end = 20
-    armature = addon("dafnet_addon.blender.armature").create_character(blender.context, "花子")
+    armature = create_character(blender.context, "花子")
     for frame, y in ((1, 0.0), (20, 1.0)):
         armature.dafnet.root.location.y = y
         armature.dafnet.root.keyframe_insert("location", frame=frame)
@@ -143,7 +144,7 @@ runpy.run_module("dafnet_addon", run_name="__main__")
     assert names(tmp_path) == ["scene.blend"]
 
 
-def test_a_film_stops_at_a_frame(blender: ModuleType, addon: Addon, tmp_path: Path) -> None:
+def test_a_film_stops_at_a_frame(blender: ModuleType, tmp_path: Path) -> None:
     blender.context.scene.frame_end = 40
     blender.context.scene.camera = blender.data.objects.new(
         "Camera", blender.data.cameras.new("Camera")
@@ -157,13 +158,9 @@ def test_a_film_stops_at_a_frame(blender: ModuleType, addon: Addon, tmp_path: Pa
             raise KeyboardInterrupt(2)
 
     with pytest.raises(KeyboardInterrupt):
-        addon("dafnet_addon.blender.preview").render_film(
-            blender.context.scene, tmp_path / "film.mp4", 2, stop
-        )
+        render_film(blender.context.scene, tmp_path / "film.mp4", 2, stop)
     assert len(shares) == 3 and names(tmp_path) == []
-    addon("dafnet_addon.blender.preview").render_film(
-        blender.context.scene, tmp_path / "film.mp4", 10
-    )
+    render_film(blender.context.scene, tmp_path / "film.mp4", 10)
     assert names(tmp_path) == ["film.mp4"]
 
 
@@ -354,36 +351,35 @@ def test_values_of_other_commands(
         assert f"argument {value.partition('=')[0]}: " in capsys.readouterr().err.splitlines()[-1]
 
 
-def _refused(addon: Addon, capfd: pytest.CaptureFixture[str], *arguments: object) -> str:
+def _refused(capfd: pytest.CaptureFixture[str], *arguments: object) -> str:
     """The sentence with which ``bake`` refuses."""
     capfd.readouterr()
-    assert addon("dafnet_addon.cli").main(["bake", *map(str, arguments)]) == 1
+    assert cli.main(["bake", *map(str, arguments)]) == 1
     out, err = capfd.readouterr()
     assert out == ""
     return err.strip().splitlines()[-1]
 
 
-def _baked(addon: Addon, capfd: pytest.CaptureFixture[str], *arguments: object) -> Any:
+def _baked(capfd: pytest.CaptureFixture[str], *arguments: object) -> Any:
     """The report of ``bake``."""
     capfd.readouterr()
-    code = addon("dafnet_addon.cli").main(["bake", *map(str, arguments), "--json"])
+    code = cli.main(["bake", *map(str, arguments), "--json"])
     out, err = capfd.readouterr()
     assert code == 0, err
     return json.loads(out)
 
 
 def test_a_failed_bake_makes_no_folder(
-    addon: Addon, scene: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    scene: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     assert "no armature" in _refused(
-        addon, capfd, scene, "-o", tmp_path / "new" / "out.blend", "--character", "Nobody"
+        capfd, scene, "-o", tmp_path / "new" / "out.blend", "--character", "Nobody"
     )
     assert names(tmp_path) == ["scene.blend"]
 
 
 def test_a_character_in_another_scene(
     blender: ModuleType,
-    addon: Addon,
     scene: Path,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -393,43 +389,40 @@ def test_a_character_in_another_scene(
     blender.context.window.scene = other
     saved(blender, scene)
     out = tmp_path / "out.blend"
-    said = _refused(addon, capfd, scene, "-o", out)
+    said = _refused(capfd, scene, "-o", out)
     assert said.endswith(
         "The scene 'Empty' has no character; the scene 'Walk' has '花子': give --scene 'Walk'."
     )
-    assert "give --scene 'Walk'" in _refused(addon, capfd, scene, "-o", out, "--character", "花子")
+    assert "give --scene 'Walk'" in _refused(capfd, scene, "-o", out, "--character", "花子")
     assert "no scene 'Run'; choose one of 'Empty', 'Walk'" in _refused(
-        addon, capfd, scene, "-o", out, "--scene", "Run"
+        capfd, scene, "-o", out, "--scene", "Run"
     )
-    there = _baked(addon, capfd, scene, "-o", out, "--scene", "Walk")
+    there = _baked(capfd, scene, "-o", out, "--scene", "Walk")
     blender.ops.wm.open_mainfile(filepath=str(out))
     assert blender.context.scene.name == "Empty", "the active scene stays"
     blender.context.window.scene = blender.data.scenes["Walk"]
     saved(blender, scene)
-    here = _baked(addon, capfd, scene, "-o", out)
+    here = _baked(capfd, scene, "-o", out)
     assert [take["metrics"] for take in here["takes"]] == [
         take["metrics"] for take in there["takes"]
     ]
 
 
 def test_files_that_are_no_scenes(
-    addon: Addon, scene: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    scene: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     broken = tmp_path / "broken.blend"
     for content in (b"", b"hello", scene.read_bytes()[: len(scene.read_bytes()) // 2]):
         broken.write_bytes(content)
-        assert "is no file that Blender" in _refused(
-            addon, capfd, broken, "-o", tmp_path / "out.blend"
-        )
+        assert "is no file that Blender" in _refused(capfd, broken, "-o", tmp_path / "out.blend")
     assert "There is no file" in _refused(
-        addon, capfd, tmp_path / "none.blend", "-o", tmp_path / "out.blend"
+        capfd, tmp_path / "none.blend", "-o", tmp_path / "out.blend"
     )
     assert names(tmp_path) == ["broken.blend", "scene.blend"]
 
 
 def test_a_file_of_a_newer_blender(
     blender: ModuleType,
-    addon: Addon,
     scene: Path,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -444,14 +437,13 @@ def test_a_file_of_a_newer_blender(
         else raw[:at] + b"09" + raw[at + 2 :]
     )
     out = tmp_path / "out.blend"
-    assert "which is newer than this one" in _refused(addon, capfd, newer, "--in-place")
-    warnings = _baked(addon, capfd, newer, "-o", out)["warnings"]
+    assert "which is newer than this one" in _refused(capfd, newer, "--in-place")
+    warnings = _baked(capfd, newer, "-o", out)["warnings"]
     assert any("which is newer than this one, so that parts" in warning for warning in warnings)
 
 
 def test_what_the_scene_links(
     blender: ModuleType,
-    addon: Addon,
     scene: Path,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -466,23 +458,20 @@ def test_what_the_scene_links(
     blender.context.scene.collection.objects.link(wanted.objects[0])
     wanted.objects[0].library.filepath = "//library.blend"
     saved(blender, scene)
-    assert "is a library of the scene" in _refused(addon, capfd, scene, "-o", library)
+    assert "is a library of the scene" in _refused(capfd, scene, "-o", library)
     out = tmp_path / "deeper" / "out.blend"
-    assert not any(
-        "library" in warning for warning in _baked(addon, capfd, scene, "-o", out)["warnings"]
-    )
+    assert not any("library" in warning for warning in _baked(capfd, scene, "-o", out)["warnings"])
     blender.ops.wm.open_mainfile(filepath=str(out))
     (found,) = blender.data.libraries
     assert found.filepath == "//../library.blend" and not found.is_missing
     library.unlink()
-    warnings = _baked(addon, capfd, scene, "-o", out)["warnings"]
+    warnings = _baked(capfd, scene, "-o", out)["warnings"]
     assert any("The library '//library.blend' is missing" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("allowed", [False, True])
 def test_scripts_of_a_file_run_only_where_blender_lets_them(
     blender: ModuleType,
-    addon: Addon,
     scene: Path,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -497,7 +486,7 @@ def test_scripts_of_a_file_run_only_where_blender_lets_them(
     assert not preferences.use_scripts_auto_execute
     preferences.use_scripts_auto_execute = allowed
     try:
-        warnings = _baked(addon, capfd, scene, "-o", tmp_path / "out.blend")["warnings"]
+        warnings = _baked(capfd, scene, "-o", tmp_path / "out.blend")["warnings"]
     finally:
         preferences.use_scripts_auto_execute = False
     assert made.exists() == allowed

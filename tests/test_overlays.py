@@ -4,81 +4,59 @@ and survive everything.
 
 import ast
 from pathlib import Path
-from types import ModuleType
 
+import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender import overlay_data, overlay_faults, overlays
+from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay_cache import cache
+from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay_drawing import compose
+from bl_ext.user_default.dafnet.dafnet_addon.blender.takes import add_take
+from bl_ext.user_default.dafnet.dafnet_addon.core.generate import Draw
+from bl_ext.user_default.dafnet.dafnet_addon.core.root import RootPath
+from bl_ext.user_default.dafnet.dafnet_addon.core.sensor import RADIUS
+from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import REST
+from bl_ext.user_default.dafnet.dafnet_addon.core.solids import box_distance
+from bl_ext.user_default.dafnet.dafnet_addon.core.take import Controls, Take
+from bl_ext.user_default.dafnet.panels.overlays import DAFNET_PT_overlays
 
 from kit.panels import drawn_by
-
-CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+from kit.stage import Stage
 
 
-class Shot:
+class Shot(Stage):
     """A character in a scene of this unit scale, a box 40 cm to the left of its root, and takes
     that tests make up.
     """
 
-    def __init__(self, bpy: ModuleType, addon, unit: float = 1.0) -> None:
-        self.bpy, self.addon, self.scene, self.unit = bpy, addon, bpy.context.scene, unit
-        self.scene.unit_settings.scale_length = unit
-        self.scene.render.fps = 30
-        self.scene.frame_start, self.scene.frame_end = 1, 40
-        bpy.ops.dafnet.add_character(name="Ann")
-        self.ann = bpy.context.object
-        self.furniture = bpy.data.collections.new("Furniture")
-        self.scene.collection.children.link(self.furniture)
-        mesh = bpy.data.meshes.new("Box")
-        mesh.from_pydata([tuple(0.2 * c / unit for c in corner) for corner in CORNERS], [], FACES)
-        self.box = bpy.data.objects.new("Box", mesh)
-        self.box.location = (-0.4 / unit, 0.0, 0.3 / unit)
-        self.furniture.objects.link(self.box)
-        self.ann.dafnet.furniture = self.furniture
+    def __init__(self, unit: float = 1.0) -> None:
+        super().__init__(fps=30, unit=unit)
+        self.unit = unit
+        half = 0.2 / unit
+        self.cube = self.box(
+            "Box", (-half,) * 3, (half,) * 3, location=(-0.4 / unit, 0.0, 0.3 / unit)
+        )
         self.update()
 
-    @property
-    def data(self):
-        return self.addon("dafnet_addon.blender.overlay_data")
-
-    @property
-    def cache(self):
-        return self.addon("dafnet_addon.blender.overlay_cache").cache
-
-    @property
-    def faults(self):
-        return self.addon("dafnet_addon.blender.overlay_faults")
-
-    @property
-    def overlays(self):
-        return self.addon("dafnet_addon.blender.overlays")
-
     def update(self) -> None:
-        self.bpy.context.view_layer.update()
+        bpy.context.view_layer.update()
 
     def is_seen(self, *centre: float) -> bool:
         """Whether the spheres shown are those of the box with its centre there, metres."""
-        from dafnet_addon.core.sensor import RADIUS
-        from dafnet_addon.core.solids import box_distance
-
         (drawn,) = self.drawn("spheres")
         return len(drawn.beads) > 25 and bool(
             (box_distance(drawn.beads - centre, np.full(3, 0.2)) < RADIUS).all()
         )
 
     def drawn(self, kind: str) -> tuple:
-        return self.data.drawings(self.bpy.context, [kind]).get(kind, ())
+        return overlay_data.drawings(bpy.context, [kind]).get(kind, ())
 
     def add(self, joints: np.ndarray, start: int = 1, play: bool = True, **given):
         """An action that holds a take of these joints (T, 22, 3), metres."""
-        take_module, core = (
-            self.addon("dafnet_addon.core.take"),
-            self.addon("dafnet_addon.core.root"),
-        )
         frames = len(joints)
         action_shares = given.pop("action", np.full((frames, 10), 0.1))
-        path = core.RootPath(np.c_[joints[:, 0, :2], np.zeros(frames)], np.zeros(frames))
-        take = take_module.Take(
+        path = RootPath(np.c_[joints[:, 0, :2], np.zeros(frames)], np.zeros(frames))
+        take = Take(
             30.0,
             joints,
             np.tile([1.0, 0, 0, 0], (frames, 22, 1)),
@@ -88,12 +66,10 @@ class Shot:
             np.zeros((70 + frames, 66)),
             path,
         )
-        controls = take_module.Controls(30.0, path.matrices(), **given)
-        action = self.bpy.data.actions.new("Ann take")
-        draw = self.addon("dafnet_addon.core.generate").Draw(0, 0, 0.0, 0.0)
-        self.addon("dafnet_addon.blender.takes").add_take(
-            self.ann, action, take, controls, draw, start
-        )
+        controls = Controls(30.0, path.matrices(), **given)
+        action = bpy.data.actions.new("Ann take")
+        draw = Draw(0, 0, 0.0, 0.0)
+        add_take(self.ann, action, take, controls, draw, start)
         if play:
             self.ann.animation_data_create().action = action
         self.update()
@@ -101,29 +77,26 @@ class Shot:
 
 
 @pytest.fixture
-def shot(blender, addon):
-    made = Shot(blender, addon)
+def shot(blender):
+    made = Shot()
     yield made
-    for kind in made.data.KINDS:
-        made.overlays.switch(kind, False)
-    made.overlays.hide_live_pose()
-    made.overlays.hide_faults()
-    made.data.forget()
+    for kind in overlay_data.KINDS:
+        overlays.switch(kind, False)
+    overlays.hide_live_pose()
+    overlays.hide_faults()
+    overlay_data.forget()
 
 
 def standing(frames: int, speed: float = 0.0) -> np.ndarray:
     """Joints (T, 22, 3) of the rest pose, metres, that glides ahead by so many metres a frame."""
-    from dafnet_addon.core.skeleton import REST
-
     joints = np.tile(REST, (frames, 1, 1))
     joints[:, :, 1] += speed * np.arange(frames)[:, None]
     return joints
 
 
 def test_nothing_is_touched_before_a_switch_goes_on(shot: Shot) -> None:
-    bpy, overlays = shot.bpy, shot.overlays
     switches = bpy.context.window_manager.dafnet_overlays
-    assert not any(getattr(switches, kind) for kind in shot.data.KINDS)
+    assert not any(getattr(switches, kind) for kind in overlay_data.KINDS)
 
     def hooks() -> list[int]:
         told = [getattr(bpy.app.handlers, event) for event in overlays._LISTENERS]
@@ -140,11 +113,11 @@ def test_nothing_is_touched_before_a_switch_goes_on(shot: Shot) -> None:
     switches.circle = True
     assert hooks() == [2, len(overlays._LISTENERS)], "one hook for all"
     switches.path = switches.circle = False
-    assert hooks() == [0, 0] and not len(shot.cache)
+    assert hooks() == [0, 0] and not len(cache)
     overlays.show_live_pose(lambda: None)
     assert hooks() == [2, 0]
     overlays.hide_live_pose()
-    overlays.show_faults({1: shot.faults.Faults(np.ones(2), np.ones(2))})
+    overlays.show_faults({1: overlay_faults.Faults(np.ones(2), np.ones(2))})
     assert hooks() == [1, len(overlays._LISTENERS)]
     overlays.hide_faults()
     assert hooks() == [0, 0]
@@ -157,16 +130,15 @@ def test_nothing_is_touched_before_a_switch_goes_on(shot: Shot) -> None:
 
 
 def test_switches_live_in_no_file_and_outlast_another(shot: Shot, tmp_path) -> None:
-    bpy, overlays = shot.bpy, shot.overlays
     overlays.switch("ghosts", True)
-    overlays.show_faults({1: shot.faults.Faults(np.ones(2), np.ones(2))})
+    overlays.show_faults({1: overlay_faults.Faults(np.ones(2), np.ones(2))})
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "on.blend"))
     overlays.switch("ghosts", False)
     overlays.hide_faults()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "on.blend"))
     assert not bpy.context.window_manager.dafnet_overlays.ghosts and not overlays._drawers
     overlays.switch("ghosts", True)
-    overlays.show_faults({1: shot.faults.Faults(np.ones(2), np.ones(2))})
+    overlays.show_faults({1: overlay_faults.Faults(np.ones(2), np.ones(2))})
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "on.blend"))
     assert bpy.context.window_manager.dafnet_overlays.ghosts
     assert set(overlays._drawers) == {"scene", "corner"}, "faults are of the file that was left"
@@ -174,7 +146,6 @@ def test_switches_live_in_no_file_and_outlast_another(shot: Shot, tmp_path) -> N
 
 
 def test_unregistering_switches_off(shot: Shot) -> None:
-    bpy, overlays = shot.bpy, shot.overlays
     overlays.switch("spheres", True)
     overlays.show_live_pose(lambda: None)
     overlays.unregister()
@@ -193,8 +164,8 @@ def test_a_box_occupies_the_spheres_that_it_covers(shot: Shot, unit: float) -> N
     from dafnet_addon.core.solids import box_distance
 
     if unit != 1.0:
-        shot.bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-        shot = Shot(shot.bpy, shot.addon, unit)
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        shot = Shot(unit)
     (drawn,) = shot.drawn("spheres")
     centre = np.array((-0.4, 0.0, 0.3))
     occupied = np.clip(1.0 - box_distance(SPHERES - centre, np.full(3, 0.2)) / RADIUS, 0.0, 1.0)
@@ -210,43 +181,43 @@ def test_a_box_occupies_the_spheres_that_it_covers(shot: Shot, unit: float) -> N
 
 
 def test_spheres_go_with_the_root_and_the_furniture(shot: Shot) -> None:
-    shot.overlays.switch("spheres", True)
+    overlays.switch("spheres", True)
     before = shot.drawn("spheres")
     assert shot.drawn("spheres") is before, "nothing has changed"
-    read = list(shot.cache._results["furniture"].values())
+    read = list(cache._results["furniture"].values())
     root = shot.ann.dafnet.root
     root.rotation_euler.z = np.pi / 2
     shot.update()
     turned = shot.drawn("spheres")
-    assert turned is not before and list(shot.cache._results["furniture"].values()) == read, (
+    assert turned is not before and list(cache._results["furniture"].values()) == read, (
         "the furniture is not read again for it"
     )
     assert shot.is_seen(-0.4, 0.0, 0.3), "the box has not moved"
-    shot.box.location = (0.0, 0.5, 0.3)
+    shot.cube.location = (0.0, 0.5, 0.3)
     shot.update()
     assert shot.is_seen(0.0, 0.5, 0.3)
-    shot.box.hide_set(True)
+    shot.cube.hide_set(True)
     shot.update()
     assert not len(shot.drawn("spheres")[0].beads), "there is no furniture to be seen"
-    shot.box.hide_set(False)
+    shot.cube.hide_set(False)
     shot.ann.dafnet.furniture = None
     shot.update()
     assert not len(shot.drawn("spheres")[0].beads)
 
 
 def test_furniture_that_moves_over_time_is_seen_where_it_is(shot: Shot) -> None:
-    shot.overlays.switch("spheres", True)
+    overlays.switch("spheres", True)
     for frame, x in ((1, -0.4), (11, 0.4)):
-        shot.box.location.x = x
-        shot.box.keyframe_insert("location", frame=frame)
+        shot.cube.location.x = x
+        shot.cube.keyframe_insert("location", frame=frame)
     for frame, x in ((1, -0.4), (11, 0.4), (1, -0.4)):
         shot.scene.frame_set(frame)
         assert shot.is_seen(x, 0.0, 0.3)
 
 
 @pytest.mark.parametrize("unit", [1.0, 0.01])
-def test_the_root_path_is_the_takes_else_that_of_the_keys(blender, addon, unit: float) -> None:
-    shot = Shot(blender, addon, unit)
+def test_the_root_path_is_the_takes_else_that_of_the_keys(blender, unit: float) -> None:
+    shot = Shot(unit)
     root = shot.ann.dafnet.root
     assert shot.drawn("path") == (), "it is not animated"
     for frame, y in ((1, 0.0), (40, 2.0)):
@@ -254,7 +225,7 @@ def test_the_root_path_is_the_takes_else_that_of_the_keys(blender, addon, unit: 
         root.keyframe_insert("location", frame=frame)
         root.keyframe_insert("rotation_euler", frame=frame)
     shot.scene.frame_set(40)
-    shot.cache.note_edit(None)
+    cache.note_edit(None)
     (drawn,) = shot.drawn("path")
     assert np.allclose(unit * drawn.lines[38, 1], (0.0, 2.0, 0.01), atol=1e-5)
     tick = unit * (drawn.lines[39, 1] - drawn.lines[39, 0])
@@ -269,7 +240,7 @@ def test_the_root_path_is_the_takes_else_that_of_the_keys(blender, addon, unit: 
     )
     shot.ann.animation_data.action = None
     root.constraints.new("COPY_LOCATION")
-    shot.cache.note_edit(None)
+    cache.note_edit(None)
     assert shot.drawn("path") == (), "keys alone would tell a wrong way"
 
 
@@ -283,7 +254,7 @@ def test_planted_feet_and_collisions_are_marked(shot: Shot) -> None:
         (drawn,) = shot.drawn("marks")
         return drawn.beads[np.isclose(drawn.bead_colours[:, :3], colour).all(axis=1)]
 
-    shot.overlays.switch("marks", True)
+    overlays.switch("marks", True)
     shot.scene.frame_set(10)
     assert np.allclose(beads(green)[:, :2], joints[10, [10, 11], :2], atol=1e-5)
     shot.scene.frame_set(30)
@@ -291,10 +262,10 @@ def test_planted_feet_and_collisions_are_marked(shot: Shot) -> None:
     assert not len(beads(orange)) and not len(beads(red))
     beside = np.array((0.12, 0.0, 0.0))
     # its right side is 8 cm to the right of the left knee
-    shot.box.location = tuple(joints[0, 4] - beside)
+    shot.cube.location = tuple(joints[0, 4] - beside)
     shot.update()
     assert np.allclose(beads(red), joints[30, [4]], atol=1e-5)
-    shot.box.location.x -= 0.13
+    shot.cube.location.x -= 0.13
     shot.update()
     assert np.allclose(beads(orange), joints[30, [4]], atol=1e-5) and not len(beads(red)), (
         "5 cm from it"
@@ -363,30 +334,30 @@ def test_ghosts_are_the_other_takes_that_are_ticked(shot: Shot) -> None:
     ), "it waits"
 
 
-def test_the_live_pose_is_in_scene_units(blender, addon) -> None:
-    shot = Shot(blender, addon, 0.01)
-    (drawn,) = shot.data.live_pose(shot.bpy.context, standing(1)[0])
+def test_the_live_pose_is_in_scene_units(blender) -> None:
+    Shot(0.01)
+    (drawn,) = overlay_data.live_pose(bpy.context, standing(1)[0])
     assert drawn.lines.shape == (21, 2, 3) and np.allclose(
         drawn.lines[:, 1], 100.0 * standing(1)[0, 1:]
     )
 
 
 def test_what_is_deleted_while_it_is_shown_does_no_harm(shot: Shot) -> None:
-    bpy, kinds = shot.bpy, list(shot.data.KINDS)
+    kinds = list(overlay_data.KINDS)
     for kind in kinds:
-        shot.overlays.switch(kind, True)
+        overlays.switch(kind, True)
     ghost = shot.add(standing(20), play=False)
     ghost.dafnet.ghost = True
     shot.add(standing(20))
     shot.scene.frame_set(5)
 
     def shown() -> set[str]:
-        return {kind for kind, drawn in shot.data.drawings(bpy.context, kinds).items() if drawn}
+        return {kind for kind, drawn in overlay_data.drawings(bpy.context, kinds).items() if drawn}
 
     assert shown() == set(kinds)
     bpy.data.actions.remove(ghost)
     assert shown() == set(kinds) - {"ghosts"}
-    bpy.data.objects.remove(shot.box)
+    bpy.data.objects.remove(shot.cube)
     shot.update()
     assert shown() == set(kinds) - {"ghosts"} and not len(shot.drawn("spheres")[0].beads)
     bpy.data.actions.remove(shot.ann.animation_data.action)
@@ -395,16 +366,15 @@ def test_what_is_deleted_while_it_is_shown_does_no_harm(shot: Shot) -> None:
     shot.update()
     assert shown() == set()
     bpy.data.objects.remove(shot.ann)
-    assert shot.data.drawings(bpy.context, kinds) == {}
-    assert shot.overlays._wanted(bpy.context) == {}, "nor is there a view"
-    shot.overlays._draw_scene()
-    shot.overlays._draw_flat()
-    shot.overlays._draw_timeline()
+    assert overlay_data.drawings(bpy.context, kinds) == {}
+    assert overlays._wanted(bpy.context) == {}, "nor is there a view"
+    overlays._draw_scene()
+    overlays._draw_flat()
+    overlays._draw_timeline()
 
 
 def test_undo_leaves_overlays_on_and_right(shot: Shot) -> None:
-    bpy = shot.bpy
-    shot.overlays.switch("circle", True)
+    overlays.switch("circle", True)
     shot.add(standing(20), action=np.eye(10)[np.zeros(20, int)])
     shot.scene.frame_set(5)
     bpy.ops.ed.undo_push(message="Take")
@@ -414,22 +384,22 @@ def test_undo_leaves_overlays_on_and_right(shot: Shot) -> None:
     assert shot.drawn("circle") == ()
     bpy.ops.ed.undo()
     assert shot.drawn("circle")[1].line_colours[0, 3] == 1.0
-    assert shot.overlays.switched_on() == {"circle"}
+    assert overlays.switched_on() == {"circle"}
 
 
 def test_another_object_may_be_active(shot: Shot) -> None:
     shot.add(standing(20))
     shot.scene.frame_set(5)
-    objects = shot.bpy.context.view_layer.objects
-    objects.active = shot.box
-    assert shot.data.watched_character(shot.bpy.context) == shot.ann, "the only character"
+    objects = bpy.context.view_layer.objects
+    objects.active = shot.cube
+    assert overlay_data.watched_character(bpy.context) == shot.ann, "the only character"
     objects.active = shot.ann
-    shot.bpy.ops.dafnet.add_character(name="Bob")
-    assert shot.data.watched_character(shot.bpy.context).name == "Bob"
-    shot.bpy.ops.object.select_all(action="DESELECT")
-    objects.active = shot.box
-    shot.cache.note_edit(None)
-    assert shot.data.watched_character(shot.bpy.context).name == "Bob", (
+    bpy.ops.dafnet.add_character(name="Bob")
+    assert overlay_data.watched_character(bpy.context).name == "Bob"
+    bpy.ops.object.select_all(action="DESELECT")
+    objects.active = shot.cube
+    cache.note_edit(None)
+    assert overlay_data.watched_character(bpy.context).name == "Bob", (
         "the last one, while the furniture is worked on"
     )
 
@@ -440,35 +410,34 @@ def test_faulty_frames_are_marked_and_unmarked(shot: Shot) -> None:
     joints[15:, [10, 11], 1] += 0.1
     action = shot.add(joints, start=11)
     for frame, x in ((11, -0.4), (30, -0.4), (31, joints[0, 4, 0])):  # onto the left knee
-        shot.box.location = (x, 0.0, joints[0, 4, 2])
-        shot.box.keyframe_insert("location", frame=frame)
+        shot.cube.location = (x, 0.0, joints[0, 4, 2])
+        shot.cube.keyframe_insert("location", frame=frame)
     shot.scene.frame_set(17)
-    shot.bpy.context.view_layer.objects.active = shot.ann
-    assert shot.bpy.ops.dafnet.mark_frames() == {"FINISHED"}
-    faults = shot.overlays.shown_faults(action)
+    bpy.context.view_layer.objects.active = shot.ann
+    assert bpy.ops.dafnet.mark_frames() == {"FINISHED"}
+    faults = overlays.shown_faults(action)
     assert shot.scene.frame_current == 17
     assert np.flatnonzero(faults.sliding).tolist() == list(range(10, 15)) and set(
         faults.sliding[10:15]
     ) == {2}
     assert faults.collisions[:19].max() == 0 and faults.collisions[20:].min() >= 1
-    bars = shot.faults.fault_bars(faults, 11)
+    bars = overlay_faults.fault_bars(faults, 11)
     assert bars.first[0] == 21 and bars.last[0] == 25 and bars.row[0] == 0
     assert (
         bars.first[1] == 31
         and bars.last[bars.row == 1].max() == 40
         and bars.colours.shape == (len(bars.row), 4)
     )
-    assert set(shot.overlays._drawers) == {"timeline"}
-    assert shot.bpy.ops.dafnet.mark_frames() == {"FINISHED"}
-    assert shot.overlays.shown_faults(action) is None and not shot.overlays._drawers
+    assert set(overlays._drawers) == {"timeline"}
+    assert bpy.ops.dafnet.mark_frames() == {"FINISHED"}
+    assert overlays.shown_faults(action) is None and not overlays._drawers
     shot.ann.animation_data.action = None
-    assert not shot.bpy.ops.dafnet.mark_frames.poll()
+    assert not bpy.ops.dafnet.mark_frames.poll()
 
 
 def test_beads_are_closed_and_lit(shot: Shot) -> None:
-    compose = shot.addon("dafnet_addon.blender.overlay_drawing").compose
     drawn = compose(beads=[(np.array([[1.0, 2.0, 3.0]]), (1.0, 1.0, 1.0, 1.0), 0.5)])
-    corners, colours = shot.overlays.beads_of(drawn)
+    corners, colours = overlays.beads_of(drawn)
     faces = corners.reshape(8, 3, 3)
     normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     assert ((normals * (faces.mean(axis=1) - (1.0, 2.0, 3.0))).sum(-1) > 0).all(), (
@@ -489,14 +458,14 @@ def test_the_corner_avoids_the_sidebar(shot: Shot) -> None:
     area = type(
         "Area", (), {"regions": [window, Region("TOOLS", 100, 50), Region("UI", 700, 200)]}
     )()
-    assert shot.overlays.corner_of(area, window, 50.0) == (550.0, 50.0)
+    assert overlays.corner_of(area, window, 50.0) == (550.0, 50.0)
     area.regions[2].width, area.regions[2].x = 1, 899
-    assert shot.overlays.corner_of(area, window, 50.0) == (750.0, 50.0)
+    assert overlays.corner_of(area, window, 50.0) == (750.0, 50.0)
 
 
-def test_the_panel_draws_all_switches(shot: Shot, addon) -> None:
-    panel = addon("panels.overlays").DAFNET_PT_overlays
-    assert panel.poll(shot.bpy.context)
-    layout = drawn_by(panel, shot.bpy.context)
-    assert set(shot.data.KINDS) <= set(layout.words())
+def test_the_panel_draws_all_switches(shot: Shot) -> None:
+
+    assert DAFNET_PT_overlays.poll(bpy.context)
+    layout = drawn_by(DAFNET_PT_overlays, bpy.context)
+    assert set(overlay_data.KINDS) <= set(layout.words())
     assert any(options.get("depress") is False for _, _, options in layout.calls)

@@ -2,17 +2,21 @@
 for.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender.preview import (
+    look_at,
+    render_film,
+    render_sheet,
+)
 
 
 @pytest.fixture
-def sliding_cube(blender: ModuleType, addon: Callable[[str], Any]) -> Any:
+def sliding_cube(blender: ModuleType) -> Any:
     """A scene of six frames, in which a red cube slides from left to right before a camera."""
     bpy = blender
     scene = bpy.context.scene
@@ -28,7 +32,7 @@ def sliding_cube(blender: ModuleType, addon: Callable[[str], Any]) -> Any:
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(camera)
     scene.camera = camera
-    addon("dafnet_addon.blender.preview").look_at(camera, (0.0, -12.0, 0.0), (0.0, 0.0, 0.0))
+    look_at(camera, (0.0, -12.0, 0.0), (0.0, 0.0, 0.0))
     return scene
 
 
@@ -42,10 +46,10 @@ def red_column(cell: np.ndarray) -> float:
 
 
 def test_sheet_shows_its_frames_row_by_row(
-    blender: ModuleType, addon: Callable[[str], Any], sliding_cube: Any, tmp_path: Path
+    blender: ModuleType, sliding_cube: Any, tmp_path: Path
 ) -> None:
     file = tmp_path / "sheet.png"
-    addon("dafnet_addon.blender.preview").render_sheet(sliding_cube, file, [1, 6, 3], columns=2)
+    render_sheet(sliding_cube, file, [1, 6, 3], columns=2)
     image = blender.data.images.load(str(file))
     assert tuple(image.size) == (1280, 720)
     pixels = np.array(image.pixels[:]).reshape(720, 1280, 4)[::-1]
@@ -55,12 +59,12 @@ def test_sheet_shows_its_frames_row_by_row(
 
 
 def test_film_is_an_mp4_at_the_scenes_speed(
-    blender: ModuleType, addon: Callable[[str], Any], sliding_cube: Any, tmp_path: Path
+    blender: ModuleType, sliding_cube: Any, tmp_path: Path
 ) -> None:
     file = tmp_path / "film.mp4"
     seen: list[float] = []
     speed = sliding_cube.render.fps, sliding_cube.render.fps_base
-    addon("dafnet_addon.blender.preview").render_film(sliding_cube, file, 2, seen.append)
+    render_film(sliding_cube, file, 2, seen.append)
     assert file.read_bytes()[4:8] == b"ftyp"
     assert b"avc1" in file.read_bytes(), "H.264"
     clip = blender.data.movieclips.load(str(file))

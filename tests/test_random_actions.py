@@ -5,17 +5,19 @@ error is a sentence.
 from pathlib import Path
 from types import ModuleType
 
+import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender import job, running
+from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 
 
 class Careless:
     """Does things at random and remembers which actions there must be after each undo and redo."""
 
-    def __init__(self, bpy: ModuleType, addon, folder: Path, seed: int) -> None:
-        self.bpy, self.addon, self.folder = bpy, addon, folder
+    def __init__(self, folder: Path, seed: int) -> None:
+        self.folder = folder
         self.random = np.random.default_rng(seed)
-        self.job = addon("dafnet_addon.blender.job")
         self.errors = 0
         self.states: list[set[str]] = []
         self.at = -1
@@ -29,7 +31,7 @@ class Careless:
 
     @property
     def scene(self):
-        return self.bpy.context.scene
+        return bpy.context.scene
 
     def characters(self) -> list:
         return [o for o in self.scene.objects if o.type == "ARMATURE"]
@@ -39,25 +41,25 @@ class Careless:
         return of[self.random.integers(len(of))] if of else None
 
     def actions(self) -> set[str]:
-        return {action.name for action in self.bpy.data.actions}
+        return {action.name for action in bpy.data.actions}
 
     def remember(self) -> None:
         """An undo step, and the actions at it."""
-        self.bpy.ops.ed.undo_push(message="Careless")
+        bpy.ops.ed.undo_push(message="Careless")
         self.states = [*self.states[: self.at + 1], self.actions()]
         self.at = len(self.states) - 1
 
     def activate(self) -> bool:
         chosen = self.one(self.characters())
-        self.bpy.context.view_layer.objects.active = chosen
+        bpy.context.view_layer.objects.active = chosen
         return chosen is not None
 
     # What can be done; each leaves an undo step where it changes something.
 
     def add_character(self) -> None:
-        self.bpy.ops.dafnet.add_character(name=self.one(["Ann", "Bo"]))
-        own = self.bpy.context.object.dafnet
-        own.furniture = self.bpy.data.collections.get("Furniture")
+        bpy.ops.dafnet.add_character(name=self.one(["Ann", "Bo"]))
+        own = bpy.context.object.dafnet
+        own.furniture = bpy.data.collections.get("Furniture")
         for frame, y in ((1, 0.0), (12, float(self.random.uniform(0.1, 0.4)))):
             if own.root:
                 own.root.location.y = y
@@ -65,21 +67,21 @@ class Careless:
 
     def make_takes(self) -> None:
         if self.activate():
-            own = self.bpy.context.object.dafnet
+            own = bpy.context.object.dafnet
             own.take_count, own.temperature = (
                 int(self.random.integers(1, 4)),
                 float(self.random.uniform(0.0, 1.5)),
             )
             own.mode = self.one(["FREE", "FREE", "EE", "FULL"])
             before = self.actions()
-            self.bpy.ops.dafnet.generate(task=self.one(["NEW", "NEW", "LEGS", "ONWARD"]))
+            bpy.ops.dafnet.generate(task=self.one(["NEW", "NEW", "LEGS", "ONWARD"]))
             assert before < self.actions(), "every take is a new action"
 
     def cancel(self) -> None:
         character = self.one(self.characters())
         if character:
             before = self.actions()
-            steps = self.job.steps(self.bpy.context, self.job.settings_of(character, self.scene))
+            steps = job.steps(bpy.context, job.settings_of(character, self.scene))
             for _ in range(int(self.random.integers(1, 40))):
                 next(steps)
             steps.close()
@@ -91,7 +93,7 @@ class Careless:
         """
         character = self.one(self.characters())
         if character:
-            steps = self.job.steps(self.bpy.context, self.job.settings_of(character, self.scene))
+            steps = job.steps(bpy.context, job.settings_of(character, self.scene))
             next(steps)
             self.one([self.delete, self.rename, self.undo, self.new_rate])()
             for _ in steps:
@@ -99,33 +101,33 @@ class Careless:
 
     def play(self) -> None:
         if self.activate():
-            self.bpy.ops.dafnet.play_take(step="NEXT")
+            bpy.ops.dafnet.play_take(step="NEXT")
 
     def reject(self) -> None:
         if self.activate():
             before = self.actions()
-            self.bpy.ops.dafnet.reject_take()
+            bpy.ops.dafnet.reject_take()
             assert self.actions() == before, (
                 "a rejected take is there until the file is opened again"
             )
 
     def clean(self) -> None:
         if self.activate():
-            self.bpy.context.object.dafnet.plant_feet = float(self.random.uniform())
-            self.bpy.ops.dafnet.clean_again()
+            bpy.context.object.dafnet.plant_feet = float(self.random.uniform())
+            bpy.ops.dafnet.clean_again()
 
     def delete(self) -> None:
         victim = self.one(self.scene.objects)
         if victim:
-            self.bpy.data.objects.remove(victim)
+            bpy.data.objects.remove(victim)
 
     def delete_action(self) -> None:
-        victim = self.one(self.bpy.data.actions)
+        victim = self.one(bpy.data.actions)
         if victim:
-            self.bpy.data.actions.remove(victim)
+            bpy.data.actions.remove(victim)
 
     def rename(self) -> None:
-        victim = self.one([*self.scene.objects, *self.bpy.data.actions, *self.bpy.data.collections])
+        victim = self.one([*self.scene.objects, *bpy.data.actions, *bpy.data.collections])
         victim.name = f"Named {self.random.integers(1000)}"
 
     def new_rate(self) -> None:
@@ -133,21 +135,21 @@ class Careless:
 
     def undo(self) -> None:
         if self.at > 0:
-            self.bpy.ops.ed.undo()
+            bpy.ops.ed.undo()
             self.at -= 1
             assert self.actions() == self.states[self.at]
 
     def redo(self) -> None:
         if self.at + 1 < len(self.states):
-            self.bpy.ops.ed.redo()
+            bpy.ops.ed.redo()
             self.at += 1
             assert self.actions() == self.states[self.at]
 
     def reload(self) -> None:
-        kept = {action.name for action in self.bpy.data.actions if action.use_fake_user}
+        kept = {action.name for action in bpy.data.actions if action.use_fake_user}
         file = str(self.folder / "careless.blend")
-        self.bpy.ops.wm.save_as_mainfile(filepath=file)
-        self.bpy.ops.wm.open_mainfile(filepath=file)
+        bpy.ops.wm.save_as_mainfile(filepath=file)
+        bpy.ops.wm.open_mainfile(filepath=file)
         assert kept <= self.actions()
         self.states, self.at = [], -1
 
@@ -193,7 +195,7 @@ class Careless:
             name = "add_character"
         try:
             getattr(self, name)()
-        except (RuntimeError, self.addon("dafnet_addon.core.errors").InputError) as error:
+        except (RuntimeError, InputError) as error:
             said = str(error).removeprefix("Error: ").strip()
             grey = ".poll() " in said
             assert grey or (said.endswith(".") and "\n" not in said and "Traceback" not in said), (
@@ -206,12 +208,11 @@ class Careless:
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_a_hundred_random_actions(blender: ModuleType, addon, tmp_path: Path, seed: int) -> None:
+def test_a_hundred_random_actions(blender: ModuleType, tmp_path: Path, seed: int) -> None:
     handlers = blender.app.handlers
     lists = [value for name in dir(handlers) if isinstance(value := getattr(handlers, name), list)]
     registered = [list(each) for each in lists]
-    running = addon("dafnet_addon.blender.running")
-    user = Careless(blender, addon, tmp_path, seed)
+    user = Careless(tmp_path, seed)
     done = []
     for _ in range(100):
         done.append(user.act())

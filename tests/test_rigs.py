@@ -2,193 +2,67 @@
 convention; and back again.
 """
 
-import importlib
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import addon_utils
+import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender import (
+    compat,
+    onto_rig,
+    rig_properties,
+    rig_reading,
+    rigs,
+)
+from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import create_character, is_character
+from bl_ext.user_default.dafnet.dafnet_addon.blender.baker import bake
+from bl_ext.user_default.dafnet.dafnet_addon.blender.scene_reader import read_scene
+from bl_ext.user_default.dafnet.dafnet_addon.blender.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.core import (
+    kinematics,
+    retargeting,
+    rotations,
+    skeleton,
+)
+from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import JOINTS
+from bl_ext.user_default.dafnet.dafnet_addon.core.take import Take
+from bl_ext.user_default.dafnet.operators.bake_to_rig import DAFNET_OT_bake_to_rig
+from bl_ext.user_default.dafnet.panels.rig import DAFNET_PT_rig, DAFNET_UL_rig
 
 from kit import humanoids
 from kit.panels import Layout, drawn_by
 from kit.places import SHARED
+from kit.rig_stage import MEASURED, RigStage, made_takes
 
 CENTIMETRE = 0.01
-# What is measured, by bone: wrists, ankles, head, and the hip joints, whose middle is the pelvis'
-# place. Written out here so that a wrong map cannot hide.
-
-
-def sided(pattern: str, *words: str) -> list[str]:
-    return [pattern.format(word) for word in words]
-
-
-MEASURED: dict[str, dict[str, list[str]]] = {
-    "mixamo": {
-        "wrists": sided("mixamorig:{}Hand", "Left", "Right"),
-        "ankles": sided("mixamorig:{}Foot", "Left", "Right"),
-        "head": ["mixamorig:Head"],
-        "pelvis": sided("mixamorig:{}UpLeg", "Left", "Right"),
-    },
-    "rigify": {
-        "wrists": sided("DEF-hand.{}", "L", "R"),
-        "ankles": sided("DEF-foot.{}", "L", "R"),
-        "head": ["DEF-spine.006"],
-        "pelvis": sided("DEF-thigh.{}", "L", "R"),
-    },
-    "rigify_metarig": {
-        "wrists": sided("hand.{}", "L", "R"),
-        "ankles": sided("foot.{}", "L", "R"),
-        "head": ["spine.006"],
-        "pelvis": sided("thigh.{}", "L", "R"),
-    },
-    "smpl_x": {
-        "wrists": sided("{}_wrist", "left", "right"),
-        "ankles": sided("{}_ankle", "left", "right"),
-        "head": ["head"],
-        "pelvis": sided("{}_hip", "left", "right"),
-    },
-    "unreal": {
-        "wrists": sided("hand_{}", "l", "r"),
-        "ankles": sided("foot_{}", "l", "r"),
-        "head": ["head"],
-        "pelvis": sided("thigh_{}", "l", "r"),
-    },
-    "vrm": {
-        "wrists": sided("{}Hand", "left", "right"),
-        "ankles": sided("{}Foot", "left", "right"),
-        "head": ["head"],
-        "pelvis": sided("{}UpperLeg", "left", "right"),
-    },
-    "odd": {
-        "wrists": sided("Hand {}", "li", "re"),
-        "ankles": sided("Fuss {}", "li", "re"),
-        "head": ["Kopf"],
-        "pelvis": sided("Schenkel {}", "li", "re"),
-    },
-}
-JOINTS = {"wrists": (20, 21), "ankles": (7, 8), "head": (15,), "pelvis": (1, 2)}
 
 
 @pytest.fixture(scope="module")
-def takes(extension: str) -> dict[str, Any]:
-    """A walk, a sitting down on a box and a writing on a board, by the weights that ship."""
-
-    def module(name: str) -> Any:
-        return importlib.import_module(f"{extension}.dafnet_addon.core.{name}")
-
-    paths, solids, controls = module("paths"), module("solids"), module("take").Controls
-    weights = module("weights").load_weights()
-
-    def box(center: tuple, half_size: tuple) -> Any:
-        return solids.Scene(
-            (
-                solids.Box(
-                    center=np.array(center), half_size=np.array(half_size), rotation=np.eye(3)
-                ),
-            )
-        )
-
-    def made(scene: Any, root: Any, **given: Any) -> Any:
-        return module("generate").generate(
-            scene, controls(fps=30, root=root.path.matrices(), **given), weights, seed=0
-        )
-
-    walk = paths.route(paths.Stop((0, 0), 0.0, 0.2), (0.5, 0.9), paths.Stop((1.2, 1.4), -1.2, 0.2))
-    sit = paths.route(paths.Stop((0, 1.4), np.pi, 0.1), paths.Stop((0, 0.2), 0.0, 0.8, seated=True))
-    write = paths.route(paths.Stop((0, -0.7), 0.0, 0.1), paths.Stop((0, 0), 0.0, 1.2))
-    t = np.arange(len(write.path)) / 30
-    hand = np.stack([0.2 + 0.15 * np.sin(2 * t), 0 * t + 0.45, 1.35 + 0.08 * np.cos(3 * t)], axis=1)
-    return {
-        "walk": made(solids.Scene(()), walk),
-        "sit": made(box((0, 0.1, 0.22), (0.25, 0.25, 0.22)), sit),
-        "write": made(box((0, 0.5, 1.4), (0.6, 0.02, 0.4)), write, mode="EE", hand_right=hand),
-    }
+def takes() -> dict[str, Take]:
+    return made_takes()
 
 
 @pytest.fixture(scope="module", autouse=True)
 def without_rigify_afterwards() -> Iterator[None]:
     yield
-    addon_utils = sys.modules.get("addon_utils")
-    if addon_utils is not None and addon_utils.check("rigify")[1]:
+    if addon_utils.check("rigify")[1]:
         addon_utils.disable("rigify")
 
 
-class Stage:
-    """A scene with a character that plays a take, and a rig beside it."""
-
-    def __init__(self, bpy: ModuleType, addon: Callable[[str], Any], takes: dict[str, Any]) -> None:
-        self.bpy, self.addon, self.takes, self.scene = bpy, addon, takes, bpy.context.scene
-        self.rigs = addon("dafnet_addon.blender.rigs")
-        self.onto = addon("dafnet_addon.blender.onto_rig")
-        self.error = addon("dafnet_addon.core.errors").InputError
-        self.scene.render.fps = 30
-        self.ann = addon("dafnet_addon.blender.armature").create_character(bpy.context, "Ann")
-        self.take: Any = None
-
-    def play(self, kind: str) -> None:
-        self.take = self.takes[kind]
-        self.addon("dafnet_addon.blender.baker").bake(self.take, self.ann, 1, kind)
-
-    def build(self, kind: str, **body: Any) -> Any:
-        try:
-            return humanoids.BUILDERS[kind](self.bpy, **body)
-        except RuntimeError as error:
-            pytest.skip(f"Rigify does not run here: {error}")
-
-    def map(self, kind: str, rig: Any) -> Any:
-        if kind == "odd":
-            return self.rigs.RigMap("Odd", joints=humanoids.ODD, root="Wurzel")
-        return self.rigs.detected(rig)
-
-    def bake(self, kind: str, rig: Any, **options: Any) -> Any:
-        return self.onto.bake_onto_rig(
-            self.bpy.context, self.ann, rig, self.map(kind, rig), **options
-        )
-
-    def heads(self, rig: Any, names: list[str], frame: int) -> np.ndarray:
-        self.scene.frame_set(frame)
-        evaluated = rig.evaluated_get(self.bpy.context.evaluated_depsgraph_get())
-        return np.array(
-            [evaluated.matrix_world @ evaluated.pose.bones[name].head for name in names]
-        )
-
-    def played(self, rig: Any, names: list[str], step: int = 9) -> np.ndarray:
-        return np.array(
-            [self.heads(rig, names, frame) for frame in range(1, len(self.take) + 1, step)]
-        )
-
-    def errors(
-        self, kind: str, rig: Any, source: np.ndarray | None = None, step: int = 9
-    ) -> dict[str, np.ndarray]:
-        """Distances in every ``step``-th frame between the rig's bones and the source's joints."""
-        source = (self.take.joints if source is None else source)[::step]
-        found = {}
-        for part, names in MEASURED[kind].items():
-            off = self.played(rig, names, step) - source[:, JOINTS[part]]
-            found[part] = np.linalg.norm(
-                off.mean(axis=1, keepdims=True) if part == "pelvis" else off, axis=-1
-            )
-        return found
-
-
 @pytest.fixture
-def stage(blender: ModuleType, addon: Callable[[str], Any], takes: dict[str, Any]) -> Stage:
-    return Stage(blender, addon, takes)
+def stage(blender: ModuleType, takes: dict[str, Take]) -> RigStage:
+    return RigStage(takes)
 
 
-def test_a_body_of_its_own_keeps_the_motion(
-    addon: Callable[[str], Any], takes: dict[str, Any]
-) -> None:
+def test_a_body_of_its_own_keeps_the_motion(takes: dict[str, Take]) -> None:
     """Onto itself nothing changes; the same body at rest in an A-pose, with fewer joints, reaches
     the same places.
     """
-    retargeting, kinematics, rotations, skeleton = (
-        addon(f"dafnet_addon.core.{name}")
-        for name in ("retargeting", "kinematics", "rotations", "skeleton")
-    )
     take = takes["write"]
     frames = kinematics.global_from_local(rotations.matrix_from_quaternion(take.rotations))
     motion, body, root = (
@@ -218,7 +92,7 @@ GOLDEN = [(kind, "FK") for kind in MEASURED] + [("rigify", "IK")]
 
 
 @pytest.mark.parametrize(("kind", "limbs"), GOLDEN)
-def test_hands_feet_head_and_pelvis_land(stage: Stage, kind: str, limbs: str) -> None:
+def test_hands_feet_head_and_pelvis_land(stage: RigStage, kind: str, limbs: str) -> None:
     rig = stage.build(kind)
     for take in stage.takes:
         stage.play(take)
@@ -245,7 +119,7 @@ def test_hands_feet_head_and_pelvis_land(stage: Stage, kind: str, limbs: str) ->
     ],
 )
 def test_limbs_of_other_lengths_still_reach(
-    stage: Stage, kind: str, arms: float, legs: float
+    stage: RigStage, kind: str, arms: float, legs: float
 ) -> None:
     """Other legs make another size: the source is scaled about its root, but steps keep their
     length, and the head lies over the hips by the trunk's size. Short arms with long legs are left
@@ -271,7 +145,7 @@ def test_limbs_of_other_lengths_still_reach(
         assert errors["wrists"].mean() < CENTIMETRE
 
 
-def test_a_small_rig_plays_the_motion_at_its_size(stage: Stage) -> None:
+def test_a_small_rig_plays_the_motion_at_its_size(stage: RigStage) -> None:
     """Hips, head and hands at its height, feet on the floor below, the root's way unchanged."""
     stage.play("sit")
     rig = stage.build("mixamo")
@@ -314,15 +188,11 @@ TURNED = {  # hand and middle finger, foot and toe by side, head
 @pytest.mark.parametrize(
     ("kind", "limbs"), [("unreal", "FK"), ("mixamo", "FK"), ("rigify", "FK"), ("rigify", "IK")]
 )
-def test_hands_and_feet_turn_as_the_characters(stage: Stage, kind: str, limbs: str) -> None:
+def test_hands_and_feet_turn_as_the_characters(stage: RigStage, kind: str, limbs: str) -> None:
     """From A-pose as from T-pose: fingers point, soles tilt and faces look where the source's
     do.
     """
     stage.play("write")
-    skeleton = stage.addon("dafnet_addon.core.skeleton")
-    kinematics, rotations = (
-        stage.addon(f"dafnet_addon.core.{name}") for name in ("kinematics", "rotations")
-    )
     frames = kinematics.global_from_local(rotations.matrix_from_quaternion(stage.take.rotations))[
         60
     ]
@@ -339,16 +209,16 @@ def test_hands_and_feet_turn_as_the_characters(stage: Stage, kind: str, limbs: s
             skeleton.OFFSETS[skeleton.joint(f"{word}_foot")]
         )
         assert np.dot(rotations.normalised(toe - ankle), foot) > np.cos(np.radians(3))
-    evaluated = rig.evaluated_get(stage.bpy.context.evaluated_depsgraph_get())
+    evaluated = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
     turned = (evaluated.matrix_world @ evaluated.pose.bones[head].matrix).to_3x3().normalized()
     rest = upright @ np.array(rig.data.bones[head].matrix_local)[:3, :3]
     assert np.abs(np.array(turned) - frames[skeleton.joint("head")] @ rest).max() < 1e-3
 
 
-def test_hand_edits_are_baked(stage: Stage) -> None:
+def test_hand_edits_are_baked(stage: RigStage) -> None:
     stage.play("walk")
     arm = 'pose.bones["right_shoulder"].rotation_quaternion'
-    for curve in stage.addon("dafnet_addon.blender.compat").action_curves(stage.ann):
+    for curve in compat.action_curves(stage.ann):
         if curve.data_path == arm:
             curve.keyframe_points.foreach_set(
                 "co",
@@ -369,7 +239,7 @@ def test_hand_edits_are_baked(stage: Stage) -> None:
 
 
 @pytest.mark.parametrize("kind", ["unreal", "rigify", "odd"])
-def test_every_root_motion_gives_the_same_places(stage: Stage, kind: str) -> None:
+def test_every_root_motion_gives_the_same_places(stage: RigStage, kind: str) -> None:
     stage.play("walk")
     rig = stage.build(kind)
     rig.location, rig.rotation_euler = (0.3, -0.2, 0.0), (0.0, 0.0, 0.7)
@@ -377,7 +247,7 @@ def test_every_root_motion_gives_the_same_places(stage: Stage, kind: str) -> Non
     places = {}
     for motion in ("OBJECT", "BONE", "HIPS"):
         stage.bake(kind, rig, root_motion=motion)
-        places[motion] = stage.played(rig, names)
+        places[motion] = stage.bones(rig, names)
         root = {"unreal": "root", "rigify": "root", "odd": "Wurzel"}[kind]
         ways = [stage.heads(rig, [root], frame)[0] for frame in (1, len(stage.take))]
         assert (np.linalg.norm(ways[1] - ways[0]) > 1.0) == (motion != "HIPS")
@@ -392,14 +262,11 @@ def test_every_root_motion_gives_the_same_places(stage: Stage, kind: str) -> Non
     assert np.abs(places["HIPS"] - places["OBJECT"]).max() < 2e-3
 
 
-def test_units_of_the_scene(
-    blender: ModuleType, addon: Callable[[str], Any], takes: dict[str, Any]
-) -> None:
+def test_units_of_the_scene(blender: ModuleType, takes: dict[str, Take]) -> None:
     """In a scene of centimetres a Mixamo rig has the scale 1; errors are told in metres."""
-    blender.context.scene.unit_settings.scale_length = 0.01
-    stage = Stage(blender, addon, takes)
+    stage = RigStage(takes, unit=0.01)
     stage.take = takes["sit"]
-    addon("dafnet_addon.blender.baker").bake(stage.take, stage.ann, 1, "sit", 0.01)
+    bake(stage.take, stage.ann, 1, "sit", 0.01)
     rig = stage.build("mixamo")
     rig.scale = (1.0, 1.0, 1.0)
     baked = stage.bake("mixamo", rig)
@@ -408,10 +275,10 @@ def test_units_of_the_scene(
     assert max(mean for mean, _ in baked.errors.values()) < CENTIMETRE
 
 
-def test_a_parent_that_moves_is_undone(stage: Stage) -> None:
+def test_a_parent_that_moves_is_undone(stage: RigStage) -> None:
     stage.play("walk")
     rig = stage.build("mixamo")
-    cart = stage.bpy.data.objects.new("Cart", None)
+    cart = bpy.data.objects.new("Cart", None)
     stage.scene.collection.objects.link(cart)
     for frame, x in ((1, 0.0), (60, 3.0)):
         cart.location.x, cart.rotation_euler.z = x, x
@@ -425,25 +292,25 @@ def test_a_parent_that_moves_is_undone(stage: Stage) -> None:
         )
 
 
-def test_rotation_modes_give_the_same_pose(stage: Stage) -> None:
+def test_rotation_modes_give_the_same_pose(stage: RigStage) -> None:
     stage.play("sit")
     rig = stage.build("vrm")
     names = [bone.name for bone in rig.pose.bones]
     stage.bake("vrm", rig)
-    meant = stage.played(rig, names)
+    meant = stage.bones(rig, names)
     modes = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "AXIS_ANGLE")
     for shift in range(len(modes)):
         for k, bone in enumerate(rig.pose.bones):
             bone.rotation_mode = modes[(k + shift) % len(modes)]
         rig.rotation_mode = modes[shift]
         stage.bake("vrm", rig)
-        assert np.abs(stage.played(rig, names, 18) - meant[::2]).max() < 1e-3
+        assert np.abs(stage.bones(rig, names, 18) - meant[::2]).max() < 1e-3
     assert {bone.rotation_mode for bone in rig.pose.bones} == set(modes), (
         "the modes are the animator's"
     )
 
 
-def test_controls_that_are_turned_by_several_are_found_frame_by_frame(stage: Stage) -> None:
+def test_controls_that_are_turned_by_several_are_found_frame_by_frame(stage: RigStage) -> None:
     """Rigify's neck that follows the torso by half is rigid on nothing; the head lands and looks
     ahead all the same.
     """
@@ -451,17 +318,17 @@ def test_controls_that_are_turned_by_several_are_found_frame_by_frame(stage: Sta
     rig = stage.build("rigify")
     stage.bake("rigify", rig)
     names = ["DEF-spine.004", "DEF-spine.006", "DEF-hand.L"]
-    meant = stage.played(rig, names)
+    meant = stage.bones(rig, names)
     rig.animation_data_clear()
     rig.pose.bones["torso"]["neck_follow"] = rig.pose.bones["torso"]["head_follow"] = 0.5
-    detected = stage.rigs.detected(rig)
+    detected = rigs.detected(rig)
     follows = {kind: rows for kind, rows in detected.settings.items() if kind != "BOTH"}
     rig_map = type(detected)(**{**vars(detected), "settings": follows})
-    stage.onto.bake_onto_rig(stage.bpy.context, stage.ann, rig, rig_map)
-    assert np.abs(stage.played(rig, names) - meant).max() < CENTIMETRE
+    onto_rig.bake_onto_rig(bpy.context, stage.ann, rig, rig_map)
+    assert np.abs(stage.bones(rig, names) - meant).max() < CENTIMETRE
 
 
-def test_rigify_is_switched_and_old_poses_do_not_leak(stage: Stage) -> None:
+def test_rigify_is_switched_and_old_poses_do_not_leak(stage: RigStage) -> None:
     """An older action has keyed IK, the chest and a limb's parent; the new one plays right after
     it, whatever was shown.
     """
@@ -475,7 +342,6 @@ def test_rigify_is_switched_and_old_poses_do_not_leak(stage: Stage) -> None:
         rig.pose.bones[name].keyframe_insert("location", frame=1)
     mine = rig.animation_data.action
     baked = stage.bake("rigify", rig)
-    compat = stage.addon("dafnet_addon.blender.compat")
     compat.assign_action(rig, mine)
     stage.scene.frame_set(3)
     assert arm["IK_FK"] == 0.0 and rig.pose.bones["chest"].location.y == pytest.approx(0.2)
@@ -486,14 +352,13 @@ def test_rigify_is_switched_and_old_poses_do_not_leak(stage: Stage) -> None:
     assert arm["IK_FK"] == 0.0 and arm["pole_vector"]
 
 
-def test_earlier_actions_stay_as_they_are(stage: Stage) -> None:
+def test_earlier_actions_stay_as_they_are(stage: RigStage) -> None:
     stage.play("walk")
     rig = stage.build("mixamo")
     bone = rig.pose.bones["mixamorig:LeftArm"]
     for frame, angle in ((1, 0.0), (30, 0.7)):
         bone.rotation_quaternion = (np.cos(angle), np.sin(angle), 0.0, 0.0)
         bone.keyframe_insert("rotation_quaternion", frame=frame)
-    compat = stage.addon("dafnet_addon.blender.compat")
     mine = rig.animation_data.action
     before = [
         [tuple(point.co) for point in curve.keyframe_points] for curve in compat.action_curves(rig)
@@ -516,25 +381,25 @@ def test_earlier_actions_stay_as_they_are(stage: Stage) -> None:
     ] == before
 
 
-def test_what_cannot_be_baked_is_refused_and_left_alone(stage: Stage) -> None:
+def test_what_cannot_be_baked_is_refused_and_left_alone(stage: RigStage) -> None:
     stage.play("walk")
     rig = stage.build("mixamo")
     rig.pose.bones["mixamorig:Spine"].location = (1.0, 2.0, 3.0)
 
     def refused(match: str, rig: Any = rig, rig_map: Any = None, **options: Any) -> None:
         actions, pose = (
-            set(stage.bpy.data.actions),
+            set(bpy.data.actions),
             [bone.matrix_basis.copy() for bone in rig.pose.bones],
         )
-        with pytest.raises(stage.error, match=match) as caught:
-            stage.onto.bake_onto_rig(
-                stage.bpy.context, stage.ann, rig, rig_map or stage.rigs.detected(rig), **options
+        with pytest.raises(InputError, match=match) as caught:
+            onto_rig.bake_onto_rig(
+                bpy.context, stage.ann, rig, rig_map or rigs.detected(rig), **options
             )
         assert str(caught.value).count(". ") == 0
-        assert set(stage.bpy.data.actions) == actions and rig.animation_data is None
+        assert set(bpy.data.actions) == actions and rig.animation_data is None
         assert [bone.matrix_basis for bone in rig.pose.bones] == pose
 
-    detected = stage.rigs.detected(rig)
+    detected = rigs.detected(rig)
     joints = {joint: bone for joint, bone in detected.joints.items() if joint != "left_knee"}
     refused("no bone for the left knee", rig_map=type(detected)("Mine", joints=joints))
     refused(
@@ -558,23 +423,23 @@ def test_what_cannot_be_baked_is_refused_and_left_alone(stage: Stage) -> None:
     stage.ann.data.pose_position = "POSE"
 
 
-def test_an_object_that_drivers_move_is_refused(stage: Stage) -> None:
+def test_an_object_that_drivers_move_is_refused(stage: RigStage) -> None:
     stage.play("walk")
     rig = stage.build("mixamo")
     rig.driver_add("location", 0).driver.expression = "0.5"
-    with pytest.raises(stage.error, match="drivers"):
+    with pytest.raises(InputError, match="drivers"):
         stage.bake("mixamo", rig)
 
 
-def test_hips_beside_the_trunk_do_not_tear_it(stage: Stage) -> None:
+def test_hips_beside_the_trunk_do_not_tear_it(stage: RigStage) -> None:
     """A bone "pelvis" for the hips' own turns, and the trunk, both on "hip": the guess takes that;
     the other is refused.
 
     What was played before is played again then, in its own slot.
     """
     stage.play("walk")
-    rig = humanoids.mixamo(stage.bpy, prefix="")
-    stage.bpy.ops.object.mode_set(mode="EDIT")
+    rig = humanoids.mixamo(bpy, prefix="")
+    bpy.ops.object.mode_set(mode="EDIT")
     bones = rig.data.edit_bones
     for old, new in (
         ("Hips", "pelvis"),
@@ -586,8 +451,8 @@ def test_hips_beside_the_trunk_do_not_tear_it(stage: Stage) -> None:
     hip = bones.new("hip")
     hip.head, hip.tail = bones["pelvis"].head, bones["pelvis"].tail
     bones["pelvis"].parent = bones["abdomenLower"].parent = hip
-    stage.bpy.ops.object.mode_set(mode="OBJECT")
-    found = stage.rigs.detected(rig)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    found = rigs.detected(rig)
     assert (found.name, found.joints["pelvis"], found.joints["spine1"]) == (
         "Guessed",
         "hip",
@@ -600,19 +465,19 @@ def test_hips_beside_the_trunk_do_not_tear_it(stage: Stage) -> None:
     if slot is not None:
         mine.slots.new(id_type="OBJECT", name="Another")
     torn = type(found)("Mine", joints=found.joints | {"pelvis": "pelvis"})
-    with pytest.raises(stage.error, match="'pelvis' does not carry 'abdomenLower'"):
-        stage.onto.bake_onto_rig(stage.bpy.context, stage.ann, rig, torn)
+    with pytest.raises(InputError, match="'pelvis' does not carry 'abdomenLower'"):
+        onto_rig.bake_onto_rig(bpy.context, stage.ann, rig, torn)
     assert data.action == mine and getattr(data, "action_slot", None) == slot
     assert all(bone.matrix_basis == bone.matrix_basis.Identity(4) for bone in rig.pose.bones)
 
-    stage.onto.bake_onto_rig(stage.bpy.context, stage.ann, rig, found)
+    onto_rig.bake_onto_rig(bpy.context, stage.ann, rig, found)
     assert (
         np.abs(stage.heads(rig, ["Head", "LeftHand"], 30) - stage.take.joints[29, [15, 20]]).max()
         < CENTIMETRE
     )
 
 
-def test_constraints_that_move_keyed_bones_are_named(stage: Stage) -> None:
+def test_constraints_that_move_keyed_bones_are_named(stage: RigStage) -> None:
     stage.play("walk")
     rig = stage.build("mixamo")
     assert stage.bake("mixamo", rig).overruled == ()
@@ -637,24 +502,24 @@ DETECTED = {
 
 
 @pytest.mark.parametrize("kind", DETECTED)
-def test_conventions_are_detected(stage: Stage, kind: str) -> None:
+def test_conventions_are_detected(stage: RigStage, kind: str) -> None:
     rig = stage.build(kind)
-    found = stage.rigs.detected(rig)
+    found = rigs.detected(rig)
     assert (found.name, len(found.joints)) == DETECTED[kind]
-    assert not stage.addon("dafnet_addon.blender.armature").is_character(rig)
-    assert stage.addon("dafnet_addon.blender.armature").is_character(stage.ann)
+    assert not is_character(rig)
+    assert is_character(stage.ann)
 
 
 @pytest.mark.parametrize("prefix", ["", "mixamorig1:", "mixamorig_", "Mia:"])
-def test_prefixes_do_not_matter(stage: Stage, prefix: str) -> None:
-    found = stage.rigs.detected(humanoids.mixamo(stage.bpy, prefix=prefix))
+def test_prefixes_do_not_matter(stage: RigStage, prefix: str) -> None:
+    found = rigs.detected(humanoids.mixamo(bpy, prefix=prefix))
     assert (found.name, len(found.joints)) == ("Mixamo", 22)
     assert found.joints["left_hip"] == f"{prefix}LeftUpLeg"
 
 
-def test_five_spine_bones_of_unreal(stage: Stage) -> None:
-    rig = humanoids.unreal(stage.bpy, spines=5)
-    found = stage.rigs.detected(rig)
+def test_five_spine_bones_of_unreal(stage: RigStage) -> None:
+    rig = humanoids.unreal(bpy, spines=5)
+    found = rigs.detected(rig)
     assert found.name == "Unreal mannequin (UE5)" and found.joints["spine3"] == "spine_05"
     stage.play("write")
     stage.bake("unreal", rig)
@@ -679,9 +544,9 @@ GUESSED = {
 }
 
 
-def test_names_of_no_convention_are_guessed(stage: Stage) -> None:
-    rig = humanoids.mixamo(stage.bpy)
-    meant = stage.rigs.detected(rig).joints
+def test_names_of_no_convention_are_guessed(stage: RigStage) -> None:
+    rig = humanoids.mixamo(bpy)
+    meant = rigs.detected(rig).joints
     new = {}
     for joint, bone in meant.items():
         for word, side in (("Left", "L"), ("Right", "R")):
@@ -692,50 +557,47 @@ def test_names_of_no_convention_are_guessed(stage: Stage) -> None:
     new["left_ankle"], new["right_ankle"] = (
         rig.data.bones[new[f"{side}_ankle"]].name for side in ("left", "right")
     )
-    found = stage.rigs.detected(rig)
+    found = rigs.detected(rig)
     assert found.name == "Guessed"
     assert found.joints == new
 
 
 @pytest.fixture
-def user_maps(tmp_path: Path, addon: Callable[[str], Any], monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(
-        addon("dafnet_addon.blender.rigs"), "user_folder", lambda create=False: tmp_path
-    )
+def user_maps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(rigs, "user_folder", lambda create=False: tmp_path)
     return tmp_path
 
 
-def test_presets_are_saved_and_found_again(stage: Stage, user_maps: Path) -> None:
+def test_presets_are_saved_and_found_again(stage: RigStage, user_maps: Path) -> None:
     """By the operators: detect, correct by hand, save; another rig of these names is then detected,
     and can load it.
     """
-    properties = stage.addon("dafnet_addon.blender.rig_properties")
     rig = stage.build("odd")
-    stage.bpy.context.view_layer.objects.active = rig
-    assert stage.bpy.ops.dafnet.detect_rig() == {"FINISHED"}
+    bpy.context.view_layer.objects.active = rig
+    assert bpy.ops.dafnet.detect_rig() == {"FINISHED"}
     assert len(rig.dafnet_rig.rows) == 22
     for row in rig.dafnet_rig.rows:
         row.bone = humanoids.ODD.get(row.name, "")
     rig.dafnet_rig.root_bone = "Wurzel"
-    assert stage.bpy.ops.dafnet.save_rig_map(name="Otto's Rig") == {"FINISHED"}
+    assert bpy.ops.dafnet.save_rig_map(name="Otto's Rig") == {"FINISHED"}
     assert [file.suffix for file in user_maps.iterdir()] == [".json"]
-    other = humanoids.odd(stage.bpy)
-    found = stage.rigs.detected(other)
+    other = humanoids.odd(bpy)
+    found = rigs.detected(other)
     assert (found.name, found.joints, found.root) == ("Otto's Rig", humanoids.ODD, "Wurzel")
-    key = next(key for key, name, _ in properties.presets(None, None) if name == "Otto's Rig")
+    key = next(key for key, name, _ in rig_properties.presets(None, None) if name == "Otto's Rig")
     assert key.startswith("my_") and "mixamo" in {
-        key for key, _, _ in properties.presets(None, None)
+        key for key, _, _ in rig_properties.presets(None, None)
     }
-    stage.bpy.context.view_layer.objects.active = other
-    assert stage.bpy.ops.dafnet.load_rig_map(preset=key) == {"FINISHED"}
-    assert properties.map_of(other).joints == humanoids.ODD
+    bpy.context.view_layer.objects.active = other
+    assert bpy.ops.dafnet.load_rig_map(preset=key) == {"FINISHED"}
+    assert rig_properties.map_of(other).joints == humanoids.ODD
     (user_maps / "broken.json").write_text("{}", encoding="utf-8")
-    assert stage.rigs.detected(other).name == "Otto's Rig"
-    with pytest.raises(stage.error, match=r"'broken\.json'"):
-        stage.rigs.load_map(user_maps / "broken.json")
+    assert rigs.detected(other).name == "Otto's Rig"
+    with pytest.raises(InputError, match=r"'broken\.json'"):
+        rigs.load_map(user_maps / "broken.json")
 
 
-def test_the_panel_shows_a_row_for_each_joint(stage: Stage) -> None:
+def test_the_panel_shows_a_row_for_each_joint(stage: RigStage) -> None:
     """And offers to bake; the list is there once bones were detected."""
 
     def called(layout: Layout) -> list[tuple[str, ...]]:
@@ -744,43 +606,39 @@ def test_the_panel_shows_a_row_for_each_joint(stage: Stage) -> None:
         ]
 
     rig = stage.build("vrm")
-    stage.bpy.context.view_layer.objects.active = rig
-    panels = stage.addon("panels.rig")
-    drawn = called(drawn_by(panels.DAFNET_PT_rig, stage.bpy.context))
+    bpy.context.view_layer.objects.active = rig
+    drawn = called(drawn_by(DAFNET_PT_rig, bpy.context))
     assert ("operator", "dafnet.bake_to_rig") in drawn and not any(
         each[0] == "template_list" for each in drawn
     )
-    stage.bpy.ops.dafnet.detect_rig()
+    bpy.ops.dafnet.detect_rig()
     rig.dafnet_rig.root_motion = "BONE"
-    drawn = called(drawn_by(panels.DAFNET_PT_rig, stage.bpy.context))
+    drawn = called(drawn_by(DAFNET_PT_rig, bpy.context))
     assert (
         any(each[0] == "template_list" for each in drawn)
         and ("prop_search", "root_bone", "bones") in drawn
     )
     rows = Layout()
     for row in rig.dafnet_rig.rows:
-        panels.DAFNET_UL_rig.draw_item(
-            None, stage.bpy.context, rows, rig.dafnet_rig, row, 0, None, ""
-        )
+        DAFNET_UL_rig.draw_item(None, bpy.context, rows, rig.dafnet_rig, row, 0, None, "")
     assert called(rows).count(("prop_search", "bone", "bones")) == 22
 
 
-def test_presets_lie_in_the_extensions_folder(stage: Stage) -> None:
-    folder = stage.rigs.user_folder(create=True)
+def test_presets_lie_in_the_extensions_folder(stage: RigStage) -> None:
+    folder = rigs.user_folder(create=True)
     assert folder.is_dir() and "dafnet" in folder.parts and folder.name == "rig_maps"
-    assert stage.rigs.load_map(stage.rigs.map_files()["mixamo"]).name == "Mixamo"
+    assert rigs.load_map(rigs.map_files()["mixamo"]).name == "Mixamo"
 
 
-def test_a_corrected_row_of_rigify_keeps_the_rest(stage: Stage) -> None:
+def test_a_corrected_row_of_rigify_keeps_the_rest(stage: RigStage) -> None:
     """A control chosen by hand replaces the preset's, with its place; IK stays for the other limbs'
     controls only.
     """
     rig = stage.build("rigify")
-    properties = stage.addon("dafnet_addon.blender.rig_properties")
-    properties.show_map(rig, stage.rigs.detected(rig))
-    assert properties.map_of(rig) == stage.rigs.detected(rig)
+    rig_properties.show_map(rig, rigs.detected(rig))
+    assert rig_properties.map_of(rig) == rigs.detected(rig)
     rig.dafnet_rig.rows["left_wrist"].bone = "hand_tweak.L"
-    changed = properties.map_of(rig)
+    changed = rig_properties.map_of(rig)
     assert (
         changed.place("left_wrist") == "hand_tweak.L"
         and changed.place("right_wrist") == "ORG-hand.R"
@@ -788,18 +646,16 @@ def test_a_corrected_row_of_rigify_keeps_the_rest(stage: Stage) -> None:
     assert changed.limbs.keys() == {"right_arm", "left_leg", "right_leg"}
 
 
-def test_the_panel_and_the_button(stage: Stage) -> None:
+def test_the_panel_and_the_button(stage: RigStage) -> None:
     """One press bakes and reports; one undo takes it back. The character is the only one, the
     selected or the chosen one.
     """
-    bpy = stage.bpy
-    panel = stage.addon("panels.rig").DAFNET_PT_rig
     stage.play("walk")
     bpy.context.view_layer.objects.active = stage.ann
-    assert not panel.poll(bpy.context) and not bpy.ops.dafnet.bake_to_rig.poll()
+    assert not DAFNET_PT_rig.poll(bpy.context) and not bpy.ops.dafnet.bake_to_rig.poll()
     rig = stage.build("mixamo")
     bpy.context.view_layer.objects.active = rig
-    assert panel.poll(bpy.context) and bpy.ops.dafnet.bake_to_rig.poll()
+    assert DAFNET_PT_rig.poll(bpy.context) and bpy.ops.dafnet.bake_to_rig.poll()
     bpy.ops.ed.undo_push(message="Before")
     assert bpy.ops.dafnet.bake_to_rig() == {"FINISHED"}
     assert max(distances.mean() for distances in stage.errors("mixamo", rig).values()) < CENTIMETRE
@@ -810,7 +666,7 @@ def test_the_panel_and_the_button(stage: Stage) -> None:
     assert "Ann on Mixamo" not in bpy.data.actions
 
     ann = bpy.data.objects["Ann"]
-    bob = stage.addon("dafnet_addon.blender.armature").create_character(bpy.context, "Bob")
+    bob = create_character(bpy.context, "Bob")
     bob.select_set(False)
     rig = bpy.data.objects["Mixamo"]
     bpy.context.view_layer.objects.active = rig
@@ -824,32 +680,27 @@ def test_the_panel_and_the_button(stage: Stage) -> None:
 
 
 @pytest.mark.parametrize("kind", ["mixamo", "rigify", "odd"])
-def test_full_mode_copies_from_any_rig(stage: Stage, kind: str) -> None:
+def test_full_mode_copies_from_any_rig(stage: RigStage, kind: str) -> None:
     """The rig plays what Bob plays; Ann's upper body copied from either is the same within about a
     centimetre.
     """
-    bpy = stage.bpy
     stage.play("write")
     stage.ann.dafnet.root = None  # the source's root is found from its joints, as a rig's is
     bob, stage.ann = (
         stage.ann,
-        stage.addon("dafnet_addon.blender.armature").create_character(bpy.context, "Ann"),
+        create_character(bpy.context, "Ann"),
     )
     stage.ann, source = bob, stage.ann
     rig = stage.build(kind)
     stage.bake(kind, rig)
-    stage.addon("dafnet_addon.blender.rig_properties").show_map(rig, stage.map(kind, rig))
+    rig_properties.show_map(rig, stage.map(kind, rig))
     source.dafnet.mode = "FULL"
     stage.scene.frame_start, stage.scene.frame_end = 1, len(stage.take)
     read = {}
     for each in (bob, rig):
         source.dafnet.upper_body_source = each
-        settings = stage.addon("dafnet_addon.blender.settings").settings_of(source, stage.scene)
-        read[each.name] = (
-            stage.addon("dafnet_addon.blender.scene_reader")
-            .read_scene(bpy.context, settings)
-            .controls.upper_body
-        )
+        settings = settings_of(source, stage.scene)
+        read[each.name] = read_scene(bpy.context, settings).controls.upper_body
     off = np.linalg.norm(read[rig.name] - read[bob.name], axis=-1)
     # Without collars the chest turns with the reaching arm, and with it the heading that the root
     # is found from.
@@ -859,13 +710,13 @@ def test_full_mode_copies_from_any_rig(stage: Stage, kind: str) -> None:
     )
 
 
-def test_full_mode_refuses_what_it_does_not_know(stage: Stage) -> None:
-    rig = humanoids.odd(stage.bpy)
+def test_full_mode_refuses_what_it_does_not_know(stage: RigStage) -> None:
+    rig = humanoids.odd(bpy)
     stage.ann.dafnet.upper_body_source = rig
     stage.ann.dafnet.mode = "FULL"
-    settings = stage.addon("dafnet_addon.blender.settings").settings_of(stage.ann, stage.scene)
-    with pytest.raises(stage.error, match="'Odd' has no bone for the"):
-        stage.addon("dafnet_addon.blender.scene_reader").read_scene(stage.bpy.context, settings)
+    settings = settings_of(stage.ann, stage.scene)
+    with pytest.raises(InputError, match="'Odd' has no bone for the"):
+        read_scene(bpy.context, settings)
 
 
 ENDS = {
@@ -917,36 +768,34 @@ def seen_off(joints: np.ndarray, source: np.ndarray) -> dict[str, np.ndarray]:
 class World:
     """Where a rig's joints are in the room, and what FULL reads from it."""
 
-    def __init__(self, stage: Stage, rig: Any) -> None:
-        self.stage, self.rig, self.map = stage, rig, stage.rigs.detected(rig)
-        self.names = stage.addon("dafnet_addon.core.skeleton").JOINTS
+    def __init__(self, stage: RigStage, rig: Any) -> None:
+        self.stage, self.rig, self.map = stage, rig, rigs.detected(rig)
 
     def played(self, frames: range) -> np.ndarray:
-        known = [j for j, name in enumerate(self.names) if self.map.place(name)]
+        known = [j for j, name in enumerate(JOINTS) if self.map.place(name)]
         joints = np.full((len(frames), 22, 3), np.nan)
         joints[:, known] = [
-            self.stage.heads(self.rig, [self.map.place(self.names[j]) for j in known], f)
+            self.stage.heads(self.rig, [self.map.place(JOINTS[j]) for j in known], f)
             for f in frames
         ]
         return joints
 
     def read(self, frames: range) -> np.ndarray:
         """Joints (T, 22, 3) of the canonical body that moves as the rig does."""
-        reading = self.stage.addon("dafnet_addon.blender.rig_reading")
         bodies, poses = [], []
         for frame in frames:
             self.stage.scene.frame_set(frame)
-            evaluated = self.rig.evaluated_get(self.stage.bpy.context.evaluated_depsgraph_get())
+            evaluated = self.rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
             bodies.append(np.array(evaluated.matrix_world))
             poses.append(
-                reading.pose_matrices(evaluated, [self.map.place(name) for name in self.names])
+                rig_reading.pose_matrices(evaluated, [self.map.place(name) for name in JOINTS])
             )
-        return reading.joints_of(self.rig, self.map, np.array(bodies), np.array(poses), 1.0)[0]
+        return rig_reading.joints_of(self.rig, self.map, np.array(bodies), np.array(poses), 1.0)[0]
 
 
 @pytest.mark.parametrize("rest", humanoids.RESTS)
 @pytest.mark.parametrize("kind", ["mixamo", "unreal", "vrm"])
-def test_the_rest_pose_does_not_matter(stage: Stage, kind: str, rest: str) -> None:
+def test_the_rest_pose_does_not_matter(stage: RigStage, kind: str, rest: str) -> None:
     """Arms hanging or ahead, sitting, twisted, bent, leaning: limbs, trunk and head lie in the room
     as the character's.
 
@@ -954,7 +803,7 @@ def test_the_rest_pose_does_not_matter(stage: Stage, kind: str, rest: str) -> No
     """
     stage.play("write")
     rig = stage.build(kind)
-    humanoids.rested(stage.bpy, rig, *humanoids.rest_pose(rest, stage.rigs.detected(rig).joints))
+    humanoids.rested(bpy, rig, *humanoids.rest_pose(rest, rigs.detected(rig).joints))
     baked = stage.bake(kind, rig)
     for part, distances in stage.errors(kind, rig).items():
         assert distances.mean() < CENTIMETRE, part
@@ -968,21 +817,21 @@ def test_the_rest_pose_does_not_matter(stage: Stage, kind: str, rest: str) -> No
 
 
 @pytest.mark.parametrize("size", [0.01, 1.0, 100.0])
-def test_bones_may_point_anywhere_and_objects_stand_anyhow(stage: Stage, size: float) -> None:
+def test_bones_may_point_anywhere_and_objects_stand_anyhow(stage: RigStage, size: float) -> None:
     """Random tails and rolls, an object of any scale that is turned: nothing of it is seen."""
     stage.play("write")
     rig = stage.build("vrm")
     rng = np.random.default_rng(5)
-    stage.bpy.context.view_layer.objects.active = rig
-    stage.bpy.ops.object.mode_set(mode="EDIT")
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
     for bone in rig.data.edit_bones:
         bone.use_connect = False
-    turn = stage.addon("dafnet_addon.core.rotations").matrix_from_vector(np.array([0.4, -1.1, 0.6]))
+    turn = rotations.matrix_from_vector(np.array([0.4, -1.1, 0.6]))
     for bone in rig.data.edit_bones:
         head = turn @ np.array(bone.head) / size
         bone.head, bone.tail = head, head + 0.1 * rng.normal(size=3) / size
         bone.roll = rng.uniform(-3.0, 3.0)
-    stage.bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.ops.object.mode_set(mode="OBJECT")
     rig.scale = (size,) * 3
     rig.rotation_euler = (0.7, 0.2, -2.0)
     stage.bake("vrm", rig)
@@ -1002,19 +851,19 @@ BVH = [
 ]
 
 
-def imported(stage: Stage, name: str) -> Any:
+def imported(stage: RigStage, name: str) -> Any:
     """A real BVH as Blender's own importer brings it in, in metres."""
     file = SHARED / "mocap" / "raw_samples" / f"{name}.bvh"
     if not file.is_file():
         pytest.skip(f"needs the motion file {file}")
-    if not hasattr(stage.bpy.ops.import_anim, "bvh"):
+    if not hasattr(bpy.ops.import_anim, "bvh"):
         pytest.skip("this Blender has no importer of BVH")
-    stage.bpy.ops.import_anim.bvh(filepath=str(file), global_scale=0.01)
-    return stage.bpy.context.object
+    bpy.ops.import_anim.bvh(filepath=str(file), global_scale=0.01)
+    return bpy.context.object
 
 
 @pytest.mark.parametrize("name", BVH)
-def test_full_mode_reads_real_imports_as_they_are_seen(stage: Stage, name: str) -> None:
+def test_full_mode_reads_real_imports_as_they_are_seen(stage: RigStage, name: str) -> None:
     """Whatever pose they rest in: trunks bent by a right angle, arms ahead, legs astride, collars
     on one side only.
     """
@@ -1047,12 +896,12 @@ REAL = {
 
 @pytest.mark.parametrize("name", REAL)
 @pytest.mark.parametrize("take", ["walk", "sit", "write"])
-def test_real_characters_keep_the_motions_shape(stage: Stage, name: str, take: str) -> None:
+def test_real_characters_keep_the_motions_shape(stage: RigStage, name: str, take: str) -> None:
     """And the report says what an eye sees."""
     file = SHARED / "rigs" / f"{name}.json"
     if not file.is_file():
         pytest.skip(f"needs the rest pose {file}")
-    rig = humanoids.of_file(stage.bpy, file)
+    rig = humanoids.of_file(bpy, file)
     stage.play(take)
     baked = stage.bake(name, rig)
     assert baked.errors["ankles"][0] < CENTIMETRE, (
@@ -1081,19 +930,16 @@ def test_real_characters_keep_the_motions_shape(stage: Stage, name: str, take: s
 
 
 @pytest.mark.parametrize("rest", humanoids.RESTS)
-def test_hands_feet_and_face_turn_the_same_from_any_rest_pose(stage: Stage, rest: str) -> None:
+def test_hands_feet_and_face_turn_the_same_from_any_rest_pose(stage: RigStage, rest: str) -> None:
     """Fingers, palms, soles and face as the character's in the room, by where bones are that nobody
     keyed.
     """
     stage.play("write")
-    kinematics, rotations, skeleton = (
-        stage.addon(f"dafnet_addon.core.{name}") for name in ("kinematics", "rotations", "skeleton")
-    )
     frames = kinematics.global_from_local(rotations.matrix_from_quaternion(stage.take.rotations))[
         60
     ]
     rig = stage.build("mixamo")
-    humanoids.rested(stage.bpy, rig, *humanoids.rest_pose(rest, stage.rigs.detected(rig).joints))
+    humanoids.rested(bpy, rig, *humanoids.rest_pose(rest, rigs.detected(rig).joints))
     stage.bake("mixamo", rig)
 
     def way(start: str, end: str) -> np.ndarray:
@@ -1116,7 +962,7 @@ def test_hands_feet_and_face_turn_the_same_from_any_rest_pose(stage: Stage, rest
     )
 
 
-def test_full_mode_tells_what_it_cannot_follow(stage: Stage) -> None:
+def test_full_mode_tells_what_it_cannot_follow(stage: RigStage) -> None:
     """A trunk folded by bones that the map does not know: in words, per limb, in degrees; nothing
     where all is followed.
     """
@@ -1125,53 +971,43 @@ def test_full_mode_tells_what_it_cannot_follow(stage: Stage) -> None:
     stage.ann.dafnet.upper_body_source = rig
     stage.ann.dafnet.mode = "FULL"
     stage.scene.frame_start, stage.scene.frame_end = 1, 20
-    settings, reader = (
-        stage.addon(f"dafnet_addon.blender.{name}") for name in ("settings", "scene_reader")
-    )
 
     def warnings() -> str:
-        return " ".join(
-            reader.read_scene(
-                stage.bpy.context, settings.settings_of(stage.ann, stage.scene)
-            ).warnings
-        )
+        return " ".join(stage.read().warnings)
 
     rig.pose.bones["mixamorig:Spine1"].rotation_quaternion = (0.966, 0.259, 0.0, 0.0)
     assert "is followed" not in warnings()
-    known = stage.rigs.detected(rig)
+    known = rigs.detected(rig)
     joints = {
         joint: bone
         for joint, bone in known.joints.items()
         if "spine" not in joint and "collar" not in joint
     }
-    stage.addon("dafnet_addon.blender.rig_properties").show_map(
-        rig, type(known)("Mine", joints=joints)
-    )
+    rig_properties.show_map(rig, type(known)("Mine", joints=joints))
     rig.pose.bones["mixamorig:Spine1"].rotation_quaternion = (0.383, 0.0, 0.924, 0.0)
     assert "'Mixamo' is followed, but the trunk by" in warnings() and "degrees off" in warnings()
 
 
-def test_a_bake_that_is_off_is_warned_about(stage: Stage) -> None:
+def test_a_bake_that_is_off_is_warned_about(stage: RigStage) -> None:
     """Long arms: the hands land, so the elbows are bent, and the report names the arms in
     degrees.
     """
     stage.play("walk")
     rig = stage.build("mixamo", arms=1.2)
-    stage.bpy.context.view_layer.objects.active = rig
+    bpy.context.view_layer.objects.active = rig
     messages: list[tuple[set[str], str]] = []
-    operator = stage.addon("operators.bake_to_rig").DAFNET_OT_bake_to_rig
 
     class Reporter:
         def report(self, kind: set[str], message: str) -> None:
             messages.append((kind, message))
 
-    operator.run(Reporter(), stage.bpy.context)
+    DAFNET_OT_bake_to_rig.run(Reporter(), bpy.context)
     warned = [message for kind, message in messages if kind == {"WARNING"}]
     assert len(warned) == 1 and "left arm by" in warned[0] and "degrees" in warned[0]
     assert "wrists 0.0" in messages[-1][1] and "left arm" in messages[-1][1], (
         "places and angles are told together"
     )
     messages.clear()
-    stage.bpy.context.view_layer.objects.active = stage.build("mixamo")
-    operator.run(Reporter(), stage.bpy.context)
+    bpy.context.view_layer.objects.active = stage.build("mixamo")
+    DAFNET_OT_bake_to_rig.run(Reporter(), bpy.context)
     assert [kind for kind, _ in messages] == [{"INFO"}]

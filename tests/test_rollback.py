@@ -12,8 +12,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon import load_weights
+from bl_ext.user_default.dafnet.dafnet_addon.blender import job
+from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import create_character
+from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
+from bl_ext.user_default.dafnet.dafnet_addon.core.generate import Draw, takes_steps
+from bl_ext.user_default.dafnet.dafnet_addon.core.progress import drained
+from bl_ext.user_default.dafnet.dafnet_addon.core.solids import Scene
+from bl_ext.user_default.dafnet.dafnet_addon.core.take import Controls
 
-Addon = Callable[[str], Any]
 Place = tuple[str, int]
 """A line of the add-on's code, and how often it had run before."""
 
@@ -52,7 +59,7 @@ def _names(kind: type) -> list[str]:
     ]
 
 
-def everything(bpy: ModuleType, addon: Addon, armature: Any) -> dict[str, object]:
+def everything(bpy: ModuleType, armature: Any) -> dict[str, object]:
     """What must be as it was: the armature, what it plays and lists, every action and its keys, the
     scene.
     """
@@ -80,7 +87,7 @@ def everything(bpy: ModuleType, addon: Addon, armature: Any) -> dict[str, object
                 curve.array_index,
                 [tuple(point.co) for point in curve.keyframe_points],
             )
-            for curve in addon("dafnet_addon.blender.compat").action_curves(armature)
+            for curve in action_curves(armature)
         ],
         "scene": _told(bpy.context.scene),
     }
@@ -153,28 +160,23 @@ def _listed(bpy: ModuleType, armature: Any) -> None:
 @pytest.mark.parametrize("prepared", [_nothing, _played, _listed])
 def test_a_failure_at_any_write_leaves_the_file_as_it_was(
     blender: ModuleType,
-    addon: Addon,
     prepared: Callable[[ModuleType, Any], None],
 ) -> None:
-    job, take_of = addon("dafnet_addon.blender.job"), addon("dafnet_addon.core.take")
-    generate = addon("dafnet_addon.core.generate")
-    armature = addon("dafnet_addon.blender.armature").create_character(blender.context, "Ann")
+    armature = create_character(blender.context, "Ann")
     prepared(blender, armature)
     controls, draws = (
-        take_of.Controls(30.0, np.tile(np.eye(4), (3, 1, 1))),
-        [generate.Draw(seed) for seed in range(2)],
+        Controls(30.0, np.tile(np.eye(4), (3, 1, 1))),
+        [Draw(seed) for seed in range(2)],
     )
-    scene, weights = addon("dafnet_addon.core.solids").Scene(), addon("dafnet_addon").load_weights()
-    made = addon("dafnet_addon.core.progress").drained(
-        generate.takes_steps(scene, controls, weights, draws)
-    )
+    scene, weights = Scene(), load_weights()
+    made = drained(takes_steps(scene, controls, weights, draws))
     settings = job.settings_of(armature, blender.context.scene)
 
     def bake() -> None:
         for _ in job._bake_steps(settings, made, controls, draws):
             blender.context.view_layer.update()
 
-    before = everything(blender, addon, armature)
+    before = everything(blender, armature)
     places: dict[str, int] = {}
     finished = False
 
@@ -186,12 +188,12 @@ def test_a_failure_at_any_write_leaves_the_file_as_it_was(
 
     with _traced(note):
         bake()
-    assert finished and everything(blender, addon, armature) != before
+    assert finished and everything(blender, armature) != before
     armature.name = "Other"
-    armature = addon("dafnet_addon.blender.armature").create_character(blender.context, "Ann")
+    armature = create_character(blender.context, "Ann")
     prepared(blender, armature)
     settings = job.settings_of(armature, blender.context.scene)
-    before = everything(blender, addon, armature)
+    before = everything(blender, armature)
     assert len(places) > 60 and {line.split(":")[0] for line in places} >= {
         "job.py",
         "baker.py",
@@ -207,7 +209,7 @@ def test_a_failure_at_any_write_leaves_the_file_as_it_was(
 
             with pytest.raises(_Injected), _traced(fail):
                 bake()
-            after = everything(blender, addon, armature)
+            after = everything(blender, armature)
             assert {key: after[key] for key in after if after[key] != before[key]} == {}, (
                 f"{line}, visit {at}"
             )

@@ -2,18 +2,24 @@
 targets, and the examples.
 """
 
-import importlib
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default import dafnet
+from bl_ext.user_default.dafnet.dafnet_addon.blender.path_sources import along_curve
+from bl_ext.user_default.dafnet.dafnet_addon.blender.surroundings import find_furniture
+from bl_ext.user_default.dafnet.panels import CLASSES, setup
+from bl_ext.user_default.dafnet.panels.setup import add_menu
 
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.paths import Stop
 from dafnet_addon.core.trails import followed, trail
 from kit.panels import drawn_by
+from kit.stage import Stage
 
 
 def test_a_straight_line_is_walked_in_the_time_that_people_take() -> None:
@@ -97,20 +103,16 @@ def test_what_moved_becomes_a_root_that_looks_where_it_goes() -> None:
         followed(np.zeros((50, 2)), 30.0)
 
 
-class Set:
+class Set(Stage):
     """A character of 1.75 m at the origin of an empty scene of 30 frames a second."""
 
-    def __init__(self, bpy: ModuleType, addon: Any) -> None:
-        self.bpy, self.addon, self.scene = bpy, addon, bpy.context.scene
-        self.scene.render.fps, self.scene.frame_end = 30, 40
-        assert bpy.ops.dafnet.add_character(name="Ann") == {"FINISHED"}
-        self.ann = bpy.context.object
-        self.root = self.ann.dafnet.root
+    def __init__(self) -> None:
+        super().__init__(fps=30, furnished=False)
 
     def curve(
         self, points: list[tuple[float, float, float]], kind: str = "POLY", name: str = "Path"
     ) -> Any:
-        data = self.bpy.data.curves.new(name, "CURVE")
+        data = bpy.data.curves.new(name, "CURVE")
         data.dimensions = "3D"
         spline = data.splines.new(kind)
         if kind == "BEZIER":
@@ -122,57 +124,12 @@ class Set:
             for point, place in zip(spline.points, points, strict=True):
                 point.co = (*place, 1.0)
             spline.use_endpoint_u = True
-        return self.add(self.bpy.data.objects.new(name, data))
-
-    def add(self, made: Any) -> Any:
-        self.scene.collection.objects.link(made)
-        return made
-
-    def empty(self, name: str, place: tuple[float, float, float]) -> Any:
-        made = self.add(self.bpy.data.objects.new(name, None))
-        made.location = place
-        self.bpy.context.view_layer.update()
-        return made
-
-    def box(
-        self, name: str, low: tuple[float, float, float], high: tuple[float, float, float]
-    ) -> Any:
-        mesh = self.bpy.data.meshes.new(name)
-        corners = [
-            (x, y, z)
-            for x in (low[0], high[0])
-            for y in (low[1], high[1])
-            for z in (low[2], high[2])
-        ]
-        mesh.from_pydata(
-            corners,
-            [],
-            [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)],
-        )
-        return self.add(self.bpy.data.objects.new(name, mesh))
-
-    def select(self, *objects: Any) -> None:
-        """The first one is active."""
-        for o in self.scene.objects:
-            o.select_set(o in objects)
-        self.bpy.context.view_layer.objects.active = objects[0] if objects else None
-
-    def place(self, frame: int) -> np.ndarray:
-        self.scene.frame_set(frame)
-        return np.array([*self.root.location, self.root.rotation_euler[2]])
-
-    def path(self, first: int, last: int) -> np.ndarray:
-        return np.array([self.place(frame) for frame in range(first, last + 1)])
-
-    def key(self, frame: int, x: float, y: float, yaw: float = 0.0) -> None:
-        self.root.location, self.root.rotation_euler = (x, y, 0.0), (0.0, 0.0, yaw)
-        for name in ("location", "rotation_euler"):
-            self.root.keyframe_insert(name, frame=frame)
+        return self.put(bpy.data.objects.new(name, data))
 
 
 @pytest.fixture
-def stage(blender: ModuleType, addon: Any) -> Set:
-    return Set(blender, addon)
+def stage(blender: ModuleType) -> Set:
+    return Set()
 
 
 @pytest.mark.parametrize("kind", ["POLY", "BEZIER", "NURBS"])
@@ -180,7 +137,7 @@ def test_a_curve_is_walked_along_on_the_floor(stage: Set, kind: str) -> None:
     curve = stage.curve([(1.0, 0.0, 0.3), (1.0, 2.0, 0.9), (1.0, 4.0, 0.3)], kind)
     stage.scene.frame_set(11)
     stage.select(curve)
-    assert stage.bpy.ops.dafnet.walk_along_curve(speed=1.2, seconds=1.0) == {"FINISHED"}
+    assert bpy.ops.dafnet.walk_along_curve(speed=1.2, seconds=1.0) == {"FINISHED"}
     assert stage.scene.frame_current == 11
     end = stage.scene.frame_end
     assert abs((end - 10) / 30 - (4.0 / 1.2 + 0.6 * (1 / 1.4 + 1 / 1.2) + 1.0)) < 0.3, (
@@ -196,23 +153,23 @@ def test_a_curve_is_walked_along_on_the_floor(stage: Set, kind: str) -> None:
 def test_a_curve_with_a_bevel_and_a_transform_counts_as_its_line(stage: Set) -> None:
     curve = stage.curve([(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)])
     curve.data.bevel_depth, curve.rotation_euler = 0.05, (0.0, 0.0, np.pi / 2)
-    before = len(stage.bpy.data.objects), len(stage.bpy.data.curves)
+    before = len(bpy.data.objects), len(bpy.data.curves)
     stage.select(stage.ann, curve)
-    assert stage.bpy.ops.dafnet.walk_along_curve(backwards=True, keep_facing=True) == {"FINISHED"}
+    assert bpy.ops.dafnet.walk_along_curve(backwards=True, keep_facing=True) == {"FINISHED"}
     path = stage.path(1, stage.scene.frame_end)
     assert np.allclose(path[0], (0, 3, 0, 0), atol=1e-3) and np.allclose(
         path[-1], 0.0, atol=1e-3
     ), "it goes backwards"
-    assert (len(stage.bpy.data.objects), len(stage.bpy.data.curves)) == before
+    assert (len(bpy.data.objects), len(bpy.data.curves)) == before
 
 
 def test_what_was_keyed_before_the_start_stays_and_what_comes_after_goes(stage: Set) -> None:
     for frame, x in ((1, 0.0), (13, 0.4), (30, 1.0), (60, 5.0)):
-        stage.key(frame, x, 0.1 * x, 0.2 * x)
+        stage.stand(frame, x, 0.1 * x, 0.2 * x)
     before = stage.path(1, 40)
     stage.scene.frame_set(40)
     stage.select(stage.ann, stage.curve([(3.0, 2.0, 0.0), (3.0, 6.0, 0.0)]))
-    assert stage.bpy.ops.dafnet.walk_along_curve() == {"FINISHED"}
+    assert bpy.ops.dafnet.walk_along_curve() == {"FINISHED"}
     assert np.allclose(stage.path(1, 40), before, atol=1e-4)
     path = stage.path(40, stage.scene.frame_end)
     assert np.allclose(path[-1, :2], (3.0, 6.0), atol=1e-3)
@@ -235,9 +192,9 @@ def test_an_object_that_has_only_places_becomes_a_root(stage: Set) -> None:
     ):
         mover.location = (x, y, 1.4)
         mover.keyframe_insert("location", frame=frame)
-    stage.key(5, 0.0, -1.0, 0.3)
+    stage.stand(5, 0.0, -1.0, 0.3)
     stage.select(mover)
-    assert stage.bpy.ops.dafnet.root_from_object() == {"FINISHED"}
+    assert bpy.ops.dafnet.root_from_object() == {"FINISHED"}
     assert stage.scene.frame_end == 290 and np.allclose(stage.place(5), (0, -1, 0, 0.3), atol=1e-5)
     assert np.allclose(stage.place(19), (0, -1, 0, 0.3), atol=1e-4), "it rests where it was"
     path = stage.path(20, 290)
@@ -259,13 +216,13 @@ def test_selected_empties_are_walked_through_in_the_order_of_their_names(stage: 
             ("Point.1", (2.0, 0.5, 0.0)),
         )
     ]
-    furniture = stage.bpy.data.collections.new("Furniture")
+    furniture = bpy.data.collections.new("Furniture")
     stage.scene.collection.children.link(furniture)
     block = stage.box("Block", (-0.4, 2.5, 0.0), (0.4, 3.4, 1.0))
     furniture.objects.link(block)
     stage.ann.dafnet.furniture = furniture
     stage.select(stage.ann, *points)
-    assert stage.bpy.ops.dafnet.walk_through_points(speed=1.3, seconds=0.5) == {"FINISHED"}
+    assert bpy.ops.dafnet.walk_through_points(speed=1.3, seconds=0.5) == {"FINISHED"}
     path = stage.path(1, stage.scene.frame_end)
     nearest = [
         np.linalg.norm(path[:, :2] - p, axis=1) for p in ((2.0, 0.5), (2.0, 3.0), (-2.0, 3.0))
@@ -278,13 +235,13 @@ def test_selected_empties_are_walked_through_in_the_order_of_their_names(stage: 
     assert np.linalg.norm(inside, axis=1).min() > 0.2
     stage.select(stage.ann)
     stage.scene.cursor.location = (-2.0, 0.0, 0.0)
-    assert stage.bpy.ops.dafnet.walk_through_points() == {"FINISHED"}
+    assert bpy.ops.dafnet.walk_through_points() == {"FINISHED"}
     assert np.allclose(stage.place(stage.scene.frame_end)[:2], (-2.0, 0.0), atol=1e-3), (
         "none is selected: the cursor"
     )
     start, stage.scene.cursor.location = stage.scene.frame_end, (-2.0, -3.0, 0.0)
     stage.select(stage.ann, points[2])
-    assert stage.bpy.ops.dafnet.walk_through_points(to_cursor=True) == {"FINISHED"}
+    assert bpy.ops.dafnet.walk_through_points(to_cursor=True) == {"FINISHED"}
     path = stage.path(start, stage.scene.frame_end)
     assert np.linalg.norm(path[:, :2] - (2.0, 0.5), axis=1).min() < 0.4 and np.allclose(
         path[-1, :2], (-2, -3), atol=1e-3
@@ -292,7 +249,6 @@ def test_selected_empties_are_walked_through_in_the_order_of_their_names(stage: 
 
 
 def test_what_cannot_be_walked_changes_nothing(stage: Set, tmp_path: Path) -> None:
-    bpy = stage.bpy
     short, line = (
         stage.curve([(0.0, 0.0, 0.0), (0.2, 0.0, 0.0)], name="Short"),
         stage.curve([(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)]),
@@ -309,7 +265,7 @@ def test_what_cannot_be_walked_changes_nothing(stage: Set, tmp_path: Path) -> No
     stage.select(short)
     refused("Short' is only 0.20 m long", bpy.ops.dafnet.walk_along_curve)
     with pytest.raises(Exception, match="is not a curve"):
-        stage.addon("dafnet_addon.blender.path_sources").along_curve(bpy.context, stage.ann, still)
+        along_curve(bpy.context, stage.ann, still)
     stage.select(still)
     refused("hardly moves", bpy.ops.dafnet.root_from_object)
     assert not bpy.ops.dafnet.walk_along_curve.poll()
@@ -323,7 +279,7 @@ def test_what_cannot_be_walked_changes_nothing(stage: Set, tmp_path: Path) -> No
     bpy.data.objects.remove(bpy.data.objects["Far Root"])
     with bpy.data.libraries.load(library, link=True) as (_, linked):
         linked.objects = ["Far Root"]
-    stage.ann.dafnet.root = stage.add(linked.objects[0])
+    stage.ann.dafnet.root = stage.put(linked.objects[0])
     refused("'Far Root' is linked", bpy.ops.dafnet.walk_along_curve)
     stage.ann.dafnet.root = None
     assert not any(
@@ -343,9 +299,9 @@ def test_a_generated_walk_keeps_to_the_curve(stage: Set) -> None:
         stage.ann,
         stage.curve([(0.0, 0.0, 0.0), (1.5, 1.5, 0.0), (0.0, 3.0, 0.0), (1.5, 5.0, 0.0)], "BEZIER"),
     )
-    assert stage.bpy.ops.dafnet.walk_along_curve() == {"FINISHED"}
+    assert bpy.ops.dafnet.walk_along_curve() == {"FINISHED"}
     stage.select(stage.ann)
-    assert stage.bpy.ops.dafnet.generate() == {"FINISHED"}
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
     sliding = stage.ann.dafnet.takes[0].action.dafnet.sliding
     off = []
     for frame in range(1, stage.scene.frame_end + 1, 5):
@@ -365,16 +321,16 @@ def test_a_generated_walk_keeps_to_the_curve(stage: Set) -> None:
         for k, place in enumerate([(1.5, 1.5, 0), (0, 3, 0), (1.5, 5, 0)])
     ]
     stage.select(stage.ann, *points)
-    assert stage.bpy.ops.dafnet.walk_through_points(seconds=1.0) == {"FINISHED"}
-    assert stage.bpy.ops.dafnet.generate() == {"FINISHED"}
+    assert bpy.ops.dafnet.walk_through_points(seconds=1.0) == {"FINISHED"}
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
     assert sliding < 1.25 * stage.ann.dafnet.takes[1].action.dafnet.sliding, (
         "feet slide as on any other walk"
     )
 
 
 def test_find_furniture_takes_what_stands_beside_the_path(stage: Set) -> None:
-    stage.key(1, 0.0, 0.0)
-    stage.key(40, 0.0, 3.0)
+    stage.stand(1, 0.0, 0.0)
+    stage.stand(40, 0.0, 3.0)
     near = [
         stage.box("Chair", (0.8, 1.0, 0.0), (1.3, 1.5, 0.5)),
         stage.box("Shelf", (-1.6, 2.8, 0.0), (-1.2, 3.4, 1.9)),
@@ -383,14 +339,12 @@ def test_find_furniture_takes_what_stands_beside_the_path(stage: Set) -> None:
     stage.box("Lamp", (0.0, 1.0, 2.3), (0.3, 1.3, 2.5))
     stage.box("Far", (3.0, 1.0, 0.0), (3.4, 1.4, 1.0))
     hidden = stage.box("Hidden", (0.5, 2.0, 0.0), (0.9, 2.4, 0.6))
-    stage.bpy.context.view_layer.update()
+    bpy.context.view_layer.update()
     hidden.hide_set(True)
     stage.scene.cursor.location = (0.6, 0.6, 0.0)
-    stage.bpy.ops.dafnet.add_character(name="Bob")
+    bpy.ops.dafnet.add_character(name="Bob")
     stage.select(stage.ann)
-    found = stage.addon("dafnet_addon.blender.surroundings").find_furniture(
-        stage.bpy.context, stage.ann
-    )
+    found = find_furniture(bpy.context, stage.ann)
     assert found.taken == ("Chair", "Shelf") and {o.name for o in found.collection.objects} == {
         "Chair",
         "Shelf",
@@ -404,26 +358,26 @@ def test_find_furniture_takes_what_stands_beside_the_path(stage: Set) -> None:
         "does not see it: 'Shelf'.",
     ):
         assert any(words in sentence for sentence in found.warnings), words
-    stage.bpy.data.objects["Far"].location.x = -1.6
-    assert stage.bpy.ops.dafnet.find_furniture() == {"FINISHED"}
+    bpy.data.objects["Far"].location.x = -1.6
+    assert bpy.ops.dafnet.find_furniture() == {"FINISHED"}
     assert {o.name for o in found.collection.objects} == {"Chair", "Shelf", "Far"}, (
         "the same collection again"
     )
     stage.root.animation_data_clear()
     stage.root.location = (40.0, 0.0, 0.0)
     with pytest.raises(RuntimeError, match="No visible mesh lies within"):
-        stage.bpy.ops.dafnet.find_furniture()
-    assert len(found.collection.objects) == 3 and len(stage.bpy.data.collections) == 3
+        bpy.ops.dafnet.find_furniture()
+    assert len(found.collection.objects) == 3 and len(bpy.data.collections) == 3
 
 
 def test_missing_targets_are_added_where_head_and_hands_are(stage: Set) -> None:
-    assert not stage.bpy.ops.dafnet.add_targets.poll(), "it has all"
+    assert not bpy.ops.dafnet.add_targets.poll(), "it has all"
     stage.ann.dafnet.hand_right = None
-    stage.bpy.data.objects.remove(stage.ann.dafnet.head)
+    bpy.data.objects.remove(stage.ann.dafnet.head)
     stage.ann.pose.bones["right_shoulder"].rotation_quaternion = (0.9, 0.3, 0.2, 0.1)
     stage.ann.location.x = 2.0
     kept = stage.ann.dafnet.hand_left
-    assert stage.bpy.ops.dafnet.add_targets() == {"FINISHED"}
+    assert bpy.ops.dafnet.add_targets() == {"FINISHED"}
     own = stage.ann.dafnet
     assert own.hand_left == kept and own.head is not None
     for bone, target in (("right_wrist", own.hand_right), ("head", own.head)):
@@ -434,16 +388,16 @@ def test_missing_targets_are_added_where_head_and_hands_are(stage: Set) -> None:
 
 
 def test_a_missing_root_is_added_where_the_character_stands(stage: Set) -> None:
-    assert not stage.bpy.ops.dafnet.add_root.poll(), "it has one"
-    stage.bpy.data.objects.remove(stage.ann.dafnet.root)
-    stage.bpy.context.view_layer.objects.active = stage.ann
+    assert not bpy.ops.dafnet.add_root.poll(), "it has one"
+    bpy.data.objects.remove(stage.ann.dafnet.root)
+    bpy.context.view_layer.objects.active = stage.ann
     stage.ann.location, stage.ann.rotation_euler.z = (1.0, 2.0, 0.0), np.pi + 0.5
-    assert stage.bpy.ops.dafnet.add_root() == {"FINISHED"}
+    assert bpy.ops.dafnet.add_root() == {"FINISHED"}
     root = stage.ann.dafnet.root
     assert (
         root.location - stage.ann.location
     ).length < 1e-6 and root.rotation_euler.z == pytest.approx(0.5)
-    assert stage.bpy.ops.dafnet.generate.poll() and not stage.bpy.ops.dafnet.add_root.poll()
+    assert bpy.ops.dafnet.generate.poll() and not bpy.ops.dafnet.add_root.poll()
 
 
 def joints(stage: Any, character: Any, frames: range, name: str) -> np.ndarray:
@@ -455,9 +409,9 @@ def joints(stage: Any, character: Any, frames: range, name: str) -> np.ndarray:
 
 
 @pytest.fixture
-def bare(blender: ModuleType, addon: Any) -> Set:
+def bare(blender: ModuleType) -> Set:
     """An empty scene with its cursor off the middle, at 24 frames a second."""
-    made = Set(blender, addon)
+    made = Set()
     blender.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     made.scene = blender.context.scene
     made.scene.cursor.location = (3.0, -2.0, 0.5)
@@ -469,10 +423,10 @@ MIDDLE = np.array([3.0, -2.0, 0.5])
 
 def example(stage: Set, kind: str) -> Any:
     """Add and generate it; its character."""
-    assert stage.bpy.ops.dafnet.add_example(kind=kind) == {"FINISHED"}
-    made = stage.bpy.context.object
+    assert bpy.ops.dafnet.add_example(kind=kind) == {"FINISHED"}
+    made = bpy.context.object
     assert tuple(stage.scene.cursor.location) == tuple(MIDDLE) and stage.scene.frame_end > 250
-    assert stage.bpy.ops.dafnet.generate() == {"FINISHED"}
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
     return made
 
 
@@ -550,17 +504,16 @@ def test_the_bed_example_lies_down(bare: Set) -> None:
 def test_examples_keep_the_scene_s_units(bare: Set) -> None:
     bare.scene.unit_settings.scale_length = 0.01
     bare.scene.cursor.location = MIDDLE * 100
-    assert bare.bpy.ops.dafnet.add_example(kind="SOFA") == {"FINISHED"}
-    sofa = bare.bpy.data.objects["Sofa"]
+    assert bpy.ops.dafnet.add_example(kind="SOFA") == {"FINISHED"}
+    sofa = bpy.data.objects["Sofa"]
     assert abs(sofa.dimensions.x - 197) < 3 and np.allclose(
         sofa.location, MIDDLE * 100 - (40.5, 0, 0), atol=1e-3
     )
-    root = bare.bpy.context.object.dafnet.root
+    root = bpy.context.object.dafnet.root
     assert np.allclose(root.location, MIDDLE * 100 + (-170, 220, 0), atol=1e-2)
 
 
 def test_each_is_one_step_to_undo(stage: Set) -> None:
-    bpy = stage.bpy
 
     def state() -> tuple[list[str], int, bool, str]:
         ann = bpy.data.objects["Ann"]
@@ -589,15 +542,13 @@ def test_each_is_one_step_to_undo(stage: Set) -> None:
 
 
 def test_the_menu_and_the_panel_are_there(stage: Set) -> None:
-    panels = stage.addon("panels.setup")
-    drawn = stage.bpy.types.VIEW3D_MT_add._dyn_ui_initialize()
+    panels = setup
+    drawn = bpy.types.VIEW3D_MT_add._dyn_ui_initialize()
     assert drawn.count(panels.add_menu) == 1
-    children = [
-        cls.bl_idname for cls in stage.addon("panels").CLASSES if getattr(cls, "bl_parent_id", "")
-    ]
+    children = [cls.bl_idname for cls in CLASSES if getattr(cls, "bl_parent_id", "")]
     assert children[0] == "DAFNET_PT_setup"
     stage.select(stage.empty("Other", (0, 0, 0)))
-    assert panels.DAFNET_PT_setup.poll(stage.bpy.context), "the only character is meant"
+    assert panels.DAFNET_PT_setup.poll(bpy.context), "the only character is meant"
 
     curve = stage.curve([(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)])
     stage.select(stage.ann, curve, stage.empty("One", (0, 0, 0)), stage.empty("Two", (1, 0, 0)))
@@ -606,18 +557,17 @@ def test_the_menu_and_the_panel_are_there(stage: Set) -> None:
         "Walk through 2 Points",
         "Sit on Selected",
         "dafnet.find_furniture",
-    } <= set(drawn_by(panels.DAFNET_PT_setup, stage.bpy.context).words())
-    added = drawn_by(panels.DAFNET_MT_add, stage.bpy.context).words()
+    } <= set(drawn_by(panels.DAFNET_PT_setup, bpy.context).words())
+    added = drawn_by(panels.DAFNET_MT_add, bpy.context).words()
     assert added.count("dafnet.add_example") == 4
     assert {"Character", "Chair and Desk", "Bed"} <= set(added)
 
 
-def test_the_menu_is_gone_after_unregister(stage: Set, extension: str) -> None:
-    root, add_menu = importlib.import_module(extension), stage.addon("panels.setup").add_menu
-    root.unregister()
+def test_the_menu_is_gone_after_unregister(stage: Set) -> None:
+    dafnet.unregister()
     try:
-        assert add_menu not in stage.bpy.types.VIEW3D_MT_add._dyn_ui_initialize()
-        assert not hasattr(stage.bpy.types, "DAFNET_PT_setup")
+        assert add_menu not in bpy.types.VIEW3D_MT_add._dyn_ui_initialize()
+        assert not hasattr(bpy.types, "DAFNET_PT_setup")
     finally:
-        root.register()
-    assert stage.bpy.types.VIEW3D_MT_add._dyn_ui_initialize().count(add_menu) == 1
+        dafnet.register()
+    assert bpy.types.VIEW3D_MT_add._dyn_ui_initialize().count(add_menu) == 1

@@ -28,7 +28,7 @@ __all__ = [
     "vrm",
 ]
 
-Point = Sequence[float]
+Point = Sequence[float] | np.ndarray
 # Facing -y, left at +x, metres; the left side only.
 _TRUNK = {
     "pelvis": (0, 0.0, 0.99),
@@ -150,13 +150,13 @@ def _humanoid(
     out.
     """
     bones = [Bone(root, None, (0, 0, 0), (0, 0.2, 0))] if root else []
-    column = [
+    column: list[str] = [
         joint
         for joint in ("pelvis", "spine1", "spine2", "spine3", "neck", "head")
         if joint in trunk
     ]
     for k, joint in enumerate(column):
-        onward = column[k + 1] if k + 1 < len(column) else "top"
+        onward: str = column[k + 1] if k + 1 < len(column) else "top"
         bones.append(
             Bone(
                 trunk[joint],
@@ -170,11 +170,12 @@ def _humanoid(
     chest = trunk[
         next(joint for joint in ("spine3", "spine2", "spine1", "pelvis") if joint in trunk)
     ]
+    chains: tuple[tuple[tuple[str, ...], str], ...] = (
+        (("collar", "shoulder", "elbow", "wrist", "tip"), chest),
+        (("hip", "knee", "ankle", "foot", "toe_end"), trunk["pelvis"]),
+    )
     for word, named in side.items():
-        for chain, start in (
-            (("collar", "shoulder", "elbow", "wrist", "tip"), chest),
-            (("hip", "knee", "ankle", "foot", "toe_end"), trunk["pelvis"]),
-        ):
+        for chain, start in chains:
             there = [joint for joint in chain if joint in limbs]
             for k, joint in enumerate(there):
                 onward = (
@@ -199,14 +200,13 @@ def _humanoid(
     return bones
 
 
-def _fingers(
-    body: dict[str, np.ndarray], hand: str, word: str, named: Callable[[str], str]
-) -> list[Bone]:
+def _fingers(body: dict[str, np.ndarray], hand: str, word: str, names: Sequence[str]) -> list[Bone]:
+    """The first bones of four fingers, of these names."""
     bones = []
     at, ahead = body[f"{word}_wrist"], body[f"{word}_tip"] - body[f"{word}_wrist"]
-    for k, finger in enumerate(_FINGERS):
+    for k, name in enumerate(names):
         start = at + 0.9 * ahead + np.array([0, -0.03 + 0.02 * k, 0])
-        bones.append(Bone(named(finger), hand, start, start + 0.4 * ahead, (0, 0, 1)))
+        bones.append(Bone(name, hand, start, start + 0.4 * ahead, (0, 0, 1)))
     return bones
 
 
@@ -242,7 +242,7 @@ def mixamo(bpy: Any, prefix: str = "mixamorig:", **body: Any) -> Any:
     bones = _humanoid(joints, trunk, side, limbs, connect=False)
     for word, named in side.items():
         bones += _fingers(
-            joints, named("Hand"), word, lambda finger, named=named: named(f"Hand{finger}1")
+            joints, named("Hand"), word, [named(f"Hand{finger}1") for finger in _FINGERS]
         )
         bones.append(
             Bone(
@@ -262,9 +262,8 @@ def unreal(bpy: Any, spines: int = 3, **body: Any) -> Any:
     """An Unreal mannequin: A-pose, bones that do not point along the limbs, twist bones beside
     them, a root bone, 0.01.
     """
-    joints = character_body(
-        **{"down": 48.0, "bent": 12.0, "trunk": {"neck": (0, 0.04, 1.51)}} | body
-    )
+    given: dict[str, Any] = {"down": 48.0, "bent": 12.0, "trunk": {"neck": (0, 0.04, 1.51)}}
+    joints = character_body(**given | body)
     names = [f"spine_0{k + 1}" for k in range(spines)]
     trunk = {
         "pelvis": "pelvis",
@@ -305,7 +304,7 @@ def unreal(bpy: Any, spines: int = 3, **body: Any) -> Any:
             middle = 0.5 * (joints[f"{word}_{joint}"] + joints[f"{word}_{end}"])
             bones.append(Bone(named(lower), named(upper), middle, middle + np.array([0, 0.05, 0])))
         bones += _fingers(
-            joints, named("hand"), word, lambda finger, named=named: named(f"{finger.lower()}_01")
+            joints, named("hand"), word, [named(f"{finger.lower()}_01") for finger in _FINGERS]
         )
     return made(bpy, "Unreal", bones, scale=0.01)
 
@@ -342,7 +341,7 @@ def smpl_x(bpy: Any, **body: Any) -> Any:
         bone.tail = np.add(bone.head, (0, 0, 0.1))
     for word, named in side.items():
         bones += _fingers(
-            joints, named("wrist"), word, lambda finger, named=named: named(f"{finger.lower()}1")
+            joints, named("wrist"), word, [named(f"{finger.lower()}1") for finger in _FINGERS]
         )
     bones.append(
         Bone("jaw", "head", joints["head"] + (0, -0.03, 0.02), joints["head"] + (0, -0.03, 0.12))
@@ -549,20 +548,21 @@ def rest_pose(
     """What ``rested`` needs for one of ``RESTS``, for a rig whose bones by joint are ``joints``."""
     turns: list[Turn] = []
     spine = [joints[joint] for joint in ("spine1", "spine2", "spine3") if joint in joints]
-    more: list[tuple[str, Point, float]] = {
+    more: dict[str, list[tuple[str, Point, float]]] = {
         "twisted": [(spine[-1], (0, 0, 1), 40.0)],
         "bent": [(bone, (1, 0, 0), 75.0 / len(spine)) for bone in spine],
         "leaning": [(joints["pelvis"], (0, 1, 0), 7.0), (joints["pelvis"], (0, 0, 1), 25.0)],
-    }.get(kind, [])
+    }
     for side, out in (("left", 1.0), ("right", -1.0)):
-        upper, lower = {
+        led: dict[str, tuple[Point | None, Point]] = {
             "hanging": ((0.08 * out, 0.05, -1), (0.08 * out, 0.05, -1)),
             "forward": ((0, -1, 0.05), (0, -1, 0.05)),
             "sitting": ((0.15 * out, -0.3, -1), (-0.1 * out, -1, -0.1)),
             "twisted": ((0.3 * out, -0.2, -1), (0.6 * out, -0.8, 0.3)),
             "bent": ((0.15 * out, -0.3, -1), (0.15 * out, -0.3, -1)),
-            "leaning": (None, None),
-        }[kind]
+            "leaning": (None, ()),
+        }
+        upper, lower = led[kind]
         limb = [
             joints[f"{side}_{joint}"]
             for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
@@ -573,7 +573,7 @@ def rest_pose(
             turns += [(limb[3], limb[4], (0.2 * out, -1, -0.05)), (limb[4], limb[5], (0, 0.1, -1))]
             if f"{side}_foot" in joints:
                 turns.append((limb[5], joints[f"{side}_foot"], (0.1 * out, -1, -0.45)))
-    return turns, more
+    return turns, more.get(kind, [])
 
 
 def of_file(bpy: Any, file: Any) -> Any:

@@ -10,6 +10,7 @@ import sys
 import traceback
 from collections.abc import Callable, Generator
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -37,7 +38,7 @@ class Driver:
         """The 3D view's region of a kind, such as UI for the sidebar."""
         return next(region for region in self.view.regions if region.type == kind)
 
-    def override(self, kind: str = "WINDOW"):
+    def override(self, kind: str = "WINDOW") -> Any:
         """Context of the 3D view, for operators that are not what is tried out here."""
         return bpy.context.temp_override(
             window=self.window, area=self.view, region=self.region(kind)
