@@ -8,29 +8,42 @@ same minutes, seeds and predictor; what is finished is kept. Writes ``ablation.m
 ``ablation.json`` into ``RUNS``. Equal minutes, not equal steps: what makes a step dearer has to
 earn it. With ``--from`` all begin with what those weights have learnt, and the variants that need
 other sizes are left out.
+
+    python benchmarks/ablation.py DATASET FOLDER -o RUNS --from WEIGHTS --furniture LIBRARY
+
+What real pieces of furniture give: ``DATASET`` was made with ``--furniture``; one of as many
+windows and the same seed is made of boxes alone. Weights trained on each from ``WEIGHTS`` on, in
+equal time, are measured beside those, on the bodies and makers that choose (``data/real_test.py``).
+Writes ``furniture.md`` and ``furniture.json``; the differences are paired, clip by clip.
 """
 
 import argparse
 import json
 import shutil
+import sys
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import torch
+import numpy as np
 
+from dafnet_addon.core.errors import DafnetError, InputError
+from dafnet_addon.core.files import save_text
+from dafnet_addon.core.threads import cores
 from dafnet_addon.core.weights import Weights, load_weights
 from dafnet_addon.data.held_out import HeldClip, held_out
-from dafnet_addon.data.prepare import bank_in
+from dafnet_addon.data.prepare import prepare
+from dafnet_addon.data.real_test import real_test
 from dafnet_addon.model.config import SMALL, ModelConfig
 from dafnet_addon.training import precision
-from dafnet_addon.training.batches import Pool
 from dafnet_addon.training.checkpoints import checkpoint_file
-from dafnet_addon.training.evaluate import captured, measured, rows_of
+from dafnet_addon.training.evaluate import Measured, captured, measured, row, rows_of
 from dafnet_addon.training.export import export
-from dafnet_addon.training.train import Run, TrainingConfig, train_part, trained
+from dafnet_addon.training.train import Run, TrainingConfig, train, train_part, trained
+from dafnet_addon.training.validation import likelihoods
 
 MODEL = replace(SMALL, width=96, code=96, ahead=18)
 TRAINING = TrainingConfig(batch=32, free_run=1.0, mixed=True, dropout_windows=0.5)
@@ -66,21 +79,6 @@ def _train(
     begin_with: Weights | None,
 ) -> None:
     train_part(part, dataset, folder, model, training, threads=1, begin_with=begin_with)
-
-
-def _likelihood(folder: Path, dataset: Path) -> float:
-    """Negative log-likelihood a frame of held-out windows, nats, in standardised units; the same
-    draws for all variants.
-    """
-    held = Pool(lambda: [dataset / "held.npz"], torch.device("cpu"), bank_in(dataset))
-    predictor = Run.load("predictor", folder)
-    total = 0.0
-    for part in ("upper", "lower"):
-        run = Run.load(part, folder)
-        run.gmvae.load_state_dict(predictor.network.state_dict())
-        run.config = replace(run.config, free_run=0.0, dropout_windows=0.0)
-        total += run.held_loss(held, 200)
-    return total
 
 
 def variant(
@@ -119,7 +117,7 @@ def variant(
         measured(load_weights(file), clips, seeds=1), ["ground_truth", "free_t0", "ee_t0"]
     )
     steps = {part: Run.load(part, folder).step for part in ("upper", "lower")}
-    return {"steps": steps, "nll": round(_likelihood(folder, dataset), 2), **found}
+    return {"steps": steps, "nll": round(sum(likelihoods(folder, dataset).values()), 2), **found}
 
 
 def table(results: dict[str, dict[str, Any]]) -> str:
@@ -146,7 +144,127 @@ def table(results: dict[str, dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
+BEGUN, BOXES, REAL = "the weights begun with", "boxes alone", "with real pieces"
+GROUPS: dict[str, Callable[[HeldClip], str]] = {
+    "all": lambda clip: "all seats",
+    "body": lambda clip: clip.body,
+    "maker": lambda clip: clip.maker,
+    "kind": lambda clip: clip.kind,
+}
+DRAWS = 2000
+
+
+def box_dataset(dataset: Path, folder: Path, out: Path) -> None:
+    """Make (or go on making) the dataset ``out``: as ``dataset``, of the same motion files, without
+    its real pieces. Raises InputError where that has none.
+    """
+    described = json.loads((dataset / "dataset.json").read_text(encoding="utf-8"))
+    if "furniture" not in described:
+        raise InputError(
+            f"The dataset '{dataset}' has no real pieces; give one made with 'dafnet prepare "
+            "--furniture'."
+        )
+    prepare(folder, out, described["windows"], cores(), described["seed"])
+
+
+def trained_on(dataset: Path, folder: Path, minutes: float, begin_with: Weights) -> Path:
+    """Train (or go on with) a run in ``folder`` as ``small.toml`` trains, predictor and flow, for
+    ``minutes`` a part (the predictor for a fifth of that), from these weights on: its weights file.
+    """
+    model = ModelConfig(**begin_with.config["model"])
+    training = replace(
+        TRAINING, batch=40, peak=1e-3, minutes_predictor=minutes / 5, minutes_flow=minutes
+    )
+    train(dataset, folder, model, training, begin_with=begin_with)
+    file = folder / "weights.safetensors"
+    export(file, *trained(folder), {})
+    return file
+
+
+def paired(better: Sequence[float], worse: Sequence[float]) -> tuple[float, float, float]:
+    """The mean difference of two figures of the same clips, and 95 % of its bootstrap over
+    clips.
+    """
+    difference = np.subtract(better, worse)
+    drawn = np.random.default_rng(0).integers(len(difference), size=(DRAWS, len(difference)))
+    low, high = np.quantile(difference[drawn].mean(1), [0.025, 0.975])
+    return float(difference.mean()), float(low), float(high)
+
+
+def off(clip: Measured, run: str) -> float:
+    """Centimetres by which a clip's pelvis misses its seats' heights in a run, the mean over
+    episodes.
+    """
+    return 100.0 * float(np.abs(clip.runs[run].seats).mean())
+
+
+def furniture_table(found: dict[str, list[Measured]]) -> str:
+    """In Markdown: per group of clips and weights, FREE within 4 and 8 cm and how far off; then how
+    much closer real pieces bring the pelvis than boxes alone; and EE.
+    """
+    lines = [
+        "| | clips | weights | FREE, within 4 cm | within 8 cm | pelvis off, cm "
+        "| real pieces less boxes alone, cm | EE, within 4 cm | EED in EE | skate, cm a frame |",
+        "|---" * 10 + "|",
+    ]
+    for group, of in GROUPS.items():
+        names = sorted({of(each.clip) for each in found[BEGUN]})
+        for name in names:
+            chosen = {
+                weights: [each for each in clips if of(each.clip) == name]
+                for weights, clips in found.items()
+            }
+            errors = {w: [off(each, "free_t0") for each in c] for w, c in chosen.items()}
+            for weights, clips in chosen.items():
+                free, ee = (row([each.runs[run] for each in clips]) for run in ("free_t0", "ee_t0"))
+                difference = "–"
+                if weights == REAL:
+                    mean, low, high = paired(errors[REAL], errors[BOXES])
+                    difference = f"{mean:+.1f} ({low:+.1f} to {high:+.1f})"
+                low, high = free["intervals"]["sits_within_8cm"]
+                cells = [
+                    name if group == "all" else f"{group} {name}",
+                    str(len(clips)),
+                    weights,
+                    f"{100 * free['sits_within_4cm']:.0f} %",
+                    f"{100 * free['sits_within_8cm']:.0f} % ({100 * low:.0f} to {100 * high:.0f})",
+                    f"{np.mean(errors[weights]):.1f}",
+                    difference,
+                    f"{100 * ee['sits_within_4cm']:.0f} %",
+                    f"{ee['end_effector_error']:.4f}",
+                    f"{free['skate_cm']:.2f}",
+                ]
+                lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def furniture(
+    dataset: Path, folder: Path, library: Path, out: Path, minutes: float, begin_with: Weights
+) -> str:
+    """What real pieces give in equal time, as a table (see ``furniture_table``)."""
+    clips = [clip for clip in real_test(folder, library, "choose") if clip.room != "bed"]
+    boxes = out / "dataset_of_boxes"
+    box_dataset(dataset, folder, boxes)
+    files = {BEGUN: begin_with.path}
+    for name, windows in ((BOXES, boxes), (REAL, dataset)):
+        files[name] = trained_on(windows, out / name.replace(" ", "_"), minutes, begin_with)
+    found = {
+        name: measured(load_weights(file), clips, seeds=1, modes=("FREE", "EE"), clean=False)
+        for name, file in files.items()
+    }
+    rows = {
+        name: rows_of(each, ("ground_truth", "free_t0", "ee_t0")) for name, each in found.items()
+    }
+    for name, file in files.items():
+        if name != BEGUN:
+            rows[name]["steps"] = {p: Run.load(p, file.parent).step for p in ("upper", "lower")}
+    save_text(out / "furniture.json", json.dumps(rows, indent=1))
+    text = furniture_table(found)
+    save_text(out / "furniture.md", text)
+    return text
+
+
+def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -158,9 +276,30 @@ def main() -> None:
         "--every", type=int, default=3, help="measure on every N-th captured clip of an unseen body"
     )
     parser.add_argument("--from", dest="begin_with", type=Path, metavar="WEIGHTS")
+    parser.add_argument(
+        "--furniture", type=Path, metavar="LIBRARY", help="measure what its real pieces give"
+    )
     options = parser.parse_args()
     begin_with = load_weights(options.begin_with) if options.begin_with else None
     precision.announce(TRAINING.mixed)
+    if options.furniture:
+        if begin_with is None:
+            parser.error("--furniture needs --from")
+        try:
+            print(
+                furniture(
+                    dataset=options.dataset,
+                    folder=options.folder,
+                    library=options.furniture,
+                    out=options.output,
+                    minutes=options.minutes,
+                    begin_with=begin_with,
+                )
+            )
+        except DafnetError as error:
+            print(f"ablation: {error}", file=sys.stderr)
+            return 1
+        return 0
     clips = captured(held_out(options.folder))[:: options.every]
     first = options.output / "predictor"
     if not checkpoint_file(first, "predictor").exists():
@@ -180,7 +319,8 @@ def main() -> None:
         )
         (options.output / "ablation.md").write_text(table(results) + "\n", encoding="utf-8")
     print(table(results))
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

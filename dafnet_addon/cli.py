@@ -312,6 +312,44 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
         "--device", default="cpu", help="'cpu', or 'cuda'; several GPUs through torchrun"
     )
 
+    validate = command(
+        "validate",
+        _validate,
+        "measure a run among real furniture while it trains, and keep its best weights",
+        part="training",
+        needs=lambda _: ("torch", "tensorboard", "safetensors", "matplotlib"),
+    )
+    validate.add_argument("training", type=Path, metavar="RUN", help="folder of the run")
+    validate.add_argument("dataset", type=Path, metavar="DATASET", help="that it trains with")
+    validate.add_argument("folder", type=Path, metavar="FOLDER", help="holds the motion files")
+    validate.add_argument(
+        "--furniture", type=Path, required=True, metavar="LIBRARY", help="folder of real pieces"
+    )
+    validate.add_argument(
+        "--every",
+        type=_number(float, 0.0),
+        metavar="MINUTES",
+        help="measure again and again until the run's budget is spent",
+    )
+    validate.add_argument("--processes", type=_number(int, 1, _MOST_PROCESSES), default=1)
+
+    cool = command(
+        "cool",
+        _cool,
+        "train a copy of a run for some minutes in which its rate falls, and write its weights",
+        part="training",
+        needs=lambda _: ("torch", "tensorboard", "safetensors"),
+    )
+    cool.add_argument("training", type=Path, metavar="RUN", help="folder of the run, only read")
+    cool.add_argument("dataset", type=Path, metavar="DATASET", help="that it trains with")
+    cool.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="CANDIDATE", help="folder of the copy"
+    )
+    cool.add_argument(
+        "--minutes", type=_number(float, 0.0), default=5.0, help="of each part's training"
+    )
+    cool.add_argument("--device", default="cpu", help="'cpu' or 'cuda'")
+
     evaluate = command(
         "evaluate",
         _evaluate,
@@ -539,9 +577,8 @@ def _prepare(options: argparse.Namespace, bar: "_Bar") -> _Result:
 def _train(options: argparse.Namespace, bar: "_Bar") -> _Result:
     from .core.weights import load_weights
     from .training import precision, ranks
-    from .training.export import export
-    from .training.spread import take_spread
-    from .training.train import account, dataset_pool, read_config, train, trained
+    from .training.candidates import write_weights
+    from .training.train import read_config, train
 
     model, config = read_config(options.config)
     if options.minutes is not None:
@@ -555,9 +592,39 @@ def _train(options: argparse.Namespace, bar: "_Bar") -> _Result:
     train(options.dataset, options.output, model, config, bar, device, begin_with)
     if ranks.rank():
         return None
-    flow, predictor, statistics = trained(options.output)
-    spread = take_spread(flow, predictor, dataset_pool(options.dataset), statistics)
-    export(file, flow, predictor, statistics, account(options.output, options.dataset), spread)
+    write_weights(options.output, options.dataset, file)
+    return {"weights": str(file)}, f"Written to {file}"
+
+
+def _validate(options: argparse.Namespace, bar: "_Bar") -> _Result:
+    import torch
+
+    from .data.real_test import real_test
+    from .training.validation import BEST, recorded, said, validations
+
+    torch.set_num_threads(options.processes)
+    require_writable(options.training / BEST)
+    for found in validations(
+        options.training,
+        options.dataset,
+        real_test(options.folder, options.furniture, "choose"),
+        every=options.every,
+        processes=options.processes,
+        progress=bar,
+    ):
+        if options.every is not None:
+            _complain(said(found))
+    rows = recorded(options.training)
+    return rows, "\n".join(said(each) for each in rows)
+
+
+def _cool(options: argparse.Namespace, _bar: "_Bar") -> _Result:
+    from .training import ranks
+    from .training.candidates import cooled
+
+    device = ranks.device_of(options.device)
+    require_writable(options.output / "weights")
+    file = cooled(options.training, options.dataset, options.output, options.minutes, device)
     return {"weights": str(file)}, f"Written to {file}"
 
 

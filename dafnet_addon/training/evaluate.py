@@ -291,13 +291,13 @@ def in_processes(
     task: Callable[[Sampler, Any], Any],
     items: Sequence[Any],
     progress: Callable[[float], None],
+    processes: int | None = None,
 ) -> Iterator[Any]:
-    """``task`` of each item with a sampler of these weights, in as many processes as there are
-    cores; in order.
+    """``task`` of each item with a sampler of these weights, in ``processes`` (None: one for each
+    core); in order.
     """
-    yield from spread_out(
-        partial(_call, task), items, progress=progress, start=partial(_start, weights)
-    )
+    start = partial(_start, weights)
+    yield from spread_out(partial(_call, task), items, processes, progress, start)
 
 
 def measured(
@@ -308,10 +308,11 @@ def measured(
     seeds: int = SEEDS,
     modes: Sequence[str] = MODES,
     clean: bool = True,
+    processes: int | None = None,
 ) -> list[Measured]:
-    """Every clip beside itself (see ``beside``), in processes."""
+    """Every clip beside itself (see ``beside``), in ``processes`` (None: one for each core)."""
     task = partial(beside, seed=seed, seeds=seeds, modes=modes, clean=clean)
-    return list(in_processes(weights, task, clips, progress))
+    return list(in_processes(weights, task, clips, progress, processes))
 
 
 def _interval(totals: np.ndarray, weights: np.ndarray) -> list[float]:

@@ -1,5 +1,8 @@
-"""A report's main figures as bars, beside those of the real motion."""
+"""A report's main figures as bars, beside those of the real motion; a run's validation as
+curves.
+"""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +10,7 @@ import numpy as np
 
 from ..core.files import whole_file
 
-__all__ = ["plot"]
+__all__ = ["curves", "plot"]
 
 _PANELS = {
     "sits_within_6cm": "sits within 6 cm",
@@ -18,6 +21,23 @@ _PANELS = {
     "jerk": "jerk, m/s³",
 }
 _COLOURS = {"ground": "#555555", "free": "#4c78a8", "ee": "#f58518", "full": "#54a24b"}
+
+_PANELS_OF_A_RUN = {
+    "sits within 4 cm": ("sits_within_4cm", ("free_t0", "ee_t0")),
+    "sits within 8 cm": ("sits_within_8cm", ("free_t0", "ee_t0")),
+    "EED, EE": ("end_effector_error", ("ee_t0",)),
+    "skate, cm a frame": ("skate_cm", ("free_t0", "ee_t0", "ground_truth")),
+    "life: wrists, m/s": ("speed_wrists", ("free_t0", "free_t1", "ground_truth")),
+    "descent, s": ("descent_seconds", ("free_t0", "ee_t0", "ground_truth")),
+}
+"""By title, the figure that is drawn, and of which runs."""
+_KINDS = {
+    "free_t0": ("FREE", "#4c78a8"),
+    "free_t1": ("FREE, temperature 1", "#72b7b2"),
+    "ee_t0": ("EE", "#f58518"),
+    "ground_truth": ("captured", "#555555"),
+}
+"""By run, its label and colour."""
 
 
 def plot(report: dict[str, Any], file: Path) -> None:
@@ -59,3 +79,59 @@ def plot(report: dict[str, Any], file: Path) -> None:
     with whole_file(file) as part:
         figure.savefig(part, format="png", dpi=80)
     plt.close(figure)
+
+
+def curves(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
+    """Draw a run's validation (rows of ``validation``) over its hours into ``file`` (PNG), with
+    95 % intervals over clips; level lines are what was captured and other weights' figures.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    own = sorted((each for each in rows if "hours" in each), key=lambda each: each["hours"])
+    others = [each for each in rows if "hours" not in each]
+    hours = [each["hours"] for each in own]
+    figure, axes = plt.subplots(3, 3, figsize=(15, 11), constrained_layout=True)
+    for ax, (title, (name, shown)) in zip(axes.flat, _PANELS_OF_A_RUN.items(), strict=False):
+        for which in shown:
+            label, colour = _KINDS[which]
+            if which == "ground_truth":
+                value, _, _ = _of(rows[0], which, name)
+                ax.axhline(value, ls="--", color=colour, label=label)
+                continue
+            values, low, high = np.array([_of(each, which, name) for each in own]).reshape(-1, 3).T
+            ax.plot(hours, values, marker="o", ms=3, color=colour, label=label)
+            ax.fill_between(hours, low, high, color=colour, alpha=0.15, lw=0)
+            for each in others:
+                value, _, _ = _of(each, which, name)
+                ax.axhline(value, ls=":", color=colour, label=f"{label}, {each['weights']}")
+        ax.set_title(title)
+    makers, loss, best = axes.flat[len(_PANELS_OF_A_RUN) :]
+    for maker in sorted({name for each in own for name in each["makers"]}):
+        shares = [each["makers"][maker]["free_t0"]["sits_within_8cm"] for each in own]
+        makers.plot(hours, shares, marker="o", ms=3, label=maker)
+    makers.set_title("FREE, within 8 cm, by maker")
+    for part in sorted({name for each in own for name in each["held_out"]}):
+        loss.plot(hours, [each["held_out"][part] for each in own], marker="o", ms=3, label=part)
+    loss.set_title("held-out loss, nats a frame")
+    best.plot(hours, [each["score"] for each in own], marker="o", ms=3, label="the run")
+    for each in others:
+        best.axhline(each["score"], ls=":", color="#222222", label=each["weights"])
+    best.set_title("score, cm (the least is kept)")
+    for ax in axes.flat:
+        ax.set_xlabel("hours of one core a part")
+        if ax.get_legend_handles_labels()[1]:
+            ax.legend(fontsize=7)
+    figure.suptitle(f"{rows[0]['clips']} captured clips of bodies and makers that choose weights")
+    with whole_file(file) as part:
+        figure.savefig(part, format="png", dpi=80)
+    plt.close(figure)
+
+
+def _of(found: Mapping[str, Any], which: str, name: str) -> tuple[float, float, float]:
+    """A figure of a row and its interval; NaN where nothing showed it, as a descent to a seat."""
+    figures = found["figures"][which]
+    low, high = figures["intervals"].get(name, (np.nan, np.nan))
+    return figures.get(name, np.nan), low, high

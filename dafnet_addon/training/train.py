@@ -58,6 +58,8 @@ __all__ = [
     "read_config",
     "Run",
     "account",
+    "before_it_cooled",
+    "checkpoints",
     "clock_of",
     "dataset_pool",
     "descend",
@@ -621,6 +623,14 @@ def train_part(
     return run
 
 
+def before_it_cooled(part: str, folder: Path) -> Run:
+    """The saved run as it is; where its rate has begun to fall, as it was before that."""
+    run, name = Run.load(part, folder), f"{part}{_HELD}"
+    if run.cools and checkpoint_file(folder, name).exists():
+        return Run.load(part, folder, name=name)
+    return run
+
+
 def _resumed(part: str, folder: Path, config: TrainingConfig, device: str) -> Run:
     """The saved run; where its budget has grown since its rate fell, as it was before that."""
     name = f"{part}{_HELD}"
@@ -706,7 +716,7 @@ def trained(folder: Path) -> tuple[BodyFlow, ActionPredictor | None, Statistics]
     """The flow, the predictor (of MoGlow none) and the statistics of a run's latest checkpoints,
     their weights averaged.
     """
-    runs = _checkpoints(folder)
+    runs = checkpoints(folder)
     flow = next(run.flow for part, run in runs.items() if part != "predictor")
     for part, run in runs.items():
         run.adopt_average()
@@ -716,7 +726,7 @@ def trained(folder: Path) -> tuple[BodyFlow, ActionPredictor | None, Statistics]
     return flow, predictor, next(iter(runs.values())).statistics
 
 
-def _checkpoints(folder: Path) -> dict[str, Run]:
+def checkpoints(folder: Path) -> dict[str, Run]:
     """The latest checkpoints of a run's folder, the predictor's first."""
     parts = ("predictor", "upper", "lower", "whole")
     return {
@@ -726,7 +736,7 @@ def _checkpoints(folder: Path) -> dict[str, Run]:
 
 def account(folder: Path, dataset: Path) -> dict[str, str]:
     """What a weights file says of its making, as metadata: licence, data, and training."""
-    runs = _checkpoints(folder)
+    runs = checkpoints(folder)
     training: dict[str, Any] = {
         part: {"steps": run.step, "minutes": round(run.seconds / 60, 1)}
         for part, run in runs.items()

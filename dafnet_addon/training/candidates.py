@@ -1,0 +1,117 @@
+"""Weights out of a run that may still be training: as it stands, or with its rate brought down.
+
+The run itself is only read. Checkpoints are replaced as a whole, so that a copy of one is whole at
+any time.
+"""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from ..core.errors import InputError
+from ..model.config import ModelConfig
+from ..model.systems import system_named
+from .checkpoints import Checkpoint, checkpoint_file
+from .export import export
+from .spread import take_spread
+from .train import Run, account, before_it_cooled, dataset_pool, train, trained
+
+__all__ = ["cooled", "has_weights", "snapshot", "write_weights"]
+
+
+@contextmanager
+def snapshot(folder: Path) -> Iterator[Path]:
+    """A copy of a run's latest checkpoints, a run's folder of its own, there until the block ends.
+
+    Raises InputError where a part of the flow has none yet.
+    """
+    with TemporaryDirectory(prefix="dafnet-") as name:
+        copy = Path(name)
+        for part in _parts(folder):
+            shutil.copyfile(checkpoint_file(folder, part), checkpoint_file(copy, part))
+        yield copy
+
+
+def has_weights(folder: Path) -> bool:
+    """Whether a run has a checkpoint of every part of its flow."""
+    return bool(_parts_there(folder))
+
+
+def _parts(folder: Path) -> tuple[str, ...]:
+    """The networks of a run, the predictor first. Raises InputError where one has no checkpoint
+    yet.
+    """
+    parts = _parts_there(folder)
+    if not parts:
+        raise InputError(
+            f"The run '{folder}' has no weights of the whole flow yet; try again when it is "
+            "training the flow, or give another folder."
+        )
+    return parts
+
+
+def _parts_there(folder: Path) -> tuple[str, ...]:
+    for part in ("upper", "lower", "whole"):
+        file = checkpoint_file(folder, part)
+        if file.exists():
+            model = Checkpoint.read(file).settings(ModelConfig, "model")
+            flow = system_named(model.system).partition
+            parts = (*(("predictor",) if model.predicts else ()), *flow)
+            if all(checkpoint_file(folder, each).exists() for each in parts):
+                return parts
+    return ()
+
+
+def write_weights(folder: Path, dataset: Path, file: Path) -> None:
+    """Write the averaged weights of a run's latest checkpoints, with what ``account`` says of
+    them.
+    """
+    flow, predictor, statistics = trained(folder)
+    spread = take_spread(flow, predictor, dataset_pool(dataset), statistics)
+    export(file, flow, predictor, statistics, account(folder, dataset), spread)
+
+
+def cooled(
+    folder: Path,
+    dataset: Path,
+    out: Path,
+    minutes: float,
+    device: str = "cpu",
+) -> Path:
+    """Train a copy of a run for ``minutes`` more a part, in which its rate falls from its peak to
+    the last: the weights file in the folder ``out``. A copy that was begun there is gone on with.
+
+    The copy begins where the run is now; where its own rate has begun to fall, before it did.
+    Raises InputError where the run has no weights of the whole flow yet.
+    """
+    if not checkpoint_file(out, _parts(folder)[-1]).exists():
+        _begin_cooling(folder, out, minutes)
+    begun = Run.load(_parts(out)[-1], out)
+    train(dataset, out, begun.model, begun.config, device=device)
+    file = out / f"{begun.model.system}.safetensors"
+    write_weights(out, dataset, file)
+    return file
+
+
+def _begin_cooling(folder: Path, out: Path, minutes: float) -> None:
+    """Make the folder ``out``, whole or not at all: a run whose rate falls over ``minutes``."""
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(f"'{out}' holds something else than a cooling run; give another folder.")
+    # The predictor is done, and the flow has learnt with what it is.
+    runs = [
+        Run.load(part, folder) if part == "predictor" else before_it_cooled(part, folder)
+        for part in _parts(folder)
+    ]
+    budget = max(run.seconds for run in runs if run.part != "predictor") / 60.0 + minutes
+    beside = out.with_name(f".{out.name}.part")
+    shutil.rmtree(beside, ignore_errors=True)
+    for run in runs:
+        run.config = replace(
+            run.config, steps_flow=0, minutes_flow=budget, cool_down=minutes / budget
+        )
+        run.folder = beside
+        run.save()
+    beside.replace(out)

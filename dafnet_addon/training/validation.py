@@ -1,0 +1,237 @@
+"""How good a run is while it trains: measured now and then among real furniture, drawn as curves,
+the best kept.
+
+Who is measured are the bodies and makers that choose weights (``data.splits``), never those that
+tell. ``validation.jsonl`` has a row for each time, ``validation.png`` the curves, and
+``best.safetensors`` the weights with the least ``score``, their row among their words.
+"""
+
+import json
+import shutil
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from ..core.errors import InputError
+from ..core.files import save_text, whole_file
+from ..core.skeleton import STATURE
+from ..core.text import read_json
+from ..core.weights import Weights, load_weights
+from ..data.held_out import HeldClip
+from ..data.prepare import bank_in
+from .batches import Pool
+from .candidates import has_weights, snapshot, write_weights
+from .evaluate import Measured, measured, row
+from .export import annotate
+from .plots import curves
+from .train import checkpoints
+
+__all__ = ["BEST", "CURVES", "RECORD", "likelihoods", "recorded", "said", "score", "validations"]
+
+RECORD, BEST, CURVES = "validation.jsonl", "best.safetensors", "validation.png"
+SHIPPED = "the weights that ship"
+_RUNS = ("ground_truth", "free_t0", "free_t1", "ee_t0")
+_FIGURES = (
+    "sits_within_2cm",
+    "sits_within_4cm",
+    "sits_within_8cm",
+    "end_effector_error",
+    "foot_sliding_per_frame",
+    "skate_cm",
+    "penetrates",
+    "jerk",
+    "speed_wrists",
+    "speed_head",
+    "speed_chest",
+    "descent_seconds",
+    "lean_degrees",
+)
+_SHARES = ("sits_within_4cm", "sits_within_8cm")
+_GROUPS: dict[str, Callable[[HeldClip], str]] = {
+    "makers": lambda clip: clip.maker,
+    "bodies": lambda clip: clip.body,
+    "kinds": lambda clip: clip.kind,
+}
+_HELD_WINDOWS = 200
+
+
+def score(clips: Sequence[Measured]) -> float:
+    """Centimetres by which calm takes are off, the less the better: the pelvis over its seats in
+    FREE, the mean over makers, so that one counts as much as another; head and hands from their
+    targets in EE; and what feet skate in a second in FREE, over what captured ones do.
+    """
+    makers: dict[str, list[float]] = defaultdict(list)
+    for each in clips:
+        makers[each.clip.maker] += [abs(error) for error in each.runs["free_t0"].seats]
+    seats = 100.0 * float(np.mean([np.mean(errors) for errors in makers.values() if errors]))
+    free, ee, truth = (
+        row([each.runs[run] for each in clips]) for run in ("free_t0", "ee_t0", "ground_truth")
+    )
+    targets = 100.0 * STATURE * ee["end_effector_error"]
+    skates = 30.0 * max(0.0, free["skate_cm"] - truth["skate_cm"])
+    return round(seats + targets + skates, 3)
+
+
+def likelihoods(folder: Path, dataset: Path) -> dict[str, float]:
+    """Negative log-likelihood a frame of held-out windows for each part of a run's flow, its
+    weights averaged: nats, in standardised units, with the same draws each time.
+    """
+    held = Pool(lambda: [dataset / "held.npz"], torch.device("cpu"), bank_in(dataset))
+    runs = checkpoints(folder)
+    if "predictor" in runs:
+        runs["predictor"].adopt_average()
+    found = {}
+    for part, run in runs.items():
+        if part != "predictor":
+            run.adopt_average()
+            if "predictor" in runs:
+                run.gmvae.load_state_dict(runs["predictor"].network.state_dict())
+            run.config = replace(run.config, free_run=0.0, dropout_windows=0.0)
+            found[part] = run.held_loss(held, _HELD_WINDOWS)
+    return found
+
+
+def recorded(folder: Path) -> list[dict[str, Any]]:
+    """The rows of a run's validation so far. Raises InputError where its file is damaged."""
+    file = folder / RECORD
+    if not file.exists():
+        return []
+    try:
+        return [read_json(line) for line in file.read_text(encoding="utf-8").splitlines()]
+    except ValueError as error:
+        raise InputError(
+            f"The record '{file}' {error}; restore a backup, or remove it to begin anew."
+        ) from None
+
+
+def validations(
+    folder: Path,
+    dataset: Path,
+    clips: Sequence[HeldClip],
+    *,
+    every: float | None = None,
+    processes: int = 1,
+    progress: Callable[[float], None] = lambda share: None,
+) -> Iterator[dict[str, Any]]:
+    """Measure the run ``folder`` on ``clips`` (``real_test``) as it is now, and again ``every`` so
+    many minutes until its budget is spent: the rows, each once its files are written. What was
+    measured already is not measured again.
+
+    The run is only read, and may go on meanwhile. Raises InputError where it has no weights of the
+    whole flow yet; with ``every`` they are waited for.
+    """
+    seats = [clip for clip in clips if clip.room != "bed"]
+
+    def measure(weights: Weights) -> dict[str, Any]:
+        found = measured(
+            weights,
+            seats,
+            progress,
+            seeds=1,
+            modes=("FREE", "EE"),
+            clean=False,
+            processes=processes,
+        )
+        return {"score": score(found), **_figures(found)}
+
+    rows = recorded(folder)
+    spent = False
+    while not spent:
+        begin = time.monotonic()
+        if every is None or has_weights(folder):
+            with snapshot(folder) as copy:
+                if not any(each["weights"] == SHIPPED for each in rows):
+                    rows.append({"weights": SHIPPED, **measure(load_weights(None))})
+                    _record(folder, rows)
+                runs = checkpoints(copy)
+                spent = every is None or all(run.share >= 1.0 for run in runs.values())
+                parts = {
+                    part: {"steps": run.step, "minutes": round(run.seconds / 60, 2)}
+                    for part, run in runs.items()
+                }
+                if not any(each.get("parts") == parts for each in rows):
+                    file = copy / BEST
+                    write_weights(copy, dataset, file)
+                    flow = [part for part in parts if part != "predictor"]
+                    rows.append(
+                        {
+                            "weights": "the run",
+                            "hours": round(max(parts[part]["minutes"] for part in flow) / 60, 3),
+                            "parts": parts,
+                            "held_out": likelihoods(copy, dataset),
+                            **measure(load_weights(file)),
+                        }
+                    )
+                    _keep_if_best(folder, file, rows[-1])
+                    _record(folder, rows)
+                    yield rows[-1]
+        if not spent and every is not None:
+            time.sleep(max(0.0, 60.0 * every - (time.monotonic() - begin)))
+
+
+def said(found: Mapping[str, Any]) -> str:
+    """A row in one line."""
+    free, ee = (found["figures"][run] for run in ("free_t0", "ee_t0"))
+    when = f" after {found['hours']:.2f} h a part" if "hours" in found else ""
+    return (
+        f"{found['weights']}{when}: score {found['score']:.1f} cm; FREE within 4 / 8 cm "
+        f"{100 * free['sits_within_4cm']:.0f} / {100 * free['sits_within_8cm']:.0f} %, "
+        f"skate {free['skate_cm']:.2f}; EE {100 * ee['sits_within_4cm']:.0f} / "
+        f"{100 * ee['sits_within_8cm']:.0f} %, EED {ee['end_effector_error']:.4f}"
+    )
+
+
+def _figures(clips: Sequence[Measured]) -> dict[str, Any]:
+    """The figures of all clips, with intervals, and how well those of each maker, body and kind of
+    piece are sat on.
+    """
+    figures = {}
+    for run in _RUNS:
+        found = row([each.runs[run] for each in clips])
+        figures[run] = {name: found[name] for name in _FIGURES if name in found}
+        figures[run]["intervals"] = {
+            name: found["intervals"][name] for name in figures[run] if name in found["intervals"]
+        }
+    groups: dict[str, dict[str, Any]] = {}
+    for group, of in _GROUPS.items():
+        parts: dict[str, list[Measured]] = defaultdict(list)
+        for each in clips:
+            parts[of(each.clip)].append(each)
+        groups[group] = {
+            name: {"clips": len(own)}
+            | {
+                run: {share: found[share] for share in _SHARES}
+                for run in ("free_t0", "ee_t0")
+                for found in [row([each.runs[run] for each in own])]
+            }
+            for name, own in sorted(parts.items())
+        }
+    return {"clips": len(clips), "figures": figures, **groups}
+
+
+def _keep_if_best(folder: Path, file: Path, found: dict[str, Any]) -> None:
+    """Keep the weights with their row, where none that are kept are as good."""
+    best = folder / BEST
+    if best.exists():
+        kept = load_weights(best).metadata.get("validation", "")
+        try:
+            if read_json(kept)["score"] <= found["score"]:
+                return
+        except (ValueError, TypeError, KeyError):
+            raise InputError(
+                f"'{best}' does not say how good it is; move it away, and validate again."
+            ) from None
+    annotate(file, {"validation": json.dumps(found)})
+    with whole_file(best) as part:
+        shutil.copyfile(file, part)
+
+
+def _record(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
+    save_text(folder / RECORD, "\n".join(json.dumps(each) for each in rows))
+    curves(rows, folder / CURVES)

@@ -1,0 +1,347 @@
+"""A run's validation: the figures are those of ``dafnet evaluate``, the best weights are kept, the
+run is only read; and a cooled copy of it.
+"""
+
+import json
+import shutil
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="training needs torch")
+
+from dafnet_addon import cli  # noqa: E402
+from dafnet_addon.core.errors import InputError  # noqa: E402
+from dafnet_addon.core.root import raw_root_from_joints  # noqa: E402
+from dafnet_addon.core.skeleton import REST, STATURE  # noqa: E402
+from dafnet_addon.core.weights import load_weights  # noqa: E402
+from dafnet_addon.data.boxes import box  # noqa: E402
+from dafnet_addon.data.held_out import HeldClip  # noqa: E402
+from dafnet_addon.data.rests import Rest  # noqa: E402
+from dafnet_addon.model.config import ModelConfig  # noqa: E402
+from dafnet_addon.training import candidates, validation  # noqa: E402
+from dafnet_addon.training.evaluate import Measured, figures  # noqa: E402
+from dafnet_addon.training.real_report import real_report  # noqa: E402
+from dafnet_addon.training.train import Run, TrainingConfig, train_part  # noqa: E402
+from dafnet_addon.training.validation import likelihoods, recorded, score, validations  # noqa: E402
+
+BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
+TINY = ModelConfig(
+    predictor_code=8,
+    predictor_width=16,
+    width=16,
+    code=8,
+    shared_encoder=True,
+    mask=True,
+    steps_upper=1,
+    steps_lower=1,
+)
+
+
+def _clip(name: str, maker: str = "maker", body: str = "no/body") -> HeldClip:
+    """The rest pose, in its second half lowered onto a block of 0.45 m."""
+    joints = np.tile(REST, (40, 1, 1))
+    joints[20:, :, 2] -= REST[0, 2] - 0.57
+    return HeldClip(
+        name=name,
+        body=body,
+        activity="sit",
+        unseen=True,
+        composed=False,
+        room="",
+        joints=joints,
+        path=raw_root_from_joints(joints),
+        boxes=box((0.0, 0.0, 0.225), (0.4, 0.4, 0.45))[None],
+        rests=(Rest(20, 40, joints[-1, 0], 0.0),),
+        kind="chair",
+        maker=maker,
+    )
+
+
+CLIPS = [_clip("one"), _clip("two", "other maker")]
+
+
+def _train(dataset: Path, folder: Path, steps: int) -> None:
+    """Train all parts up to a number of steps of sixty."""
+    config = TrainingConfig(
+        minutes_predictor=1e-9, steps_flow=60, batch=4, warmup=5, save_every=1000
+    )
+    if not (folder / "predictor.checkpoint").exists():
+        train_part("predictor", dataset, folder, TINY, config)
+    for part in ("upper", "lower"):
+        train_part(part, dataset, folder, TINY, replace(config, steps_flow=steps))
+        run = Run.load(part, folder)
+        run.config = config
+        run.save()
+
+
+@pytest.fixture
+def described(dataset: Path) -> Path:
+    (dataset / "dataset.json").write_text(
+        '{"train": ["no/body"], "furniture": {}, "windows": 12, "seed": 3}', encoding="utf-8"
+    )
+    return dataset
+
+
+def _files(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.glob("*.checkpoint")}
+
+
+def test_a_run_is_measured_as_it_goes_on_and_its_best_weights_are_kept(
+    described: Path, tmp_path: Path
+):
+    run = tmp_path / "run"
+    _train(described, run, 2)
+    before = _files(run)
+    (first,) = validations(run, described, CLIPS)
+    assert _files(run) == before, "the run is only read"
+    assert not list(validations(run, described, CLIPS)), "nothing is measured twice"
+    _train(described, run, 30)
+    (second,) = validations(run, described, CLIPS)
+
+    shipped, *own = recorded(run)
+    assert own == [first, second] and "hours" not in shipped
+    assert [each["parts"]["upper"]["steps"] for each in own] == [2, 30]
+    assert set(first["makers"]) == {"maker", "other maker"} and set(first["held_out"]) == {
+        "upper",
+        "lower",
+    }
+    assert second["held_out"]["lower"] < first["held_out"]["lower"], "it has learnt"
+    best = load_weights(run / validation.BEST)
+    kept = json.loads(best.metadata["validation"])
+    assert kept == min(own, key=lambda each: each["score"])
+    assert (run / validation.CURVES).read_bytes().startswith(b"\x89PNG")
+
+    report = real_report(best, CLIPS)["all seats"]
+    for which in ("ground_truth", "free_t0", "ee_t0"):
+        for name, value in kept["figures"][which].items():
+            if name == "intervals":
+                assert all(report[which][name][each] == value[each] for each in value)
+            else:
+                assert report[which][name] == value, "as 'dafnet evaluate' has it"
+
+
+def test_only_what_is_better_takes_the_place_of_the_best(
+    described: Path, tmp_path: Path, monkeypatch
+):
+    run = tmp_path / "run"
+    scores = iter((9.0, 5.0, 7.0, 4.0))  # the first is of the weights that ship
+    monkeypatch.setattr(validation, "score", lambda clips: next(scores))
+    for steps, best in ((2, 5.0), (4, 5.0), (6, 4.0)):
+        _train(described, run, steps)
+        list(validations(run, described, CLIPS))
+        words = load_weights(run / validation.BEST).metadata
+        assert json.loads(words["validation"])["score"] == best
+    assert json.loads(words["training"])["upper"]["steps"] == 6
+
+
+def test_it_goes_on_until_the_budget_is_spent(described: Path, tmp_path: Path, monkeypatch):
+    run, slept = tmp_path / "run", []
+
+    def sleep(seconds: float) -> None:
+        slept.append(seconds)
+        _train(described, run, (2, 2, 20, 60)[len(slept) - 1])
+
+    monkeypatch.setattr(validation.time, "sleep", sleep)
+    with pytest.raises(InputError, match="no weights of the whole flow yet"):
+        list(validations(run, described, CLIPS))
+    rows = list(validations(run, described, CLIPS, every=10.0))
+    assert [each["parts"]["lower"]["steps"] for each in rows] == [2, 20, 60]
+    assert len(slept) == 4 and all(500.0 < seconds <= 600.0 for seconds in slept)
+
+
+def test_what_fails_leaves_all_as_it_was(described: Path, tmp_path: Path, monkeypatch):
+    run = tmp_path / "run"
+    _train(described, run, 2)
+    list(validations(run, described, CLIPS))
+    _train(described, run, 4)
+    names = (validation.RECORD, validation.BEST, validation.CURVES)
+    before = [(run / name).read_bytes() for name in names]
+
+    def fails(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(validation, "measured", fails)
+        with pytest.raises(KeyboardInterrupt):
+            list(validations(run, described, CLIPS))
+    assert [(run / name).read_bytes() for name in names] == before
+    assert len(list(validations(run, described, CLIPS))) == 1, "and can be gone on with"
+    (run / validation.RECORD).write_text('{"weights": ', encoding="utf-8")
+    with pytest.raises(InputError, match=r"validation\.jsonl' is not JSON; restore"):
+        list(validations(run, described, CLIPS))
+
+
+def test_a_score_is_how_far_calm_takes_are_off():
+    def measured(clip: HeldClip, free: np.ndarray, ee: np.ndarray) -> Measured:
+        takes = {"ground_truth": clip.joints, "free_t0": free, "ee_t0": ee}
+        return Measured(clip, {name: figures(clip, take[None]) for name, take in takes.items()})
+
+    one, two, three = _clip("one"), _clip("two"), _clip("three", "other maker")
+    true = [measured(clip, clip.joints, clip.joints) for clip in (one, two, three)]
+    assert score(true) == 0.0
+    high = three.joints + np.array([0.0, 0.0, 0.06])
+    off = measured(three, high, three.joints)
+    assert abs(score([*true[:2], off]) - 3.0) < 0.01, "a maker counts as much as another"
+    aside = three.joints + np.array([0.0, 0.02, 0.0])
+    assert abs(score([measured(three, three.joints, aside)]) - 2.0 / 1.7 * STATURE) < 0.01
+    sliding = three.joints.copy()
+    sliding[20:, :, 1] += 0.01 * np.arange(20)[:, None]
+    assert score([measured(three, sliding, three.joints)]) > 3.0
+
+
+def test_likelihoods_are_of_the_averaged_weights(described: Path, tmp_path: Path):
+    run = tmp_path / "run"
+    _train(described, run, 12)
+    averaged = likelihoods(run, described)
+    for part in ("predictor", "upper", "lower"):
+        kept = Run.load(part, run)
+        kept.adopt_average()
+        kept.save()
+    assert likelihoods(run, described) == averaged == likelihoods(run, described)
+
+
+def test_a_snapshot_is_whole_while_the_run_is_saved(described: Path, tmp_path: Path):
+    run = tmp_path / "run"
+    _train(described, run, 2)
+    training, done = Run.load("upper", run), threading.Event()
+
+    def save() -> None:
+        while not done.is_set():
+            training.step += 1
+            training.save()
+
+    saving = threading.Thread(target=save)
+    saving.start()
+    try:
+        steps = []
+        for _ in range(20):
+            with candidates.snapshot(run) as copy:
+                steps.append(Run.load("upper", copy).step)
+                assert steps[-1] == Run.load("upper", copy).step
+            assert not copy.exists()
+    finally:
+        done.set()
+        saving.join()
+    assert steps == sorted(steps) and steps[-1] > steps[0]
+
+
+def test_a_copy_is_cooled_and_the_run_is_not_disturbed(described: Path, tmp_path: Path):
+    run, out = tmp_path / "run", tmp_path / "candidate"
+    with pytest.raises(InputError, match="no weights of the whole flow yet"):
+        candidates.cooled(run, described, out, 0.02)
+    _train(described, run, 4)
+    for part, seconds in (("upper", 600.0), ("lower", 540.0)):
+        kept = Run.load(part, run)
+        kept.seconds = seconds
+        kept.save()
+    before = _files(run)
+    candidates._begin_cooling(run, out, 1.0)
+    for part in ("upper", "lower"):
+        begun = Run.load(part, out)
+        assert begun.step == 4 and begun.config.minutes_flow == 11.0
+        rates = [
+            begun.config.rate(1000, begun.config.share(1000, seconds))
+            for seconds in (600.0, 630.0, 660.0)
+        ]
+        middle = (begun.config.peak + begun.config.final) / 2
+        assert np.allclose(rates, [begun.config.peak, middle, begun.config.final])
+        # All but a second of it is over: what is left is trained by the command.
+        begun.seconds = 659.0
+        begun.save()
+    file = candidates.cooled(run, described, out, 1.0)
+    assert _files(run) == before and file == out / "dafnet.safetensors"
+    for part in ("upper", "lower"):
+        assert Run.load(part, out).step > 4 and Run.load(part, out).share == 1.0
+    said = json.loads(load_weights(file).metadata["training"])
+    assert said["upper"]["minutes"] >= 11.0 and said["settings"]["cool_down"] == 1.0 / 11.0
+    steps = Run.load("upper", out).step
+    candidates.cooled(run, described, out, 1.0)
+    assert Run.load("upper", out).step == steps, "what is cooled stays so"
+
+
+def test_a_run_that_cools_itself_is_cooled_from_before(described: Path, tmp_path: Path):
+    run = tmp_path / "run"
+    _train(described, run, 60)  # its rate has fallen since step 42
+    shutil.copyfile(run / "upper-held.checkpoint", run / "predictor-held.checkpoint")
+    candidates._begin_cooling(run, tmp_path / "candidate", 1.0)
+    for name, value in Run.load("predictor", run).averaged.items():
+        assert torch.equal(value, Run.load("predictor", tmp_path / "candidate").averaged[name]), (
+            "the flow has learnt with the predictor as it was done"
+        )
+    held = Run.load("upper", run, name="upper-held").step
+    assert 42 <= held < 60 and Run.load("upper", tmp_path / "candidate").step == held
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "mine.txt").write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match="something else"):
+        candidates.cooled(run, described, other, 1.0)
+    assert [file.name for file in other.iterdir()] == ["mine.txt"]
+
+
+def test_the_commands(described: Path, tmp_path: Path, monkeypatch, capsys):
+    from dafnet_addon.data import real_test
+
+    monkeypatch.setattr(real_test, "real_test", lambda *_: CLIPS)
+    run = tmp_path / "run"
+    command = ["validate", str(run), str(described), "mocap", "--furniture", "library"]
+    assert cli.main(command) == 1
+    assert "no weights of the whole flow yet" in capsys.readouterr().err
+    assert not run.exists()
+    _train(described, run, 60)
+    assert cli.main([*command, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [each["weights"] for each in found] == ["the weights that ship", "the run"]
+    assert cli.main([*command, "--every", "60"]) == 0, "its budget is spent"
+    assert capsys.readouterr().out.count("score") == 2
+    cooled = ["cool", str(run), str(described), "-o", str(tmp_path / "out"), "--minutes", "0.01"]
+    assert cli.main(cooled) == 0
+    assert load_weights(tmp_path / "out" / "dafnet.safetensors").config["model"]["width"] == 16
+
+
+def test_what_real_pieces_give_is_measured_in_equal_time(
+    described: Path, tmp_path: Path, monkeypatch
+):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import ablation
+
+    asked = []
+
+    def prepare(folder: Path, out: Path, windows: int, processes: int, seed: int) -> None:
+        asked.append((windows, seed))
+        shutil.copytree(described, out, dirs_exist_ok=True)
+
+    monkeypatch.setattr(ablation, "prepare", prepare)
+    monkeypatch.setattr(ablation, "real_test", lambda *_: CLIPS)
+    run = tmp_path / "run"
+    _train(described, run, 2)
+    candidates.write_weights(run, described, tmp_path / "w.safetensors")
+    arguments = described, tmp_path, tmp_path, tmp_path / "out", 0.01
+    weights = load_weights(tmp_path / "w.safetensors")
+    text = ablation.furniture(*arguments, weights)
+    assert asked == [(12, 3)], "as many windows, the same seed"
+    lines = text.splitlines()[2:]
+    groups = 1 + 1 + 2 + 1  # all; a body; two makers; a kind
+    assert len(lines) == 3 * groups and all(line.count("|") == 11 for line in lines)
+    kept = json.loads((tmp_path / "out" / "furniture.json").read_text(encoding="utf-8"))
+    steps = kept[ablation.REAL]["steps"]
+    assert min(steps.values()) > 0 and set(kept) == {ablation.BEGUN, ablation.BOXES, ablation.REAL}
+    assert ablation.furniture(*arguments, weights) == text, "what is finished is kept"
+    (described / "dataset.json").write_text('{"windows": 12, "seed": 3}', encoding="utf-8")
+    with pytest.raises(InputError, match="no real pieces"):
+        ablation.furniture(*arguments, weights)
+
+
+def test_differences_are_paired(monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import ablation
+
+    rng = np.random.default_rng(0)
+    worse = rng.uniform(0.0, 30.0, 30)
+    mean, low, high = ablation.paired(worse - 2.0, worse)
+    assert mean == pytest.approx(-2.0) and low == pytest.approx(-2.0) == pytest.approx(high)
+    mean, low, high = ablation.paired(worse - rng.normal(2.0, 1.0, 30), worse)
+    assert low < mean < high and high - low < 1.5
