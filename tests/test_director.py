@@ -80,6 +80,27 @@ def test_stools_and_benches_are_sat_on_from_where_one_comes():
     assert seat_of(bed, np.array([0.0, 4.0])).position[1] > 0.5, "on a bed's edge"
 
 
+def test_one_sits_on_a_beds_edge_and_not_on_its_pillow():
+    mattress = _box((-0.5, -1.0, 0.1), (0.5, 1.0, 0.5))
+    boards = [_box((-0.5, 1.0, 0.0), (0.5, 1.05, 1.1)), _box((-0.5, -1.05, 0.0), (0.5, -1.0, 0.8))]
+    for towards in ((4.0, 1.0), (-4.0, 0.0), (1.0, -4.0)):
+        found = seat_of([mattress, *boards], np.array(towards))
+        ahead = np.array([-np.sin(found.yaw), np.cos(found.yaw)])
+        assert abs(ahead[1]) < 0.05 and ahead @ towards > 0, "on a long edge, towards where one is"
+        assert abs(found.position @ ahead + found.edge - 0.5) < 0.03 and found.edge < 0.25
+        assert not found.back and abs(found.height - 0.5) < 0.01
+    foot = seat_of([mattress, boards[0]], np.array([0.3, -4.0]))
+    assert np.cos(foot.yaw - np.pi) > 0.99 and foot.position[1] < -0.7
+
+
+def test_a_sofas_long_part_is_no_bed():
+    seat = [_box((-1.2, -0.35, 0.0), (1.2, 0.35, 0.42)), _box((0.5, -1.3, 0.0), (1.2, -0.35, 0.42))]
+    back = _box((-1.2, 0.35, 0.0), (1.2, 0.5, 0.85))
+    found = seat_of([*seat, back], np.array([0.0, -4.0]))
+    assert found.back and np.cos(found.yaw - np.pi) > 0.99
+    assert found.position[0] < 0.5 and abs(found.position[1] - 0.15) < 0.05
+
+
 def test_who_rests_over_a_seat_sits():
     chair = _chair()
     assert on_a_seat(chair, np.array([0.0, 0.0])) and not on_a_seat(chair, np.array([0.0, 0.6]))

@@ -26,17 +26,21 @@ _NEARLY = 0.5
 _ONE_SIDED = 0.10
 # metres between the pelvis and the back; and the front edge, where there is no back
 _BEFORE_BACK, _FROM_EDGE = 0.20, 0.22
+_ON_IT = 0.12  # metres of seat that the pelvis has before it, however shallow the seat is
 _SNAP = np.radians(30.0)
 _UNDER = 0.08  # metres around a root, in which its seat is looked for
 _SMALLEST, _LARGEST = 0.15, 15.0  # metres across, of furniture
 _HALF_WIDTH = 0.28  # metres that a body needs to each side
+# metres from a back to the front edge: on what is deeper, as a bed, one sits on an edge
+_DEEPEST = 1.1
+_LEGS = 0.3  # metres beyond an edge, and to each side, that legs need to hang there
 
 
 @dataclass(frozen=True)
 class SeatPlace:
     """``position`` (2,) of the resting pelvis and ``yaw`` that it faces (``core.root``); ``height``
     of the seat's top over the world's zero, metres; whether there is a ``back``; ``aside``: metres
-    to each side within which one may sit as well.
+    to each side within which one may sit as well; ``edge``: metres from there to the front edge.
     """
 
     position: np.ndarray
@@ -44,6 +48,7 @@ class SeatPlace:
     height: float
     back: bool
     aside: float
+    edge: float
 
 
 def _hull(points: np.ndarray) -> np.ndarray:
@@ -121,6 +126,48 @@ def _seat_level(field: HeightField, floor: float) -> tuple[float, np.ndarray] | 
     return level, cells
 
 
+def _nearest(ways: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """The one of unit vectors ``ways`` (N, 2) that is most like ``wanted`` (2,)."""
+    return ways[np.argmax(ways @ wanted)]
+
+
+def _snapped(forward: np.ndarray, ways: np.ndarray) -> np.ndarray:
+    """``forward`` (2,), or the one of the ``ways`` (N, 2) that is as good as it."""
+    found = _nearest(ways, forward)
+    return found if found @ forward > np.cos(_SNAP) else forward
+
+
+def _spot(
+    places: np.ndarray, forward: np.ndarray, near: np.ndarray | None
+) -> tuple[float, float, float, float]:
+    """Where one sits on ``places`` (N, 2) that looks ``forward``: how far to the right, with how
+    much room to each side, and where along ``forward`` the seat begins and ends there.
+
+    One sits in the middle or beside ``near``; where a part of a sofa is as deep as a bed, on
+    another part.
+    """
+    sideways = np.array([forward[1], -forward[0]])
+    depth, width = places @ forward, places @ sideways
+    middle = 0.5 * float(width.min() + width.max())
+    room = max(0.0, 0.5 * float(np.ptp(width)) - _HALF_WIDTH)
+    low, high = middle - room, middle + room
+    wanted = middle if near is None else float(np.clip(near @ sideways, low, high))
+    others = np.linspace(low, high, 1 + round(2 * room / _CELL))
+    spots = []
+    for aside in (wanted, *others[np.argsort(np.abs(others - wanted))]):
+        column = depth[np.abs(width - aside) < 0.5 * _ROOM]
+        column = column if len(column) else depth
+        spots.append((float(aside), room, float(column.min()), float(column.max())))
+    return next((spot for spot in spots if spot[3] - depth.min() <= _DEEPEST), spots[0])
+
+
+def _blocked(up: np.ndarray, forward: np.ndarray, spot: tuple[float, float, float, float]) -> bool:
+    """Whether something stands up, at places ``up`` (N, 2), where legs would hang over an edge."""
+    aside, _, _, high = spot
+    along, across = up @ forward - high, up @ np.array([forward[1], -forward[0]]) - aside
+    return bool(((along > -0.1) & (along < _LEGS) & (np.abs(across) < _LEGS)).any())
+
+
 def on_a_seat(solids: Sequence[Box | Mesh], position: np.ndarray, floor: float = 0.0) -> bool:
     """Whether a root that rests at ``position`` (2,) has a seat under it: something between 22 and
     85 cm over ``floor``.
@@ -142,8 +189,9 @@ def seat_of(
     m.
 
     With a back on one side one sits before it and looks away from it; without, one looks along the
-    seat's shorter side, to where ``towards`` (2,) lies. On a wide seat one sits in the middle, or
-    beside ``near`` (2,) where given. Raises InputError where there is nothing to sit on: a level
+    seat's shorter side, to where ``towards`` (2,) lies. On what is as deep as a bed one sits on an
+    edge towards there, at which nothing stands up. On a wide seat one sits in the middle, or beside
+    ``near`` (2,) where given. Raises InputError where there is nothing to sit on: a level
     surface between 22 and 85 cm over ``floor``. ``size``: of the character, over 1.75 m, for what
     is said of the scene.
     """
@@ -173,23 +221,22 @@ def seat_of(
     if back:
         forward = -side / np.linalg.norm(side)
         ways = np.stack([longer, -longer, shorter, -shorter])
+        forward = _snapped(forward, ways)
+        spot = _spot(places, forward, near)
+        if spot[3] - (places @ forward).min() > _DEEPEST:
+            back = False
+            legs = field.middles(np.argwhere(field.top - floor > level + _FLAT))
+            free = [way for way in ways if not _blocked(legs, way, _spot(places, way, near))]
+            forward = _nearest(np.array(free or ways), towards - middle)
     else:
-        forward = towards - middle
-        forward = forward / max(float(np.linalg.norm(forward)), 1e-9)
         square = np.ptp(places @ longer) < 1.3 * np.ptp(places @ shorter)
         ways = np.stack([longer, -longer, shorter, -shorter] if square else [shorter, -shorter])
-    along = ways @ forward
-    if not back or along.max() > np.cos(_SNAP):
-        forward = ways[np.argmax(along)]
-    sideways = np.array([forward[1], -forward[0]])
-    depth, width = places @ forward, places @ sideways
-    low, high = float(depth.min()), float(depth.max())
-    at = low + _BEFORE_BACK if back else max(0.5 * (low + high), high - _FROM_EDGE)
-    aside = 0.5 * float(width.min() + width.max())
-    room = 0.5 * float(np.ptp(width)) - _HALF_WIDTH
-    if near is not None and room > 0.0:
-        aside = float(np.clip(near @ sideways, aside - room, aside + room))
-    position = min(at, high) * forward + aside * sideways
-    return SeatPlace(
-        position, float(np.arctan2(-forward[0], forward[1])), floor + level, back, max(room, 0.0)
-    )
+        forward = _nearest(ways, towards - middle)
+    aside, room, low, high = _spot(places, forward, near)
+    if back:
+        at = min(low + _BEFORE_BACK, max(0.5 * (low + high), high - _ON_IT))
+    else:
+        at = max(0.5 * (low + high), high - _FROM_EDGE)
+    position = at * forward + aside * np.array([forward[1], -forward[0]])
+    yaw = float(np.arctan2(-forward[0], forward[1]))
+    return SeatPlace(position, yaw, floor + level, back, room, high - at)
