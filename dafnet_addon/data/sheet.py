@@ -2,8 +2,8 @@
 above.
 
 Axes are equal and in metres. The body's left is blue, its right orange; an arrow on the floor shows
-where it faces; furniture is drawn as wireframes, contacts as green dots. Needs matplotlib, which is
-imported when a sheet is drawn.
+where it faces; furniture is shaded, with the body drawn over it; contacts are green dots. Needs
+matplotlib, which is imported when a sheet is drawn.
 """
 
 from collections.abc import Sequence
@@ -17,6 +17,7 @@ from ..core.root import root_from_joints
 from ..core.rotations import normalised, rotate, yaw_matrix
 from ..core.skeleton import PARENTS, joint
 from .flesh import Furnishing
+from .picture import picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,10 +29,10 @@ Row = tuple[str, np.ndarray, Furnishing | None]
 Cell = tuple[float, float, float, float]  # left, bottom, width, height
 
 _LEFT, _RIGHT, _TRUNK = "#1f6fb4", "#e0701a", "#3a3a3a"
-_FURNITURE, _CONTACT, _FACING, _FAINT = "#8a7a66", "#1e9e3e", "#a01860", "#d4d4d4"
+_CONTACT, _FACING, _FAINT = "#1e9e3e", "#a01860", "#d4d4d4"
 # a cell, and how much of it lies under the floor line; metres
 _WIDTH, _HEIGHT, _BELOW = 1.8, 2.35, 0.32
-_INCHES = 0.68  # a metre on paper
+_INCHES, _DOTS = 0.68, 82.0  # a metre on paper, and in pictures of furniture
 # the camera: from straight ahead towards the body's right side, and up
 _TURN, _TILT = np.radians(60), np.radians(12)
 _CONTACT_JOINTS = (
@@ -52,10 +53,6 @@ _RIGHT_BONES = {
 _COLOURS = [
     _LEFT if j in _LEFT_BONES else _RIGHT if j in _RIGHT_BONES else _TRUNK for j in range(22)
 ]
-_CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-_EDGES = np.array(
-    [(a, b) for a in range(8) for b in range(a) if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 2]
-)
 
 
 def _camera(yaw: float) -> np.ndarray:
@@ -67,18 +64,21 @@ def _camera(yaw: float) -> np.ndarray:
     return np.stack([right, np.cross(toward, right), toward]) @ yaw_matrix(np.array(-yaw))
 
 
-def _wireframe(room: Furnishing) -> np.ndarray:
-    """(N, 2, 3) edges of the boxes, and dots on the surfaces of the shapes."""
-    boxes = room.boxes
-    corners = (
-        rotate(yaw_matrix(boxes[:, None, 6]), _CORNERS * boxes[:, None, 3:6]) + boxes[:, None, :3]
-    )
-    dots = room.bank.surface(room.shapes)
-    return np.concatenate(
-        [
-            corners[:, _EDGES].reshape(-1, 2, 3),
-            np.stack([dots, dots + np.array([0.0, 0.0, 0.012])], axis=1),
-        ]
+def _furniture(
+    ax: "Axes", room: Furnishing, camera: np.ndarray, middle: np.ndarray, cell: Cell, scale: float
+) -> None:
+    """Draw furniture as ``camera`` sees it into a cell, in whose middle ``middle`` (3,) lies,
+    ``scale`` units of the sheet a metre.
+    """
+    dots = scale * _DOTS
+    size = round(cell[2] * _DOTS), round(cell[3] * _DOTS)
+    seen = picture(room, None, camera, middle, size, dots)
+    ax.imshow(
+        seen,
+        extent=(cell[0], cell[0] + cell[2], cell[1], cell[1] + cell[3]),
+        aspect="equal",
+        interpolation="antialiased",
+        zorder=0,
     )
 
 
@@ -111,13 +111,9 @@ def _figure(
     def seen(points: np.ndarray) -> np.ndarray:
         return (points - ground) @ camera[:2].T + corner
 
-    # Floor lines every metre of the world, so that travel shows although the camera follows.
-    low, high = np.floor(ground[:2]) - 1, np.ceil(ground[:2]) + 1
-    grid = [((x, low[1], 0), (x, high[1], 0)) for x in np.arange(low[0], high[0] + 1)]
-    grid += [((low[0], y, 0), (high[0], y, 0)) for y in np.arange(low[1], high[1] + 1)]
-    _lines(ax, seen(np.array(grid, dtype=float)), _FAINT, 0.5, cell)
-    if room is not None and len(room):
-        _lines(ax, seen(_wireframe(room)), _FURNITURE, 0.8, cell)
+    # The floor's lines are those of the world, so that travel shows although the camera follows.
+    middle = ground + (cell[3] / 2 - _BELOW) * camera[1]
+    _furniture(ax, room or Furnishing(), camera, middle, cell, 1.0)
 
     forward = rotate(yaw_matrix(np.array(yaw)), np.array([0.0, 1.0, 0.0]))
     start, end = seen(np.stack([ground, ground + 0.38 * forward]))
@@ -170,7 +166,8 @@ def _plan(
         return (points[..., :2] - middle) * scale + corner
 
     if room is not None and len(room):
-        _lines(ax, seen(_wireframe(room)), _FURNITURE, 0.8, cell)
+        square = (corner[0] - cell[2] / 2, corner[1] - cell[2] / 2, cell[2], cell[2])
+        _furniture(ax, room, np.eye(3), np.array([*middle, 0.0]), square, scale)
     _lines(ax, seen(np.stack([path[:-1], path[1:]], 1)), _TRUNK, 0.8, cell)
     for frame in frames:
         pose = joints[frame]
