@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +11,30 @@ import pytest
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.occupancy import distance, occupancy
 from dafnet_addon.core.root import RootPath
+from dafnet_addon.core.skeleton import SEAT_TO_PELVIS
 from dafnet_addon.core.solids import Scene
+from dafnet_addon.data.flesh import GIVES, PROBES, Furnishing, clearance, sunk
 from dafnet_addon.data.library import Piece, kind_of, read_library
-from dafnet_addon.data.real_pieces import LIES_OVER, bed_shape_for, seat_shape_for
+from dafnet_addon.data.real_pieces import (
+    LIES_OVER,
+    bed_shape_for,
+    desk_shape_for,
+    seat_shape_for,
+)
 from dafnet_addon.data.rests import Rest
-from dafnet_addon.data.shapes import FARTHEST, PELVIS_OVER, STRETCH, ShapeBank, bank_of
+from dafnet_addon.data.shapes import (
+    FARTHEST,
+    PELVIS_OVER,
+    STRETCH,
+    ShapeBank,
+    bank_of,
+    shapes_of,
+)
+from dafnet_addon.data.uses import Use
 from kit.places import LIBRARY
 
 trimesh = pytest.importorskip("trimesh")
+Size = tuple[float, float, float]
 
 
 def _chair(width: float = 0.46) -> "trimesh.Trimesh":
@@ -55,6 +72,22 @@ def _piece(kind: str = "chair", name: str = "one") -> Piece:
         vertices=np.asarray(mesh.vertices, float),
         triangles=np.asarray(mesh.faces, np.int64),
     )
+
+
+def _of_mesh(kind: str, mesh: "trimesh.Trimesh", name: str = "") -> Piece:
+    return replace(
+        _piece(kind, name or kind),
+        vertices=np.asarray(mesh.vertices, float),
+        triangles=np.asarray(mesh.faces, np.int64),
+    )
+
+
+def _made(kind: str, parts: list[tuple[Size, Size]], name: str = "") -> Piece:
+    """A piece of boxes: size and middle of each."""
+    boxes = [trimesh.creation.box(size) for size, _ in parts]
+    for box, (_, middle) in zip(boxes, parts, strict=True):
+        box.apply_translation(middle)
+    return _of_mesh(kind, trimesh.util.concatenate(boxes), name)
 
 
 @pytest.fixture(scope="module")
@@ -133,10 +166,50 @@ def test_what_is_no_library_is_said(tmp_path: Path) -> None:
 
 def test_one_sits_on_a_chair_where_and_as_high_as_it_carries(bank: ShapeBank) -> None:
     for shape in bank.shapes:
-        assert shape.seat is not None
-        assert abs(shape.seat.height - 0.45 * shape.factor) < 0.01
-        assert abs(shape.seat.pelvis - shape.seat.height - PELVIS_OVER["chair"]) < 1e-9
-        assert abs(np.cos(shape.seat.yaw) + 1.0) < 1e-6 and np.abs(shape.seat.position).max() < 0.1
+        (seat,) = shape.seats
+        assert abs(seat.height - 0.45 * shape.factor) < 0.01
+        assert abs(seat.pelvis - seat.height - PELVIS_OVER["chair"]) < 1e-9
+        assert abs(np.cos(seat.yaw) + 1.0) < 1e-6 and np.abs(seat.position).max() < 0.1
+        assert abs(seat.position[1] - seat.edge + 0.23) < 0.04, "the front edge lies at −0.23"
+
+
+def test_one_sits_on_a_stool_from_every_side_and_on_a_bed_where_its_boards_leave_room() -> None:
+    block = _made("stool", [((0.4, 0.4, 0.45), (0.0, 0.0, 0.225))])
+    (stool,) = shapes_of(block, factors=(1.0,))
+    assert sorted(round(float(np.cos(seat.yaw))) for seat in stool.seats) == [-1, 0, 0, 1]
+    parts = [
+        ((1.0, 2.0, 0.5), (0.0, 0.0, 0.25)),
+        ((1.0, 0.05, 1.0), (0.0, 1.0, 0.5)),
+        ((1.0, 0.05, 0.7), (0.0, -1.0, 0.35)),
+    ]
+    low, high = shapes_of(_made("bed", parts), factors=(0.9, 1.1))
+    for bed, height in ((low, 0.45), (high, 0.55)):
+        assert len(bed.seats) == 2
+        for seat in bed.seats:
+            assert abs(seat.height - height) < 0.01 and abs(np.cos(seat.yaw)) < 0.05
+            ahead = np.array([-np.sin(seat.yaw), np.cos(seat.yaw)])
+            assert abs(seat.position @ ahead + seat.edge - 0.5) < 0.04, "on its long edges"
+
+
+def test_the_surface_is_that_under_the_hips() -> None:
+    """A seat that falls towards its back carries the pelvis lower than it is on the whole."""
+    slope = trimesh.creation.box((0.5, 0.5, 0.04))
+    slope.apply_transform(trimesh.transformations.rotation_matrix(np.radians(-9), (1, 0, 0)))
+    slope.apply_translation((0.0, 0.0, 0.42))
+    back = trimesh.creation.box((0.5, 0.04, 0.5))
+    back.apply_translation((0.0, 0.25, 0.62))
+    (shape,) = shapes_of(_of_mesh("chair", trimesh.util.concatenate([slope, back])), factors=(1.0,))
+    (seat,) = shape.seats
+    under = 0.44 - np.tan(np.radians(9)) * seat.position[1]
+    assert abs(seat.height - under) < 0.012 and seat.position[1] > -0.1
+
+
+def test_nobody_sits_on_what_is_too_narrow_or_carries_nothing() -> None:
+    fan = _made("table", [((0.24, 0.27, 0.4), (0.0, 0.0, 0.2))])
+    assert not shapes_of(fan, factors=(1.0,))[0].seats
+    rails = [((0.04, 0.5, 0.04), (x, 0.0, 0.43)) for x in (-0.23, 0.23)]
+    rails += [((0.5, 0.04, 0.04), (0.0, y, 0.43)) for y in (-0.23, 0.23)]
+    assert not shapes_of(_made("chair", rails), factors=(1.0,))[0].seats
 
 
 def test_a_bank_is_kept(bank: ShapeBank, tmp_path: Path) -> None:
@@ -146,7 +219,12 @@ def test_a_bank_is_kept(bank: ShapeBank, tmp_path: Path) -> None:
         assert (
             (one.values == two.values).all() and one.name == two.name and one.factor == two.factor
         )
-        assert one.seat is not None and two.seat is not None and one.seat.height == two.seat.height
+        assert [seat.height for seat in one.seats] == [seat.height for seat in two.seats]
+        assert (one.seats[0].position == two.seats[0].position).all()
+    with np.load(tmp_path / "bank.npz") as arrays:
+        np.savez(tmp_path / "old.npz", **{**arrays, "seats": np.zeros((2, 6))})
+    with pytest.raises(InputError, match="make the dataset anew"):
+        ShapeBank.read(tmp_path / "old.npz")
 
 
 def test_distances_are_those_of_the_mesh(bank: ShapeBank) -> None:
@@ -211,8 +289,6 @@ def test_other_devices_see_the_same(bank: ShapeBank) -> None:
 
 def _free(height: float) -> np.ndarray:
     """Probes of a body of which nothing is near furniture."""
-    from dafnet_addon.data.flesh import PROBES
-
     return np.full((4, len(PROBES), 3), 50.0 + height)
 
 
@@ -233,8 +309,6 @@ def test_a_real_seat_carries_the_pelvis_as_high_as_it_rests(bank: ShapeBank) -> 
 
 
 def test_no_real_seat_cuts_the_body(bank: ShapeBank) -> None:
-    from dafnet_addon.data.flesh import PROBES
-
     rest = Rest(0, 10, np.array([0.0, 0.0, 0.56]), 0.0)
     blocked = _free(0.0)
     # an ankle in the seat
@@ -242,16 +316,65 @@ def test_no_real_seat_cuts_the_body(bank: ShapeBank) -> None:
     assert seat_shape_for(np.random.default_rng(0), bank, rest, blocked) is None
 
 
+def test_who_sinks_in_sinks_downwards_only() -> None:
+    """A sofa's cushion gives way to who sits on it, and its back to nobody."""
+    wall = Furnishing(boxes=np.array([[0.0, 0.3, 0.5, 0.5, 0.1, 0.5, 0.0]]))
+    floor = Furnishing(boxes=np.array([[0.0, 0.0, 0.2, 0.5, 0.5, 0.2, 0.0]]))
+    body = _free(0.0)
+    hip = PROBES.index(("left_hip", "left_knee", 0.0, 0.08))
+    body[:, hip] = (0.0, 0.16, 0.5)
+    assert clearance(wall, body, GIVES, sunk(0.03)) == pytest.approx(0.04)
+    body[:, hip] = (0.0, 0.22, 0.5)
+    assert clearance(wall, body, GIVES, sunk(0.03)) < 0.0
+    body[:, hip] = (0.0, 0.0, 0.41 - (SEAT_TO_PELVIS - 0.03))
+    assert clearance(floor, body, GIVES, sunk(0.03)) == pytest.approx(0.01)
+    assert clearance(floor, body, GIVES, sunk(0.14)) < 0.0
+
+
+def test_what_is_easy_to_sit_on_does_not_take_the_place_of_what_is_not() -> None:
+    """Two stools of a kind, on one of which the shins leave room only far forward on it."""
+    deep = _made("stool", [((0.5, 0.7, 0.45), (0.0, 0.0, 0.225))], "deep")
+    plain = _made("stool", [((0.3, 0.3, 0.45), (0.0, 0.0, 0.225))], "plain")
+    stools = bank_of([deep, plain], factors=(1.0,))
+    body = _free(0.0)
+    for side in ("left", "right"):
+        body[:, PROBES.index((f"{side}_knee", f"{side}_ankle", 0.5, 0.05))] = (0.0, 0.24, 0.25)
+    rng = np.random.default_rng(0)
+    rest = Rest(0, 10, np.array([0.0, 0.0, 0.59]), 0.0)
+    found = [seat_shape_for(rng, stools, rest, body) for _ in range(60)]
+    names = [stools.shapes[int(room.shapes[0, 0])].name for room in found if room is not None]
+    assert len(names) == 60 and 18 <= names.count("deep") <= 42
+
+
+def test_hands_work_on_a_real_desk() -> None:
+    parts = [
+        ((1.4, 0.7, 0.03), (0.0, 0.0, 0.735)),
+        ((0.04, 0.7, 0.72), (-0.68, 0.0, 0.36)),
+        ((0.04, 0.7, 0.72), (0.68, 0.0, 0.36)),
+    ]
+    desks = bank_of([_made("desk", parts)], factors=(0.88, 1.0))
+    yaw, origin = 0.6, np.array([1.0, -2.0])
+    away = np.array([-np.sin(yaw), np.cos(yaw)])
+    hands = origin + np.array([[0.0], [0.12]]) * away
+    for wrists in (0.70, 0.78):
+        use = Use("desk", 0, 40, np.c_[hands, [wrists, wrists + 0.02]], yaw)
+        room = desk_shape_for(np.random.default_rng(0), desks, use, _free(0.0))
+        assert room is not None
+        top = np.array([*hands.mean(0), wrists - 0.035])
+        assert abs(float(desks.distances(room.shapes, top[None])[0])) < 0.03
+        nearer = np.array([[*(hands[0] - 0.3 * away), wrists - 0.035]])
+        assert float(desks.distances(room.shapes, nearer)[0]) > 0.05, "the body is before it"
+    too_high = Use("desk", 0, 40, np.c_[hands, [1.1, 1.1]], yaw)
+    assert desk_shape_for(np.random.default_rng(0), desks, too_high, _free(0.0)) is None
+
+
 def test_one_lies_in_a_real_bed() -> None:
     if not LIBRARY.is_dir():
         pytest.skip(f"needs the furniture library at {LIBRARY}")
-    from dafnet_addon.data.uses import Use
-
     pieces, left_out = read_library(LIBRARY)
     assert len(pieces) == 123 and not left_out
     beds = bank_of([p for p in pieces if p.name == "bed_001"], factors=(1.0,))
-    seat = beds.shapes[0].seat
-    assert seat is not None
+    seat = beds.shapes[0].seats[0]
     line = np.array([[0.0, -0.2, seat.height + LIES_OVER], [0.0, 0.2, seat.height + LIES_OVER]])
     found = bed_shape_for(
         np.random.default_rng(0), beds, Use("bed", 0, 30, line, 0.0), _free(0.0), []

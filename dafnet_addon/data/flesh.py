@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..core.rotations import yaw_matrix
-from ..core.skeleton import joint
+from ..core.skeleton import SEAT_TO_PELVIS, joint
 from ..core.solids import Box, Scene
 from .boxes import NO_BOXES, placed
 from .shapes import NO_SHAPES, ShapeBank
@@ -15,6 +15,8 @@ from .shapes import NO_SHAPES, ShapeBank
 __all__ = [
     "FAR",
     "NO_BANK",
+    "GIVES",
+    "LIES_SUNK",
     "PROBES",
     "RADIUS",
     "Furnishing",
@@ -23,6 +25,7 @@ __all__ = [
     "nearest_box",
     "pressed",
     "probes",
+    "sunk",
 ]
 
 FAR = 0.3
@@ -138,6 +141,22 @@ def probes(joints: np.ndarray, step: int = 3) -> np.ndarray:
     return j[:, _FROM] + (j[:, _TO] - j[:, _FROM]) * _SHARE
 
 
+GIVES = pressed(
+    0.03, hip=0.08, thigh=0.05, trunk=0.05, shoulder=0.05, elbow=0.045, wrist=0.045, hand=0.08
+)
+"""Metres (P,) by which flesh gives of one that sits on something hard, or lies on it."""
+_SINKS = pressed(0.3, hip=1.0, thigh=0.6)
+LIES_SUNK = pressed(0.12, trunk=0.15, head=0.14, shoulder=0.2, elbow=0.22)
+"""Metres (P,) by which the flesh of one that lies is lower than on a floor: a bed is soft."""
+
+
+def sunk(over: float) -> np.ndarray:
+    """Metres (P,) by which the flesh of one that sits is lower than on something hard, where the
+    pelvis joint is ``over`` metres over the undeformed surface.
+    """
+    return max(0.0, SEAT_TO_PELVIS - over) * _SINKS
+
+
 def nearest_box(boxes: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Signed distance (N,) of points (N, 3) to the nearest of the boxes: ``boxes.distances``, axis
     by axis for speed.
@@ -153,16 +172,22 @@ def nearest_box(boxes: np.ndarray, points: np.ndarray) -> np.ndarray:
     return (outside + inside).min(0)
 
 
-def box_clearance(boxes: np.ndarray, points: np.ndarray, gives: float | np.ndarray = 0.0) -> float:
+def box_clearance(
+    boxes: np.ndarray,
+    points: np.ndarray,
+    gives: float | np.ndarray = 0.0,
+    sinks: float | np.ndarray = 0.0,
+) -> float:
     """How far (metres) the flesh about the probes (N, P, 3) stays from the boxes at least; negative
     where it cuts them.
 
-    ``gives`` (a number, or one per probe) is let off: flesh gives where it rests on something.
+    ``gives`` (a number, or one per probe) is let off: flesh gives where it rests on something. What
+    it ``sinks`` (metres, likewise) into it counts downwards only: backs and arms do not give.
     Nothing is farther than ``FAR``.
     """
     if not len(boxes):
         return FAR
-    flat = points.reshape(-1, 3)
+    flat = _raised(points, sinks)
     limits = np.broadcast_to(RADIUS - gives, points.shape[:2]).reshape(-1)
     centre = boxes[:, :2].mean(0)
     span = (
@@ -176,15 +201,24 @@ def box_clearance(boxes: np.ndarray, points: np.ndarray, gives: float | np.ndarr
     return min(FAR, float((nearest_box(boxes, flat[near]) - limits[near]).min()))
 
 
-def clearance(furniture: Furnishing, points: np.ndarray, gives: float | np.ndarray = 0.0) -> float:
+def clearance(
+    furniture: Furnishing,
+    points: np.ndarray,
+    gives: float | np.ndarray = 0.0,
+    sinks: float | np.ndarray = 0.0,
+) -> float:
     """``box_clearance`` of any furniture; shapes are at most ``shapes.FARTHEST`` away, less the
     flesh's own radius.
     """
-    least = box_clearance(furniture.boxes, points, gives)
+    least = box_clearance(furniture.boxes, points, gives, sinks)
     if not len(furniture.shapes):
         return least
     limits = np.broadcast_to(RADIUS - gives, points.shape[:2]).reshape(-1)
-    return min(
-        least,
-        float((furniture.bank.distances(furniture.shapes, points.reshape(-1, 3)) - limits).min()),
-    )
+    gap = furniture.bank.distances(furniture.shapes, _raised(points, sinks))
+    return min(least, float((gap - limits).min()))
+
+
+def _raised(points: np.ndarray, sinks: float | np.ndarray) -> np.ndarray:
+    """Probes (N · P, 3) where they would be on something hard."""
+    up = np.broadcast_to(sinks, points.shape[1])[:, None] * np.array([0.0, 0.0, 1.0])
+    return (points + up).reshape(-1, 3)

@@ -11,13 +11,31 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.root import RootPath
-from ..core.skeleton import SEAT_TO_PELVIS, joint
+from ..core.skeleton import joint
 from .boxes import NO_BOXES, box, placed
-from .flesh import FAR, NO_BANK, Furnishing, box_clearance, pressed, probes
-from .real_pieces import LIES_OVER, bed_shape_for, carries, seat_shape_for, stray_shape
+from .flesh import (
+    FAR,
+    GIVES,
+    LIES_SUNK,
+    NO_BANK,
+    Furnishing,
+    box_clearance,
+    pressed,
+    probes,
+    sunk,
+)
+from .real_pieces import (
+    LIES_OVER,
+    ON_DESK,
+    bed_shape_for,
+    carries,
+    desk_shape_for,
+    seat_shape_for,
+    stray_shape,
+)
 from .rests import Rest, resting
 from .shapes import PELVIS_OVER, ShapeBank
-from .uses import Use, lying, reaching, stroking, working
+from .uses import Use, across, lying, reaching, stroking, working
 
 __all__ = [
     "SeatKind",
@@ -40,21 +58,7 @@ _LIKELY = {"desk": 0.95, "board": 0.8, "shelf": 0.6, "spare desk": 0.35}
 _STANDS_BEFORE = 0.2  # metres a second: a slower body may have a desk before it, too
 
 
-# The hand's probe lies where a stretched wrist would carry it; on a top or a board the wrist bends.
-_ON_SEAT = pressed(0.025, hip=0.07, thigh=0.07)
-_SINKS = pressed(0.0, hip=1.0, thigh=1.0)
-_ON_BED = pressed(
-    0.10,
-    hip=0.18,
-    thigh=0.18,
-    trunk=0.18,
-    head=0.20,
-    shoulder=0.19,
-    elbow=0.20,
-    wrist=0.19,
-    hand=0.20,
-)
-_ON_DESK = pressed(0.0, wrist=0.035, hand=0.09, elbow=0.03)
+# A stretched wrist would carry the hand's probe; on a board, as on a top, the wrist bends.
 _ON_BOARD = pressed(0.0, wrist=0.01, hand=0.12)
 _STYLES = ("block", "legs", "legs", "column", "panels")
 
@@ -338,10 +342,10 @@ def seat_for(
             kind = _SEATS[0]  # a plain stool fits where nothing else does
         over = kind.over + error
         top = rest.position[2] - over
-        carrying, extra = _seat(rng, top, kind, small=1.0 - 0.5 * attempt / _TRIES)
+        carrying, extra = _seat(rng, top, kind, small=1.0 - 0.7 * attempt / _TRIES)
         yaw = rest.yaw + rng.normal(0.0, 0.08)
         carrying, extra = (placed(part, rest.position[:2], yaw) for part in (carrying, extra))
-        if box_clearance(carrying, points, _ON_SEAT + max(0.0, SEAT_TO_PELVIS - over) * _SINKS) < 0:
+        if box_clearance(carrying, points, GIVES, sunk(over)) < 0:
             continue
         if box_clearance(extra, points, 0.02) < 0:
             if attempt < _TRIES // 4:
@@ -394,7 +398,7 @@ def _bed_for(
         yaw = use.yaw + rng.normal(0.0, 0.05)
         carrying, beside = (placed(part, middle[:2], yaw) for part in (carrying, beside))
         under = Furnishing(carrying[:1])
-        if box_clearance(carrying, points, _ON_BED) < 0 or not all(
+        if box_clearance(carrying, points, GIVES, LIES_SUNK) < 0 or not all(
             carries(under, rest) for rest in beside_it
         ):
             continue
@@ -404,17 +408,10 @@ def _bed_for(
     return None
 
 
-def _across(use: Use, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the use's points lie to the right of ``origin`` (2,) and away from the body."""
-    offset = use.points[:, :2] - origin
-    c, s = np.cos(use.yaw), np.sin(use.yaw)
-    return offset @ (c, s), offset @ (-s, c)
-
-
 def desk_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
     """A desk, table or counter whose top is 2 to 5 cm under the lowest wrist that works there."""
     origin = use.points[:, :2].mean(0)
-    right, ahead = _across(use, origin)
+    right, ahead = across(use, origin)
     top = use.points[:, 2].min() - rng.uniform(0.02, 0.05)
     for attempt in range(_TRIES):
         share = 1.0 - attempt / _TRIES
@@ -434,7 +431,7 @@ def desk_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarr
         desk = np.array(rows)
         desk[:, 0] += (left_side + right_side) / 2
         desk = placed(desk, origin, use.yaw)
-        if box_clearance(desk, points, _ON_DESK) >= 0:
+        if box_clearance(desk, points, ON_DESK) >= 0:
             return desk
     return None
 
@@ -442,7 +439,7 @@ def desk_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarr
 def board_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
     """A board or wall 5 to 9 cm beyond the furthest wrist that strokes it."""
     origin = use.points[:, :2].mean(0)
-    right, ahead = _across(use, origin)
+    right, ahead = across(use, origin)
     low, high = use.points[:, 2].min(), use.points[:, 2].max()
     face = ahead.max() + rng.uniform(0.05, 0.09)
     for attempt in range(_TRIES):
@@ -467,7 +464,7 @@ def board_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndar
 def _shelf_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
     """A shelf, bookcase or counter a little under a hand that reached for it."""
     origin = use.points[:, :2].mean(0)
-    _, ahead = _across(use, origin)
+    _, ahead = across(use, origin)
     under = use.points[:, 2].min()
     for _ in range(_TRIES // 2):
         top, x = under - rng.uniform(0.03, 0.08), rng.uniform(0.15, 0.7)
@@ -493,7 +490,7 @@ def _shelf_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.nda
         shelf = np.array(rows)
         shelf[:, 0] += rng.uniform(-0.6, 0.6) * x
         shelf = placed(shelf, origin, use.yaw + rng.normal(0.0, 0.1))
-        if box_clearance(shelf, points, _ON_DESK) >= 0:
+        if box_clearance(shelf, points, ON_DESK) >= 0:
             return shelf
     return None
 
@@ -651,7 +648,7 @@ def fitted(
         ]:
             kind = use.kind
             if rng.random() < _LIKELY[kind]:
-                pieces.append((kind, _furnishing(_FITS[kind](rng, use, points))))
+                pieces.append((kind, _worked_at(rng, bank, use, points)))
                 if pieces[-1][1] is not None:
                     break
         place = places[0] if places else _standing_place(path)
@@ -682,6 +679,15 @@ def _bed(
     real = len(bank) > 0 and rng.random() < _REAL
     found = bed_shape_for(rng, bank, use, points, _beside(use, rests)) if real else None
     return found or _furnishing(_bed_for(rng, use, points, rests))
+
+
+def _worked_at(
+    rng: np.random.Generator, bank: ShapeBank, use: Use, points: np.ndarray
+) -> Furnishing | None:
+    """A desk, board or shelf at hands: a real desk where there is one to be had."""
+    real = use.kind == "desk" and len(bank) > 0 and rng.random() < _REAL
+    found = desk_shape_for(rng, bank, use, points) if real else None
+    return found or _furnishing(_FITS[use.kind](rng, use, points))
 
 
 def furnished(

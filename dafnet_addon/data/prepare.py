@@ -4,7 +4,8 @@ furnished windows on disk.
 A dataset is a folder: ``train.npz`` and ``test.npz`` (motions, captured and composed),
 ``dataset.json`` (what they were made from), ``pool-NNNN.npz`` (training windows) and ``held.npz``
 (windows of held-out motions, for the likelihood). For people: ``summary.txt`` (what was read, cut
-and left out), ``fits.txt`` (how often furniture fits) and ``preview.png``.
+and left out), ``fits.txt`` (how often furniture fits), ``preview.png`` and, where real pieces
+train, ``furniture.png`` (every kind of them with bodies on it).
 """
 
 import json
@@ -23,6 +24,7 @@ from ..core.skeleton import OFFSETS, PARENTS
 from .archive import read_arrays
 from .canonical import Calibration, calibrate, canonical
 from .compose import composed
+from .fit_sheet import fit_sheet
 from .fits import fit_report
 from .flesh import NO_BANK
 from .library import read_library
@@ -432,6 +434,8 @@ def prepare(
     _written(out / "fits.txt", lambda: fit_report(*known, rng, _FIT_TRIES, trained))
     if not (out / "preview.png").exists():
         preview(out / "preview.png", *known, np.random.default_rng(seed), bank=trained)
+    if len(trained) and not (out / "furniture.png").exists():
+        fit_sheet(out / "furniture.png", *known, np.random.default_rng(seed), trained)
 
 
 def _furniture(folder: Path, out: Path) -> dict[str, list[str]]:

@@ -97,7 +97,7 @@ def _frozen_sitting(
     """Episodes of one body on the role's seats, kinds in turn."""
     found: list[dict[str, Any]] = []
     episodes = list(_sitting(motions))
-    seats = [i for i, shape in enumerate(bank.shapes) if shape.seat is not None]
+    seats = [i for i, shape in enumerate(bank.shapes) if shape.seats]
     kinds = sorted({bank.shapes[i].kind for i in seats})
     for e in rng.permutation(len(episodes)):
         if len(found) == _EPISODES:
@@ -125,15 +125,15 @@ def _on_piece(
 ) -> dict[str, Any] | None:
     """One episode on one piece, or None where the body would cut it."""
     shape = bank.shapes[number]
-    assert shape.seat is not None
+    seat = shape.seats[0]
     was = float(np.median(motion.joints[rest.start : rest.end, 0, 2]))
-    if abs(shape.seat.pelvis - was) > _MOVED:
+    if abs(seat.pelvis - was) > _MOVED:
         return None
-    joints = at_seat_height(motion.joints[first:end], was, shape.seat.pelvis)
+    joints = at_seat_height(motion.joints[first:end], was, seat.pelvis)
     path = raw_root_from_joints(joints)
     start, stop = rest.start - first, min(rest.end, end) - first
     moved = rest_of(joints, path, start, stop)
-    moved = Rest(start, stop, np.array([*moved.position[:2], shape.seat.pelvis]), moved.yaw)
+    moved = Rest(start, stop, np.array([*moved.position[:2], seat.pelvis]), moved.yaw)
     points = probes(joints)
     under = seat_shape_for(rng, ShapeBank((shape,)), moved, points)
     if under is None:
@@ -143,7 +143,7 @@ def _on_piece(
         "start": first,
         "frames": end - first,
         "was": round(was, 4),
-        "pelvis": round(shape.seat.pelvis, 4),
+        "pelvis": round(seat.pelvis, 4),
         "rest": [start, stop],
         "activity": "sit down or up",
         "fingerprint": fingerprint(joints),
@@ -187,9 +187,9 @@ def _frozen_lying(
             middle = float(use.points.mean(0)[2])
             for number in rng.permutation(len(bank)):
                 shape = bank.shapes[number]
-                if shape.kind not in ("bed", "sofa") or shape.seat is None:
+                if shape.kind not in ("bed", "sofa") or not shape.seats:
                     continue
-                raised = shape.seat.height + LIES_OVER - middle
+                raised = shape.seats[0].height + LIES_OVER - middle
                 joints = clip.joints + np.array([0.0, 0.0, raised])
                 path, points = raw_root_from_joints(joints), probes(joints)
                 (moved,) = lying(joints)[:1] or [use]

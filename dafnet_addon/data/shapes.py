@@ -8,7 +8,7 @@ and y (metres), yaw (radians, counter-clockwise), stretch of its height.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +44,7 @@ PELVIS_OVER = {
     "bench": 0.14,
     "stool": 0.14,
     "toilet": 0.11,
+    "desk": 0.14,
     "chair": 0.11,
     "armchair": 0.07,
     "sofa": 0.03,
@@ -66,10 +67,14 @@ ABSENT_SHAPE = np.array([-1.0, 0.0, 0.0, 0.0, 1.0])
 DEEPEST, FARTHEST = -0.05, 0.11
 """Metres between which distances are kept, in bytes; beyond them they are these."""
 
+_SEAT_NUMBERS = 8
 _STEP = (FARTHEST - DEEPEST) / 255.0
 _FLOOR = np.array([0.0, 0.0, 1.0, 0.0])
-_APPROACH = np.array([0.0, -3.0])
-"""From where one comes to a piece without a back: its front faces −y."""
+_SIDES_TO_COME_FROM = np.array([(0.0, -3.0), (3.0, 0.0), (0.0, 3.0), (-3.0, 0.0)])
+_NARROWEST = 0.3  # metres across: a table fan is no table
+_SAME_WAY = np.cos(np.radians(20.0))
+# what carries the hips: half sizes of a patch, how near a surface is under it, and how much of it
+_PATCH, _UNDER_IT, _CARRIED = (0.1, 0.08), 0.03, 0.5
 _ASTRAY = np.cos(np.radians(60.0))
 _FRAMES_AT_ONCE = 16
 _CORNERS = np.array([(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
@@ -96,7 +101,7 @@ _SIDES = np.array(
 class Seat:
     """Where one sits on a shape, in its own frame: ``position`` (2,) under the pelvis, ``yaw`` that
     one faces, ``height`` of the surface, ``pelvis`` height of the joint, ``aside`` metres to each
-    side where another may sit as well.
+    side where another may sit as well, ``edge`` metres from there to the front edge.
     """
 
     position: np.ndarray
@@ -104,13 +109,14 @@ class Seat:
     height: float
     pelvis: float
     aside: float
+    edge: float
 
 
 @dataclass(frozen=True)
 class Shape:
     """A piece at ``factor`` of its height. ``values`` (nx, ny, nz) uint8: distances from
-    ``DEEPEST`` to ``FARTHEST`` at nodes ``spacing`` metres apart from ``origin`` (3,) on. ``seat``:
-    None where nobody sits.
+    ``DEEPEST`` to ``FARTHEST`` at nodes ``spacing`` metres apart from ``origin`` (3,) on. ``seats``
+    hold one for each side from which one may come; none where nobody sits.
     """
 
     name: str
@@ -120,7 +126,7 @@ class Shape:
     origin: np.ndarray
     spacing: float
     values: np.ndarray
-    seat: Seat | None
+    seats: tuple[Seat, ...]
 
     @property
     def grid(self) -> DistanceGrid:
@@ -193,34 +199,19 @@ class ShapeBank:
             solids.append(Mesh(corners, _SIDES, matrix, name or shape.name, grid))
         return solids
 
-    def surface(self, placed: np.ndarray, spacing: float = 0.06) -> np.ndarray:
-        """Points (N, 3) of the placed shapes' surfaces, world, about ``spacing`` metres apart: to
-        be drawn.
-        """
-        found = [np.zeros((0, 3))]
-        for number, x, y, yaw, stretch in placed:
-            shape = self.shapes[int(number)]
-            step = max(1, round(spacing / shape.spacing))
-            nodes = np.argwhere(np.abs(DEEPEST + _STEP * shape.values) < 0.6 * shape.spacing)
-            nodes = nodes[(nodes % step == 0).sum(1) >= 2]
-            points = (shape.origin + shape.spacing * nodes) * (1.0, 1.0, stretch)
-            found.append(rotate(yaw_matrix(np.array(yaw)), points) + np.array([x, y, 0.0]))
-        return np.concatenate(found)
-
     def write(self, file: Path) -> None:
         """Write the bank, whole or not at all."""
         seats = [
-            [*s.seat.position, s.seat.yaw, s.seat.height, s.seat.pelvis, s.seat.aside]
-            if s.seat
-            else [np.nan] * 6
-            for s in self.shapes
+            [i, *seat.position, seat.yaw, seat.height, seat.pelvis, seat.aside, seat.edge]
+            for i, shape in enumerate(self.shapes)
+            for seat in shape.seats
         ]
         part = file.with_suffix(".part.npz")
         np.savez_compressed(
             part,
             texts=np.array([[s.name, s.kind, s.maker] for s in self.shapes]),
             places=np.array([[s.factor, *s.origin, s.spacing] for s in self.shapes]),
-            seats=np.array(seats),
+            seats=np.array(seats).reshape(-1, _SEAT_NUMBERS),
             sizes=np.array([s.values.shape for s in self.shapes]),
             values=np.concatenate([s.values.ravel() for s in self.shapes]),
         )
@@ -228,15 +219,19 @@ class ShapeBank:
 
     @staticmethod
     def read(file: Path) -> "ShapeBank":
-        """What ``write`` wrote."""
+        """What ``write`` wrote. Raises InputError where an earlier version did."""
         with np.load(file) as z:
             texts, places, seats, sizes, values = (
                 z[name] for name in ("texts", "places", "seats", "sizes", "values")
             )
+        if seats.shape[1] != _SEAT_NUMBERS:
+            raise InputError(
+                f"The furniture in '{file}' was made by an earlier version; make the dataset anew "
+                "with 'dafnet prepare'."
+            )
         shapes, at = [], 0
-        for text, place, seat, size in zip(texts, places, seats, sizes, strict=True):
+        for number, (text, place, size) in enumerate(zip(texts, places, sizes, strict=True)):
             count = int(np.prod(size))
-            sits = None if np.isnan(seat[0]) else Seat(seat[:2], *(float(v) for v in seat[2:]))
             shapes.append(
                 Shape(
                     name=str(text[0]),
@@ -246,7 +241,10 @@ class ShapeBank:
                     origin=place[1:4],
                     spacing=float(place[4]),
                     values=values[at : at + count].reshape(size),
-                    seat=sits,
+                    seats=tuple(
+                        Seat(row[1:3], *(float(v) for v in row[3:]))
+                        for row in seats[seats[:, 0] == number]
+                    ),
                 )
             )
             at += count
@@ -290,27 +288,74 @@ def _stretched(shape: Shape, stretch: float) -> DistanceGrid:
     )
 
 
-def _seat(piece: Piece, vertices: np.ndarray) -> Seat | None:
-    """Where one sits on a piece, if one does."""
-    if piece.kind not in PELVIS_OVER:
-        return None
-    mesh = Mesh(vertices, piece.triangles, name=piece.title)
-    try:
-        place = seat_of([mesh], _APPROACH, 0.0, piece.title)
-    except InputError:
-        return None
-    if np.cos(place.yaw - np.pi) < _ASTRAY:
-        return None  # a piece's front faces −y: what looks elsewhere was misjudged
-    return Seat(
-        place.position, place.yaw, place.height, place.height + PELVIS_OVER[piece.kind], place.aside
+def _seats(piece: Piece, grid: DistanceGrid) -> list[Seat]:
+    """Where one sits on a piece that has these distances, from each side that one may come from."""
+    found: list[Seat] = []
+    across = np.ptp(piece.vertices[:, :2], axis=0).min()
+    if piece.kind not in PELVIS_OVER or across < _NARROWEST:
+        return found
+    mesh = Mesh(piece.vertices, piece.triangles, name=piece.title)
+    for side in _SIDES_TO_COME_FROM:
+        try:
+            place = seat_of([mesh], side, 0.0, piece.title)
+        except InputError:
+            return []
+        # A piece's front faces −y: a back that is elsewhere is none.
+        misjudged = place.back and np.cos(place.yaw - np.pi) < _ASTRAY
+        known = any(np.cos(place.yaw - seat.yaw) > _SAME_WAY for seat in found)
+        height = _surface_under(grid, place.position, place.yaw, place.height)
+        if not misjudged and not known and height is not None:
+            found.append(
+                Seat(
+                    position=place.position,
+                    yaw=place.yaw,
+                    height=height,
+                    pelvis=height + PELVIS_OVER[piece.kind],
+                    aside=place.aside,
+                    edge=place.edge,
+                )
+            )
+    return found
+
+
+def _surface_under(
+    grid: DistanceGrid, position: np.ndarray, yaw: float, level: float
+) -> float | None:
+    """Height of what carries the hips of one that sits at ``position`` (2,) on about this level:
+    None where it is too little, as a rim or a frame without its cloth.
+    """
+    half_width, half_depth = _PATCH
+    patch = np.stack(
+        np.meshgrid(
+            np.linspace(-half_width, half_width, 9), np.linspace(-half_depth, half_depth, 7)
+        ),
+        axis=-1,
+    ).reshape(-1, 2)
+    c, s = np.cos(yaw), np.sin(yaw)
+    spots = position + patch @ np.array([[c, s], [-s, c]])
+    heights = level + np.arange(0.06, -0.061, -0.01)
+    points = np.concatenate(
+        [
+            np.repeat(spots, len(heights), axis=0),
+            np.tile(heights, len(spots))[:, None],
+        ],
+        axis=1,
     )
+    gap = grid.sample(points).reshape(len(spots), len(heights))
+    near = gap < _UNDER_IT
+    if near.any(-1).mean() < _CARRIED:
+        return None
+    # The first height from above that touches, less how far it still is.
+    first = near.argmax(-1)
+    touched = heights[first] - gap[np.arange(len(spots)), first]
+    return float(np.median(touched[near.any(-1)]))
 
 
 def shapes_of(piece: Piece, factors: Sequence[float] = FACTORS) -> list[Shape]:
     """A piece at ``factors`` of its true height; where nobody sits, only at the true one."""
-    sits = _seat(piece, piece.vertices) is not None
+    seats = _seats(piece, build_grid(piece.vertices, piece.triangles, _FLOOR))
     found = []
-    for factor in factors if sits else (1.0,):
+    for factor in factors if seats else (1.0,):
         vertices = piece.vertices * (1.0, 1.0, factor)
         grid = build_grid(vertices, piece.triangles, _FLOOR)
         values = np.clip(np.rint((grid.values - DEEPEST) / _STEP), 0, 255).astype(np.uint8)
@@ -323,7 +368,14 @@ def shapes_of(piece: Piece, factors: Sequence[float] = FACTORS) -> list[Shape]:
                 origin=grid.origin,
                 spacing=grid.spacing,
                 values=values,
-                seat=_seat(piece, vertices) if sits else None,
+                seats=tuple(
+                    replace(
+                        seat,
+                        height=seat.height * factor,
+                        pelvis=seat.height * factor + PELVIS_OVER[piece.kind],
+                    )
+                    for seat in seats
+                ),
             )
         )
     return found

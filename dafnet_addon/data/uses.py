@@ -12,7 +12,7 @@ from ..core.root import RootPath, to_root
 from ..core.rotations import normalised
 from ..core.skeleton import joint
 
-__all__ = ["Use", "lying", "working", "stroking", "reaching", "runs"]
+__all__ = ["Use", "across", "lying", "working", "stroking", "reaching", "runs"]
 
 _PELVIS, _CHEST, _NECK = joint("pelvis"), joint("spine3"), joint("neck")
 _SHOULDERS = [joint("left_shoulder"), joint("right_shoulder")]
@@ -43,6 +43,13 @@ class Use:
     end: int
     points: np.ndarray
     yaw: float
+
+
+def across(use: Use, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the use's points lie to the right of ``origin`` (2,) and away from the body."""
+    offset = use.points[:, :2] - origin
+    c, s = np.cos(use.yaw), np.sin(use.yaw)
+    return offset @ (c, s), offset @ (-s, c)
 
 
 def runs(flags: np.ndarray, shortest: int = 1) -> list[tuple[int, int]]:

@@ -19,7 +19,19 @@ from .rests import Rest, resting
 from .retarget import at_seat_height
 from .shapes import ABSENT_SHAPE, SHAPES, ShapeBank
 
-__all__ = ["COMPOSED", "HISTORY", "LENGTH", "Motion", "Window", "motion_of", "draw", "mirrored"]
+__all__ = [
+    "COMPOSED",
+    "HIGHEST",
+    "HISTORY",
+    "LENGTH",
+    "LOWEST",
+    "Motion",
+    "Window",
+    "draw",
+    "lowest_pelvis",
+    "mirrored",
+    "motion_of",
+]
 
 HISTORY, LENGTH = 10, 70
 COMPOSED = "composed"
@@ -28,7 +40,8 @@ _FRAMES = HISTORY + LENGTH
 _MARGIN = 32  # the root is smoothed over 24 frames and known 30 ahead
 _AROUND = 100  # frames before and after that, in which the body shows what furniture there is
 _HOLD = 45
-_LOWEST, _HIGHEST = 0.36, 0.95  # resting pelvis, metres: from a step of 0.22 to a bar stool of 0.81
+LOWEST, HIGHEST = 0.36, 0.95
+"""Metres over the floor at which a pelvis may rest: from a step of 0.22 to a bar stool of 0.81."""
 _USUAL = 0.38, 0.66  # metres: the pelvis on sofas and chairs
 _LOWERED = 0.3  # metres; from a high stool further down, every wave of the pelvis would grow
 
@@ -130,6 +143,11 @@ def _farthest(valid: np.ndarray, frame: int, step: int) -> int:
     return frame
 
 
+def lowest_pelvis(height: float) -> float:
+    """How low (metres) a pelvis that was captured at rest at this height may be moved."""
+    return max(LOWEST, height - _LOWERED)
+
+
 def _seat_height(rng: np.random.Generator, height: float) -> float:
     """Where a pelvis that was captured at rest at this height (metres) shall rest: mostly where
     furniture carries one.
@@ -137,8 +155,8 @@ def _seat_height(rng: np.random.Generator, height: float) -> float:
     if rng.random() < 0.2:
         wanted = height + rng.normal(0, 0.02)
     else:
-        wanted = rng.uniform(*(_USUAL if rng.random() < 0.6 else (_LOWEST, _HIGHEST)))
-    return float(np.clip(wanted, max(_LOWEST, height - _LOWERED), _HIGHEST))
+        wanted = rng.uniform(*(_USUAL if rng.random() < 0.6 else (LOWEST, HIGHEST)))
+    return float(np.clip(wanted, lowest_pelvis(height), HIGHEST))
 
 
 def _near_shapes(placed: np.ndarray, path: RootPath) -> np.ndarray:
