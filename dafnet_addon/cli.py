@@ -181,10 +181,13 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
             "--temperature",
             type=_number(float, 0.0),
             default=temperature,
-            help="0 is the calm take, 1 as lively as real",
+            help="0 gives the calm take, 1 is as lively as real motion",
         )
         added.add_argument(
-            "--weights", type=Path, metavar="FILE", help="trained weights; else those that ship"
+            "--weights",
+            type=Path,
+            metavar="FILE",
+            help="trained weights; the ones that ship if left out",
         )
 
     demo = command(
@@ -194,59 +197,67 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
         needs=lambda _: ("bpy",),
     )
     demo.add_argument("-o", "--output", type=Path, default=Path("out/demo"), metavar="FOLDER")
-    demo.add_argument(
-        "--no-preview", action="store_true", help="leave out the film and the contact sheet"
-    )
+    demo.add_argument("--no-preview", action="store_true", help="make no film and no contact sheet")
     sampling(demo, 0.0)
 
     bake = command(
         "bake",
         _bake,
-        "generate a character of a scene and save the scene with its keys",
+        "generate the motion of a scene's character and save the scene with its keys",
         needs=lambda _: ("bpy",),
     )
     bake.add_argument("file", type=Path, nargs="?" if in_blender else None, metavar="FILE.blend")
     written = bake.add_mutually_exclusive_group(required=True)
     written.add_argument("-o", "--output", type=Path, metavar="OUT.blend")
-    written.add_argument("--in-place", action="store_true", help="write FILE.blend itself anew")
+    written.add_argument("--in-place", action="store_true", help="overwrite FILE.blend itself")
     bake.add_argument(
-        "--scene", metavar="NAME", help="another scene than the one that is active in the file"
+        "--scene",
+        metavar="NAME",
+        help="the scene to use instead of the one that is active in the file",
     )
     bake.add_argument(
         "--character", metavar="ARMATURE", help="needed where the scene has several characters"
     )
     for name in ("root", "furniture", "head", "hand-left", "hand-right", "upper-body"):
-        bake.add_argument(f"--{name}", metavar="NAME", help="overrules the character's own setting")
+        bake.add_argument(f"--{name}", metavar="NAME", help="overrides the character's own setting")
     bake.add_argument("--mode", choices=MODES, help="one mode for all frames")
     bake.add_argument(
         "--frames",
         type=_frames,
         metavar="A:B",
-        help="first and last frame; --frames=A:B where A is negative",
+        help="first and last frame; write --frames=A:B if A is negative",
     )
     share = _number(float, 0.0, 1.0)
     bake.add_argument(
         "--plant-feet",
         type=share,
         metavar="SHARE",
-        help="0 leaves feet as generated, 1 holds those that stand",
+        help="0 leaves the feet as generated, 1 holds standing feet in place",
     )
     bake.add_argument(
-        "--rest-on-seats", type=share, metavar="SHARE", help="0 leaves who sinks into a seat there"
+        "--rest-on-seats",
+        type=share,
+        metavar="SHARE",
+        help="0 leaves the body as generated, 1 lifts it out of a seat that it has sunk into",
     )
     bake.add_argument(
         "--reach-targets",
         type=share,
         metavar="SHARE",
-        help="0 leaves hands as generated, 1 is exact",
+        help="0 leaves head and hands as generated, 1 puts them onto their targets",
     )
     bake.add_argument(
         "--clear-furniture",
         type=share,
         metavar="SHARE",
-        help="1 brings hands and feet out of furniture",
+        help="0 leaves hands and feet as generated, 1 moves them out of furniture",
     )
-    bake.add_argument("--smooth", type=share, metavar="SHARE", help="1 evens out quick changes")
+    bake.add_argument(
+        "--smooth",
+        type=share,
+        metavar="SHARE",
+        help="0 leaves the motion as generated, 1 smooths out abrupt changes",
+    )
     bake.add_argument(
         "--takes",
         type=_number(int, 1),
@@ -256,25 +267,25 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     )
     sampling(bake, None)
 
-    info = command("info", _info, "say what a weights file is")
+    info = command("info", _info, "describe a weights file")
     info.add_argument(
-        "weights", type=Path, nargs="?", metavar="WEIGHTS", help="else the weights that ship"
+        "weights", type=Path, nargs="?", metavar="WEIGHTS", help="the weights that ship if left out"
     )
 
     prepare = command(
         "prepare",
         _prepare,
-        "make a training set from motion files, or go on making it",
+        "make a training set from motion files, or resume making one",
         part="data",
         needs=lambda _: ("matplotlib",),
     )
-    prepare.add_argument("folder", type=Path, metavar="FOLDER", help="holds the motion files")
+    prepare.add_argument("folder", type=Path, metavar="FOLDER", help="folder of motion files")
     prepare.add_argument("-o", "--output", type=Path, required=True, metavar="DATASET")
     prepare.add_argument(
         "--furniture",
         type=Path,
         metavar="LIBRARY",
-        help="folder of real pieces to stand among the boxes",
+        help="folder of real furniture to use besides boxes",
     )
     prepare.add_argument(
         "--windows", type=_number(int, 1), default=12000, help="how many training windows"
@@ -285,7 +296,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     train = command(
         "train",
         _train,
-        "train a model, or go on with a run, and write its weights",
+        "train a model, or resume a run, and write its weights",
         part="training",
         needs=lambda _: ("torch", "tensorboard", "safetensors"),
     )
@@ -299,14 +310,14 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     train.add_argument(
         "--minutes",
         type=_number(float, 0.0),
-        help="of the flow's training, instead of the configuration's",
+        help="how long to train the flow, instead of what the configuration says",
     )
     train.add_argument(
         "--from",
         dest="begin_with",
         type=Path,
         metavar="WEIGHTS",
-        help="weights that a new run begins with",
+        help="weights that a new run starts from",
     )
     train.add_argument(
         "--device", default="cpu", help="'cpu', or 'cuda'; several GPUs through torchrun"
@@ -353,7 +364,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     evaluate = command(
         "evaluate",
         _evaluate,
-        "measure weights on held-out clips, beside the clips themselves",
+        "measure weights on held-out clips, and the clips themselves for comparison",
         part="training",
         needs=lambda o: (
             "torch",
@@ -362,9 +373,12 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
             *(("PIL",) if o.sheets else ()),
         ),
     )
-    evaluate.add_argument("folder", type=Path, metavar="FOLDER", help="holds the motion files")
+    evaluate.add_argument("folder", type=Path, metavar="FOLDER", help="folder of motion files")
     evaluate.add_argument(
-        "--weights", type=Path, metavar="FILE", help="trained weights; else those that ship"
+        "--weights",
+        type=Path,
+        metavar="FILE",
+        help="trained weights; the ones that ship if left out",
     )
     evaluate.add_argument(
         "-o",
@@ -380,13 +394,22 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
         "--sheets",
         type=Path,
         metavar="FOLDER",
-        help="also draw twenty clips, real beside generated",
+        help="also draw twenty clips, real motion above generated motion",
     )
     evaluate.add_argument(
-        "--furniture", type=Path, metavar="LIBRARY", help="measure among these real pieces instead"
+        "--furniture",
+        type=Path,
+        metavar="LIBRARY",
+        help="measure among this real furniture instead",
     )
     evaluate.add_argument(
-        "--role", choices=["choose", "tell"], default="choose", help="whose bodies and makers, then"
+        "--role",
+        choices=["choose", "tell"],
+        default="choose",
+        help=(
+            "with --furniture: the bodies and makers kept for choosing a model, or those kept for "
+            "reporting on it"
+        ),
     )
 
     bench = command(
@@ -398,7 +421,10 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     )
     bench.add_argument("name", choices=["seats", "speed"])
     bench.add_argument(
-        "--weights", type=Path, metavar="FILE", help="trained weights; else those that ship"
+        "--weights",
+        type=Path,
+        metavar="FILE",
+        help="trained weights; the ones that ship if left out",
     )
 
     figures = command(
@@ -410,7 +436,10 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     )
     figures.add_argument("-o", "--output", type=Path, default=Path("out/figures"), metavar="FOLDER")
     figures.add_argument(
-        "--weights", type=Path, metavar="FILE", help="trained weights; else those that ship"
+        "--weights",
+        type=Path,
+        metavar="FILE",
+        help="trained weights; the ones that ship if left out",
     )
     figures.add_argument(
         "--other",
@@ -420,7 +449,10 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
         help="weights of another system",
     )
     figures.add_argument(
-        "--only", nargs="+", metavar="NUMBER", help="the paper's numbers of the figures; else all"
+        "--only",
+        nargs="+",
+        metavar="NUMBER",
+        help="figure numbers as in the paper; all if left out",
     )
     return parser
 
@@ -438,7 +470,7 @@ def _number(
         except ValueError:
             value = math.nan
         if not low <= value <= high or value == math.inf:
-            raise argparse.ArgumentTypeError(f"'{text}' is no {what} {limits}")
+            raise argparse.ArgumentTypeError(f"'{text}' is not a {what} {limits}")
         return value
 
     return read
@@ -449,7 +481,9 @@ def _frames(text: str) -> tuple[int, int]:
     try:
         return int(first), int(last)
     except ValueError as error:
-        raise argparse.ArgumentTypeError(f"'{text}' is no range; write it as FIRST:LAST") from error
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is not a range; write it as FIRST:LAST"
+        ) from error
 
 
 def _demo(options: argparse.Namespace, bar: "_Bar") -> _Result:
@@ -671,8 +705,7 @@ def _evaluate_among_real(options: argparse.Namespace, bar: "_Bar") -> _Result:
 
     if options.save or options.sheets:
         raise InputError(
-            "Of the test among real furniture only the tables are made; leave out --save and "
-            "--sheets."
+            "The test among real furniture makes tables only; leave out --save and --sheets."
         )
     weights = load_weights(options.weights)
     found = real_report(weights, real_test(options.folder, options.furniture, options.role), bar)
@@ -690,8 +723,7 @@ def _evaluate_samp(options: argparse.Namespace, clips: "list[HeldClip]", bar: "_
 
     if options.save or options.sheets or options.output:
         raise InputError(
-            "Of a checkpoint of SAMP's only the table is made; leave out --save, --sheets and "
-            "--output."
+            "A checkpoint of SAMP gives a table only; leave out --save, --sheets and --output."
         )
     kind, _ = load_samp(options.weights)
     found = {}
@@ -710,7 +742,7 @@ def _figures(options: argparse.Namespace, bar: "_Bar") -> _Result:
     for each in options.other:
         name, _, file = each.partition("=")
         if not file:
-            raise InputError(f"'{each}' names no weights; write it as NAME=FILE.")
+            raise InputError(f"'{each}' names no weights file; write it as NAME=FILE.")
         others[name] = Path(file)
     require_writable(options.output / "figure.png")
     files = [
@@ -739,8 +771,8 @@ def _require(options: argparse.Namespace) -> None:
     if missing:
         inside = ", or run it inside Blender" if missing == ["bpy"] else ""
         raise InputError(
-            f"This command needs what this Python does not have, {' and '.join(missing)}; install "
-            f"it{inside}."
+            f"This command needs {' and '.join(missing)}, which this Python does not have; "
+            f"install it{inside}."
         )
 
 

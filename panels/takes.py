@@ -99,7 +99,7 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
         character: Any = character_of(context)
         own = character.dafnet
         if not len(own.takes):
-            layout.label(text="Generate lists its takes here", icon="INFO")
+            layout.label(text="Generated takes are listed here", icon="INFO")
             return
         row = layout.row()
         row.template_list(DAFNET_UL_takes.bl_idname, "", own, "takes", own, "active_take", rows=4)
@@ -120,7 +120,7 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
                 f"{figures.temperature:.2f}"
             )
         )
-        layout.label(text=f"Likelihood {figures.log_likelihood:.0f} nats a frame")
+        layout.label(text=f"Likelihood {figures.log_likelihood:.0f} nats per frame")
         table = layout.column(align=True)
         _tell(table, "", "Raw", "Cleaned")
         _tell(table, "Sliding feet", _said(figures.raw_sliding), _said(figures.sliding))

@@ -171,7 +171,10 @@ ERRORS: dict[str, tuple[Change, str]] = {
         ],
         "before its start",
     ),
-    "stretched time": (lambda s: setattr(s.scene.render, "frame_map_new", 200), "stretches time"),
+    "stretched time": (
+        lambda s: setattr(s.scene.render, "frame_map_new", 200),
+        "uses time stretching",
+    ),
     "the character as its root": (lambda s: setattr(s.own, "root", s.ann), "follows the character"),
     "root on the character": (
         lambda s: setattr(s.own.root, "parent", s.ann),
@@ -188,7 +191,7 @@ ERRORS: dict[str, tuple[Change, str]] = {
     "bones parented anew": (lambda s: s.edit_bones(_edited_parent), "other parents"),
     "bones that do not inherit": (
         lambda s: setattr(s.ann.data.bones["left_knee"], "use_inherit_rotation", False),
-        "other parents or inheritance",
+        "other parents or another inheritance",
     ),
     "driven armature": (lambda s: s.ann.driver_add("location", 0), "drivers"),
     "rest position": (lambda s: setattr(s.ann.data, "pose_position", "REST"), "rest position"),
@@ -347,7 +350,7 @@ def test_the_furniture_collection_is_removed_while_a_take_is_made(shot: Shot) ->
     while next(steps) < 0.5:
         pass
     bpy.data.collections.remove(shot.furniture)
-    with pytest.raises(InputError, match="is not in the scene any more"):
+    with pytest.raises(InputError, match="is no longer in the scene"):
         for _ in steps:
             pass
 

@@ -167,7 +167,7 @@ def test_what_follows_the_character_is_no_furniture(stage: Stage, way: Way) -> N
     read = stage.read()
     assert {solid.name for solid in read.scene.solids} == {"Chair"}
     assert [each for each in read.warnings if "'Cup'" in each] == [
-        "Moved by the character, so not there for it: 'Cup'."
+        "Ignored as furniture, since the character moves it: 'Cup'."
     ]
     found = furniture_now(bpy.context, stage.settings())
     assert set(found) == {"Chair"}, "the same for the overlays and for ways round the furniture"
@@ -184,7 +184,7 @@ def test_the_mode_may_not_be_driven_by_the_character(stage: Stage) -> None:
     drive(stage.ann, "dafnet.head_influence", stage.chair, "location[0]")
     stage.read()
     drive(stage.ann, "dafnet.mode", stage.ann, "location[1]")
-    stage.cannot_be_read("driver of mode or influences of 'Ann' reads the character itself")
+    stage.cannot_be_read("driver of the mode or an influence of 'Ann' reads the character itself")
 
 
 def test_the_source_of_the_upper_body_may_not_follow_the_character(stage: Stage) -> None:

@@ -103,7 +103,7 @@ def test_what_is_deleted_while_it_runs(shot: Stage) -> None:
     shot.ann.select_set(True)
     bpy.ops.object.delete()
     actions = [action.name for action in bpy.data.actions]
-    with pytest.raises(InputError, match="'Ann' is not in the scene"):
+    with pytest.raises(InputError, match="'Ann' is no longer in the scene"):
         for _ in steps:
             pass
     assert [action.name for action in bpy.data.actions] == actions

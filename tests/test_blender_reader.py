@@ -283,8 +283,8 @@ def test_what_is_shown_or_hidden_during_the_shot_is_said(stage: Stage) -> None:
     read = stage.read()
     assert {solid.name for solid in read.scene.solids} == {"Always", "Leaves", "Flickers"}
     assert set(read.warnings) == {
-        f"'{name}' is shown or hidden during the shot; it counts for all of it as at the first "
-        "frame."
+        f"'{name}' is shown or hidden during the shot; it counts throughout as it does at the "
+        "first frame."
         for name in ("Leaves", "Comes", "Flickers")
     }
     assert not stage.read(frame_start=6).warnings, "nothing of it changes any more"
@@ -323,7 +323,7 @@ def test_helpers_are_no_furniture_and_doubtful_objects_are_named(stage: Stage) -
     read = stage.read()
     assert {solid.name for solid in read.scene.solids} == {"Wall", "Heavy Sofa", "Proxy", "Shelf"}
     helpers, doubtful = read.warnings
-    assert "'Cage', 'Cutter', 'Window Cutter'; show" in helpers
+    assert "'Cage', 'Cutter', 'Window Cutter'; let" in helpers
     assert "'Heavy Sofa', 'Proxy'; hide" in doubtful
 
 

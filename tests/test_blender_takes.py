@@ -334,7 +334,7 @@ def test_full_copies_the_upper_body_of_a_take(shot: Shot) -> None:
     with pytest.raises(RuntimeError, match="does not cover"):
         bpy.ops.dafnet.generate()
     shot.scene.frame_end, shot.scene.render.fps = 55, 24
-    with pytest.raises(RuntimeError, match="30 frames a second, the scene 24"):
+    with pytest.raises(RuntimeError, match="30 frames per second, the scene 24"):
         bpy.ops.dafnet.generate()
 
 

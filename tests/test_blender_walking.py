@@ -285,7 +285,7 @@ def all_curves(action) -> list:
         (muted, "muted curves"),
         (in_a_muted_group, "muted curves"),
         (repeated, "modifiers on curves"),
-        (sampled, "samples"),
+        (sampled, "sampled curves"),
         (linked, "linked action"),
         (shared, "in common with 'Other'"),
         (added_up, "blending to Replace"),
@@ -297,7 +297,7 @@ def all_curves(action) -> list:
         (with_delta_scale, "delta"),
         (with_keyed_delta, "delta"),
         (driven, "drivers"),
-        (pushed, "Something else than its keys moves the root 'Ball'"),
+        (pushed, "Something other than its keys moves the root 'Ball'"),
     ],
 )
 @pytest.mark.parametrize("button", ["SEAT", "CURVE"])

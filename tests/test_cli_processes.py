@@ -285,7 +285,7 @@ def test_what_is_not_installed_is_said_first(
     or_inside = ", or run it inside Blender" if lacks == "bpy" else ""
     assert (code, said) == (1, "")
     assert err == (
-        f"dafnet: This command needs what this Python does not have, {lacks}; install "
+        f"dafnet: This command needs {lacks}, which this Python does not have; install "
         f"it{or_inside}.\n"
     )
     assert names(tmp_path) == []
@@ -414,7 +414,9 @@ def test_files_that_are_no_scenes(
     broken = tmp_path / "broken.blend"
     for content in (b"", b"hello", scene.read_bytes()[: len(scene.read_bytes()) // 2]):
         broken.write_bytes(content)
-        assert "is no file that Blender" in _refused(capfd, broken, "-o", tmp_path / "out.blend")
+        assert "cannot be opened by Blender" in _refused(
+            capfd, broken, "-o", tmp_path / "out.blend"
+        )
     assert "There is no file" in _refused(
         capfd, tmp_path / "none.blend", "-o", tmp_path / "out.blend"
     )
@@ -439,7 +441,7 @@ def test_a_file_of_a_newer_blender(
     out = tmp_path / "out.blend"
     assert "which is newer than this one" in _refused(capfd, newer, "--in-place")
     warnings = _baked(capfd, newer, "-o", out)["warnings"]
-    assert any("which is newer than this one, so that parts" in warning for warning in warnings)
+    assert any("which is newer than this one, so parts" in warning for warning in warnings)
 
 
 def test_what_the_scene_links(
@@ -490,4 +492,4 @@ def test_scripts_of_a_file_run_only_where_blender_lets_them(
     finally:
         preferences.use_scripts_auto_execute = False
     assert made.exists() == allowed
-    assert any("script of the file did not run" in warning for warning in warnings) == (not allowed)
+    assert any("script in the file did not run" in warning for warning in warnings) == (not allowed)

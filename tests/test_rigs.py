@@ -408,7 +408,7 @@ def test_what_cannot_be_baked_is_refused_and_left_alone(stage: RigStage) -> None
             "Mine", joints=detected.joints | {"left_knee": detected.joints["left_elbow"]}
         ),
     )
-    refused("No IK controls", limbs="IK")
+    refused("no known IK controls", limbs="IK")
     refused("no root bone", root_motion="BONE")
     rig.scale.x *= 2.0
     refused("unevenly")
@@ -976,7 +976,7 @@ def test_full_mode_tells_what_it_cannot_follow(stage: RigStage) -> None:
         return " ".join(stage.read().warnings)
 
     rig.pose.bones["mixamorig:Spine1"].rotation_quaternion = (0.966, 0.259, 0.0, 0.0)
-    assert "is followed" not in warnings()
+    assert "is copied" not in warnings()
     known = rigs.detected(rig)
     joints = {
         joint: bone
@@ -985,7 +985,7 @@ def test_full_mode_tells_what_it_cannot_follow(stage: RigStage) -> None:
     }
     rig_properties.show_map(rig, type(known)("Mine", joints=joints))
     rig.pose.bones["mixamorig:Spine1"].rotation_quaternion = (0.383, 0.0, 0.924, 0.0)
-    assert "'Mixamo' is followed, but the trunk by" in warnings() and "degrees off" in warnings()
+    assert "'Mixamo' is copied, but the trunk by" in warnings() and "degrees off" in warnings()
 
 
 def test_a_bake_that_is_off_is_warned_about(stage: RigStage) -> None:

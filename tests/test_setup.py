@@ -354,8 +354,8 @@ def test_find_furniture_takes_what_stands_beside_the_path(stage: Set) -> None:
     )
     assert all(stage.scene.collection in o.users_collection for o in near), "linked, not moved"
     for words in (
-        "Hidden beside the path, so not there for the character: 'Hidden'",
-        "does not see it: 'Shelf'.",
+        "Hidden near the path, so ignored: 'Hidden'",
+        "does not see: 'Shelf'.",
     ):
         assert any(words in sentence for sentence in found.warnings), words
     bpy.data.objects["Far"].location.x = -1.6

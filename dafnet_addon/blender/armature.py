@@ -133,8 +133,8 @@ def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:
         raise InputError(f"The armature '{armature.name}' is in edit mode; leave it and try again.")
     if missing := missing_bones(armature):
         raise InputError(
-            f"The armature '{armature.name}' has no bone '{missing[0]}'; use one that Add "
-            "Character made."
+            f"The armature '{armature.name}' has no bone '{missing[0]}'; use a character made "
+            "with Add Character."
         )
     bones = [armature.data.bones[name] for name in JOINTS]
     chained = [bone.parent and bone.parent.name for bone in bones] == [
@@ -144,7 +144,8 @@ def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:
         bone.use_inherit_rotation and bone.use_local_location for bone in bones
     ):
         raise InputError(
-            f"The bones of '{armature.name}' got other parents or inheritance; add a new character."
+            f"The bones of '{armature.name}' were given other parents or another inheritance; add "
+            "a new character."
         )
     heads = np.array([bone.head_local for bone in bones])
     offsets = heads[1:] - heads[list(PARENTS[1:])]
@@ -152,14 +153,13 @@ def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:
     scale = float((offsets * canonical).sum() / (canonical**2).sum())
     if scale <= 0.0 or np.abs(offsets - scale * canonical).max() > 0.002 * scale:
         raise InputError(
-            f"The bones of '{armature.name}' were moved in edit mode; add a new character and use "
-            "it."
+            f"The bones of '{armature.name}' were moved in edit mode; add a new character instead."
         )
     size = np.array(armature.scale)
     if not np.isfinite(size).all() or size[0] <= 0.0 or np.ptp(size) > 1e-4 * size[0]:
         raise InputError(
-            f"The armature '{armature.name}' is scaled unevenly; set its scales to one positive "
-            "value."
+            f"The armature '{armature.name}' is scaled unevenly; set its three scales to the same "
+            "positive value."
         )
     return scale * float(size[0]) * unit
 

@@ -32,7 +32,7 @@ def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
     """
     if armature.type != "ARMATURE":
         raise InputError(
-            f"'{armature.name}' is no armature; select a character that Add Character made."
+            f"'{armature.name}' is not an armature; select a character made with Add Character."
         )
     if armature.library or armature.override_library:
         raise InputError(
@@ -104,7 +104,8 @@ def bake(
     scale = require_bakeable(armature, unit)
     if abs(scale - take.scale) > 1e-3 * take.scale:
         raise InputError(
-            f"The character '{armature.name}' is no longer of the take's size; generate it again."
+            f"The character '{armature.name}' no longer has the size of the take; generate it "
+            "again."
         )
     if not all(np.isfinite(values).all() for values in (take.joints, take.rotations, take.root)):
         raise InputError("The take holds values that are not numbers; generate it again.")

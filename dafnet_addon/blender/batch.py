@@ -54,12 +54,11 @@ def bake_takes(
     written = output or source
     assert written is not None
     if written.suffix != ".blend":
-        raise InputError(f"The output '{written}' has to end in .blend.")
+        raise InputError(f"The output '{written}' must end in .blend.")
     require_writable(written)
     if output is not None and source is not None and _same(output, source):
         raise InputError(
-            f"'{output}' is the scene's own file; give the output another name, or --in-place "
-            "instead of it."
+            f"'{output}' is the scene's own file; give the output another name, or use --in-place."
         )
     if file is not None:
         _open(file)
@@ -114,8 +113,8 @@ def _open(file: Path) -> None:
         bpy.ops.wm.open_mainfile(filepath=str(file.resolve()))
     except RuntimeError as error:
         raise InputError(
-            f"'{file}' is no file that Blender {bpy.app.version_string} can open; "
-            "save it again with this Blender or an older one."
+            f"'{file}' cannot be opened by Blender {bpy.app.version_string}; save it again with "
+            "this Blender or an older one."
         ) from error
 
 
@@ -131,19 +130,19 @@ def _told(in_place: bool) -> Iterator[str]:
         if in_place:
             raise InputError(f"{newer}; bake it with that Blender, or name an output.")
         yield (
-            f"{newer}, so that parts of it may be missing in the output; bake it with that Blender."
+            f"{newer}, so parts of it may be missing from the output; bake it with that Blender."
         )
     for library in bpy.data.libraries:
         if library.is_missing:
             yield (
                 f"The library '{library.filepath}' is missing, and so is what the scene links "
-                "from it; put it there again."
+                "from it; put it back."
             )
     if bpy.app.autoexec_fail:
         yield (
-            f"A script of the file did not run ({bpy.app.autoexec_fail_message}), and what it "
-            "moves stands still; "
-            "allow Python scripts in Blender's preferences if you trust the file."
+            f"A script in the file did not run ({bpy.app.autoexec_fail_message}), so whatever it "
+            "moves stands still; allow Python scripts in Blender's preferences if you trust the "
+            "file."
         )
 
 

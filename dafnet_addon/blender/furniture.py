@@ -150,11 +150,12 @@ class Furniture:
         if not met:
             raise InputError(
                 f"The furniture collection '{name}' has no visible mesh besides the character's "
-                "own; fill it or choose none."
+                "own; add some, or clear the setting."
             )
         if not self._pieces:
             raise InputError(
-                f"The meshes of the furniture collection '{name}' have no faces; give them some."
+                f"The meshes of the furniture collection '{name}' have no faces; add some, or "
+                "choose another collection."
             )
         self._shown = {o: o.visible_get() for o in self.members if _may_have_faces(o)}
 
@@ -202,8 +203,7 @@ class Furniture:
         )
         for name in dict.fromkeys(nowhere):
             yield (
-                f"'{name}' is scaled to zero, so it is not there for the character; give it a "
-                "scale."
+                f"'{name}' is scaled to zero, so the character does not see it; give it a scale."
             )
         for name in self._changed:
             yield (
@@ -212,8 +212,8 @@ class Furniture:
             )
         for name in self._blinking:
             yield (
-                f"'{name}' is shown or hidden during the shot; it counts for all of it as at the "
-                "first frame."
+                f"'{name}' is shown or hidden during the shot; it counts throughout as it does at "
+                "the first frame."
             )
         worn = {
             o
@@ -221,17 +221,16 @@ class Furniture:
             if any(m.type == "ARMATURE" and m.object == self._armature for m in o.modifiers)
         }
         if held := self._named(self._held - worn):
-            yield f"Moved by the character, so not there for it: {held}."
+            yield f"Ignored as furniture, since the character moves it: {held}."
         if helpers := self._named(self._helpers):
             yield (
-                f"Helpers that no picture shows, so not there for the character: {helpers}; show "
-                "what is to count."
+                f"Ignored as helpers, since no render shows them: {helpers}; let renders show "
+                "what should count."
             )
         if doubtful := self._named(self._doubtful):
             yield (
                 "Not rendered, or drawn as wire or bounds, but solid for the character: "
-                f"{doubtful}; "
-                "hide in the viewport what is not to count."
+                f"{doubtful}; hide in the viewport what should not count."
             )
 
     def _named(self, objects: set[bpy.types.Object]) -> str:

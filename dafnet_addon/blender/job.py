@@ -103,8 +103,8 @@ def run(
         resume, at = stored(action)[0], settings.kept_until - settings.frame_start
         if action.dafnet.frame_start != settings.frame_start:
             raise InputError(
-                f"The take '{action.name}' begins at another frame than the range; set the "
-                "range's start to its."
+                f"The take '{action.name}' begins at another frame than the range; let the range "
+                "start there."
             )
         render = find_scene(settings).render
         if not 0.0 < at * render.fps_base / render.fps < len(resume) / resume.fps:
@@ -138,7 +138,7 @@ def run(
     )
     started = perf_counter()
     if gone := used - names_in_use(settings):
-        raise InputError(f"'{min(gone)}' is not in the scene any more; generate again.")
+        raise InputError(f"'{min(gone)}' is no longer in the scene; generate again.")
     actions = yield from within(_bake_steps(settings, takes, read.controls, draws), _GENERATED, 1.0)
     seconds |= takes[0].seconds | {"fitting": sum(take.seconds["fitting"] for take in takes)}
     seconds["baking"] = perf_counter() - started

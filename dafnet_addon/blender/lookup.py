@@ -15,8 +15,7 @@ def find_scene(settings: Settings) -> bpy.types.Scene:
     scene = next((s for s in bpy.data.scenes if s.name_full == settings.scene), None)
     if scene is None:
         raise InputError(
-            f"The scene '{settings.scene}' is not in this file any more; generate again from "
-            "another."
+            f"The scene '{settings.scene}' is no longer in this file; generate again from another."
         )
     return scene
 
@@ -41,7 +40,7 @@ def find_action(name: str) -> bpy.types.Action:
     found = next((a for a in bpy.data.actions if a.name_full == name), None)
     if found is None:
         raise InputError(
-            f"The take '{name}' is not in this file any more; choose another one in the list."
+            f"The take '{name}' is no longer in this file; choose another one in the list."
         )
     return found
 

@@ -234,7 +234,7 @@ def _facing(bodies: np.ndarray) -> np.ndarray:
 
 def _require_bakeable(context: bpy.types.Context, rig: bpy.types.Object, root_motion: str) -> None:
     if rig.type != "ARMATURE":
-        raise InputError(f"'{rig.name}' is no armature; choose the armature of your rig.")
+        raise InputError(f"'{rig.name}' is not an armature; choose the armature of your rig.")
     if rig.library:
         raise InputError(
             f"The armature '{rig.name}' is linked; make a library override of it, or make it "

@@ -24,7 +24,9 @@ class Preferences(bpy.types.AddonPreferences):
     weights: StringProperty(
         name="Weights",
         subtype="FILE_PATH",
-        description="File of trained weights; leave it empty for the weights that ship",
+        description=(
+            "File of trained weights. Leave it empty for the weights that come with the add-on"
+        ),
     )
 
     engine: EnumProperty(
@@ -32,7 +34,11 @@ class Preferences(bpy.types.AddonPreferences):
         default="NUMPY",
         description="What runs the network",
         items=[
-            ("NUMPY", "NumPy", "Comes with Blender, and as fast as anything for one take"),
+            (
+                "NUMPY",
+                "NumPy",
+                "Comes with Blender, and is as fast as anything else for a single take",
+            ),
             ("cpu", "PyTorch on the CPU", "Where PyTorch is installed in Blender's Python"),
             (
                 "cuda",

@@ -38,52 +38,67 @@ class TakeSettings(bpy.types.PropertyGroup):
     beside it (``takes``).
     """
 
-    seed: IntProperty(name="Seed", options=set(), description="Seed that it was drawn with")
+    seed: IntProperty(name="Seed", options=set(), description="The seed that it was generated with")
     lower_seed: IntProperty(
-        name="Legs' Seed", options=set(), description="Seed that its legs were drawn with"
+        name="Legs' Seed", options=set(), description="The seed that its legs were generated with"
     )
     temperature: FloatProperty(
-        name="Temperature", options=set(), description="How far from the calm take it was drawn"
+        name="Temperature", options=set(), description="The temperature that it was generated at"
     )
     lower_temperature: FloatProperty(
-        name="Legs' Temperature", options=set(), description="How far its legs were"
+        name="Legs' Temperature",
+        options=set(),
+        description="The temperature that its legs were generated at",
     )
-    frame_start: IntProperty(name="Start", options=set(), description="Its first frame")
-    accepted: BoolProperty(name="Accepted", options=set(), description="A take to keep")
+    frame_start: IntProperty(name="Start", options=set(), description="The take's first frame")
+    accepted: BoolProperty(name="Accepted", options=set(), description="Keep this take")
     ghost: BoolProperty(
         name="Ghost",
         options=set(),
-        description="Show this take as a figure of lines beside what plays",
+        description="Show this take as a stick figure next to the one that plays",
     )
     log_likelihood: FloatProperty(
         name="Likelihood",
         options=set(),
-        description="How likely the model finds its poses, in nats a frame: more is more usual",
+        description=(
+            "How likely the model finds its poses, in nats per frame; higher is more typical"
+        ),
     )
     sliding: FloatProperty(
-        name="Sliding", options=set(), description="Feet that slide in a frame, 0 to 2"
+        name="Sliding", options=set(), description="Sliding feet per frame, 0 to 2"
     )
     collisions: FloatProperty(
-        name="Collisions", options=set(), description="Joints that touch furniture in a frame"
+        name="Collisions", options=set(), description="Joints that touch furniture, per frame"
     )
     miss: FloatProperty(
         name="Miss",
         options=set(),
         subtype="DISTANCE",
-        description="Mean distance of head and hands from their targets",
+        description="Mean distance of the head and hands from their targets",
     )
-    jerk: FloatProperty(name="Jerk", options=set(), description="How abrupt it moves, in m/s\u00b3")
+    jerk: FloatProperty(
+        name="Jerk", options=set(), description="How jerky the motion is, in m/s\u00b3"
+    )
     raw_sliding: FloatProperty(
-        name="Sliding before", options=set(), description="Feet that slide before the clean-up"
+        name="Sliding before",
+        options=set(),
+        description="Sliding feet per frame before the clean-up",
     )
     raw_collisions: FloatProperty(
-        name="Collisions before", options=set(), description="Joints that touch furniture before it"
+        name="Collisions before",
+        options=set(),
+        description="Joints that touch furniture, per frame, before the clean-up",
     )
     raw_miss: FloatProperty(
-        name="Miss before", options=set(), subtype="DISTANCE", description="The distance before it"
+        name="Miss before",
+        options=set(),
+        subtype="DISTANCE",
+        description="Mean distance from the targets before the clean-up",
     )
     raw_jerk: FloatProperty(
-        name="Jerk before", options=set(), description="How abrupt it moved before it"
+        name="Jerk before",
+        options=set(),
+        description="How jerky the motion was before the clean-up",
     )
 
 
@@ -105,8 +120,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
             (
                 "EE",
                 "EE",
-                "End effectors: head and hands reach for their targets; each of them that is set "
-                "counts",
+                "End effectors: the head and hands reach for their targets. Any of the three may "
+                "be left empty",
             ),
             (
                 "FULL",
@@ -120,7 +135,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         type=bpy.types.Collection,
         options=set(),
         description=(
-            "Collection of everything the character may touch or must avoid; empty for a bare floor"
+            "Collection of everything the character may touch or must avoid. Leave it empty for a "
+            "bare floor"
         ),
     )
     root: PointerProperty(
@@ -136,8 +152,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         poll=_is_not_the_character,
         options=set(),
         description=(
-            "Target of the head joint. Once rotated, it turns the head: Y where the face looks, Z "
-            "to the crown"
+            "Target of the head joint. Once it is rotated, it turns the head as well: Y is where "
+            "the face looks, Z points to the crown"
         ),
     )
     hand_left: PointerProperty(
@@ -146,8 +162,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         poll=_is_not_the_character,
         options=set(),
         description=(
-            "Target of the left wrist. Once rotated, it turns the hand: Y to the fingers, Z out "
-            "of its back"
+            "Target of the left wrist. Once it is rotated, it turns the hand as well: Y points "
+            "along the fingers, Z out of the back of the hand"
         ),
     )
     hand_right: PointerProperty(
@@ -156,8 +172,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         poll=_is_not_the_character,
         options=set(),
         description=(
-            "Target of the right wrist. Once rotated, it turns the hand: Y to the fingers, Z out "
-            "of its back"
+            "Target of the right wrist. Once it is rotated, it turns the hand as well: Y points "
+            "along the fingers, Z out of the back of the hand"
         ),
     )
     upper_body_source: PointerProperty(
@@ -167,7 +183,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         options=set(),
         description=(
             "Armature whose upper body is copied: another character, or any rig whose bones are "
-            "known (Your Rig)"
+            "mapped (see Your Rig)"
         ),
     )
     upper_body_take: PointerProperty(
@@ -175,7 +191,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         type=bpy.types.Action,
         poll=_is_take,
         options=set(),
-        description="Take whose upper body is copied, where no source armature is chosen",
+        description="Take whose upper body is copied when no source armature is chosen",
     )
     use_scene_range: BoolProperty(
         name="Scene Range",
@@ -194,9 +210,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         default=0,
         min=0,
         options=set(),
-        description=(
-            "Another number gives another take. It matters where the temperature is above zero"
-        ),
+        description=("Another number gives another take, if the temperature is above zero"),
     )
     take_count: IntProperty(
         name="Takes",
@@ -206,13 +220,13 @@ class CharacterSettings(bpy.types.PropertyGroup):
         soft_max=16,
         options=set(),
         description=(
-            "How many takes to generate at once; each further one has the next seed, and "
-            "temperature 1 where it is 0"
+            "How many takes to generate at once. Each further take uses the next seed, and "
+            "temperature 1 if the temperature is 0"
         ),
     )
     takes: CollectionProperty(type=TakeLink, options=set(), description="Takes of this character")
     active_take: IntProperty(
-        name="Take", options=set(), description="The take that the buttons below are for"
+        name="Take", options=set(), description="The take that the buttons below act on"
     )
     blend_frames: IntProperty(
         name="Blend",
@@ -220,7 +234,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         min=0,
         max=120,
         options=set(),
-        description="Frames in which the body comes over to the new mode where it changes",
+        description="Number of frames over which the body blends into the new mode",
     )
     head_influence: FloatProperty(
         name="Head Influence",
@@ -229,8 +243,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         max=1.0,
         subtype="FACTOR",
         description=(
-            "How far the head's target counts; at 0 the head is free. Keyframe it to come to a "
-            "target and leave it"
+            "How much the head's target counts; at 0 the head is free. Keyframe it to reach for a "
+            "target and to let go of it"
         ),
     )
     hand_left_influence: FloatProperty(
@@ -240,8 +254,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         max=1.0,
         subtype="FACTOR",
         description=(
-            "How far the left hand's target counts; at 0 the hand is free. Keyframe it to come to "
-            "it and leave it"
+            "How much the left hand's target counts; at 0 the hand is free. Keyframe it to reach "
+            "for the target and to let go of it"
         ),
     )
     hand_right_influence: FloatProperty(
@@ -251,8 +265,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         max=1.0,
         subtype="FACTOR",
         description=(
-            "How far the right hand's target counts; at 0 the hand is free. Keyframe it to come "
-            "to it and leave it"
+            "How much the right hand's target counts; at 0 the hand is free. Keyframe it to reach "
+            "for the target and to let go of it"
         ),
     )
     temperature: FloatProperty(
@@ -264,8 +278,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         precision=2,
         options=set(),
         description=(
-            "How far takes differ: 0 gives the one calm take, 1 as far as real ones do, above 2 "
-            "strange ones"
+            "How much takes differ: 0 always gives the same calm take, 1 gives as much variety as "
+            "real motion has, above 2 they become strange"
         ),
     )
     plant_feet: FloatProperty(
@@ -276,8 +290,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         subtype="FACTOR",
         options=set(),
         description=(
-            "How firmly a foot that stands is held where it stands, so that it does not slide; 0 "
-            "is the raw motion"
+            "How firmly a standing foot is held in place, so that it does not slide; 0 leaves the "
+            "raw motion"
         ),
     )
     rest_on_seats: FloatProperty(
@@ -288,7 +302,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         subtype="FACTOR",
         options=set(),
         description=(
-            "How far a pelvis that has sunk into a seat is lifted out of it; 0 is the raw motion"
+            "How far a pelvis that has sunk into a seat is lifted out of it; 0 leaves the raw "
+            "motion"
         ),
     )
     reach_targets: FloatProperty(
@@ -299,8 +314,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         subtype="FACTOR",
         options=set(),
         description=(
-            "How exactly head and hands are put onto their targets, as far as arms and back "
-            "allow; 0 is the raw motion"
+            "How exactly the head and hands are brought onto their targets, as far as arms and "
+            "back allow; 0 leaves the raw motion"
         ),
     )
     clear_furniture: FloatProperty(
@@ -311,7 +326,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         subtype="FACTOR",
         options=set(),
         description=(
-            "How far hands and feet that have got into furniture are brought out of it; 0 is the "
+            "How far hands and feet that are inside furniture are moved out of it; 0 leaves the "
             "raw motion"
         ),
     )
@@ -323,8 +338,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         subtype="FACTOR",
         options=set(),
         description=(
-            "How much quick changes of the motion are evened out, before feet and hands are put "
-            "in place; 0 is none"
+            "How much abrupt changes of the motion are smoothed out, before feet and hands are "
+            "put in place; 0 leaves the raw motion"
         ),
     )
 

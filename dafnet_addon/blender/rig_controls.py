@@ -96,8 +96,8 @@ def controls_of(
     if limbs == "IK":
         if rig_map.limbs.keys() != LIMBS.keys():
             raise InputError(
-                f"No IK controls of '{rig.name}' are known; set Limbs to FK, or detect its "
-                "convention again."
+                f"'{rig.name}' has no known IK controls; set Limbs to FK, or detect its bones "
+                "again."
             )
         for k, (limb, joints) in enumerate(LIMBS.items()):
             names = rig_map.limbs[limb]
@@ -204,8 +204,8 @@ def _require_carried(
             moved[pelvis]
         ):
             raise InputError(
-                f"The bone '{bone.name}' does not carry '{control.bone}'; choose the one above "
-                "both as pelvis."
+                f"The bone '{bone.name}' does not carry '{control.bone}'; choose the bone above "
+                "both as the pelvis."
             )
 
 

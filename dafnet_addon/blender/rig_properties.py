@@ -25,7 +25,7 @@ class RigRow(bpy.types.PropertyGroup):
     bone: StringProperty(
         name="Bone",
         options=set(),
-        description="Bone that plays this joint; empty where the rig has none",
+        description="Bone of this joint; leave it empty where the rig has none",
     )
 
 
@@ -33,9 +33,9 @@ class RigSettings(bpy.types.PropertyGroup):
     """Settings of one armature that is no DAFNet character."""
 
     rows: CollectionProperty(type=RigRow, options=set(), description="Bones of the joints")
-    active_row: IntProperty(name="Joint", options=set(), description="The row that is marked")
+    active_row: IntProperty(name="Joint", options=set(), description="The row that is selected")
     convention: StringProperty(
-        name="Convention", options=set(), description="Name of the preset that the bones are from"
+        name="Convention", options=set(), description="Name of the preset that the bones come from"
     )
     more: StringProperty(
         options={"HIDDEN"}, description="What else the preset knows of the rig's controls"
@@ -54,7 +54,7 @@ class RigSettings(bpy.types.PropertyGroup):
         name="Root Motion",
         default="OBJECT",
         options=set(),
-        description="What carries the character through the room",
+        description="What carries the character through the scene",
         items=[
             (
                 "OBJECT",
@@ -75,11 +75,11 @@ class RigSettings(bpy.types.PropertyGroup):
         options=set(),
         description="Which controls of arms and legs are keyed",
         items=[
-            ("FK", "FK", "Each bone of the limbs is turned"),
+            ("FK", "FK", "Rotate each bone of the arms and legs"),
             (
                 "IK",
                 "IK",
-                "Hand, foot and pole controls are placed; for rigs whose preset knows them, such "
+                "Place the hand, foot and pole controls; for rigs whose preset knows them, such "
                 "as Rigify",
             ),
         ],

@@ -70,8 +70,8 @@ def rigid_parts(matrices: np.ndarray, what: str) -> tuple[np.ndarray, float]:
         or (np.linalg.det(matrices[:, :3, :3]) < 0).any()
     ):
         raise InputError(
-            f"The {what} is scaled unevenly or over time; give it one positive scale in all three "
-            "axes."
+            f"The {what} is scaled unevenly or over time; give it the same positive scale on all "
+            "three axes throughout."
         )
     return matrices[:, :3, :3] / lengths[:, None], scale
 

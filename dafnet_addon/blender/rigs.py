@@ -96,7 +96,7 @@ def load_map(file: Path) -> RigMap:
         return from_text(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(
-            f"'{file.name}' is no map of a rig that can be read; delete it and save the preset "
+            f"'{file.name}' is not a rig preset that can be read; delete it and save the preset "
             "again."
         ) from error
 
@@ -134,14 +134,14 @@ def save_map(rig_map: RigMap, name: str) -> Path:
     """
     stem = bpy.path.clean_name(name.strip()).lower()
     if not stem.strip("_"):
-        raise InputError("The preset has no name; type one.")
+        raise InputError("The preset has no name; enter one.")
     text = as_text(replace(rig_map, name=name.strip(), known_by=tuple(rig_map.joints.values())))
     try:
         file = user_folder(create=True) / f"{stem}.json"
         save_text(file, text)
     except OSError as error:
         raise InputError(
-            f"The preset cannot be written: {error.strerror}; check Blender's folder of user files."
+            f"The preset cannot be written: {error.strerror}; check Blender's user folder."
         ) from error
     return file
 

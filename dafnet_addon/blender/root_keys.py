@@ -92,7 +92,7 @@ def _in_the_way_of_keys(curve: bpy.types.FCurve) -> Iterator[str]:
     if any(not modifier.mute for modifier in curve.modifiers):
         yield "has modifiers on curves of location or rotation; remove or mute them to key it."
     if len(curve.sampled_points):
-        yield "has curves of location or rotation that are samples; turn them into keys to key it."
+        yield "has sampled curves of location or rotation; convert them to keys first."
 
 
 def last_key(root: bpy.types.Object) -> int | None:
@@ -158,9 +158,8 @@ def keyed_along(
             wrong = np.arctan2(-matrix[0, 1], matrix[1, 1]) - route.path.yaw[k]
             if not off < _NEAR or not abs(np.angle(np.exp(1j * wrong))) < _TURNED:
                 raise InputError(
-                    f"Something else than its keys moves the root '{root.name}', so nothing was "
-                    "keyed; "
-                    "look for physics, NLA strips or scripts."
+                    f"Something other than its keys moves the root '{root.name}', so nothing was "
+                    "keyed; look for physics, NLA strips or scripts."
                 )
 
 
@@ -180,7 +179,7 @@ def write_keys(
         root.rotation_euler = (0.0, 0.0, float(route.path.yaw[k]))
         if not all(root.keyframe_insert(path, frame=first + k) for path in MOVES):
             raise InputError(
-                f"Blender takes no keys for the root '{root.name}'; unlock its action and curves."
+                f"The root '{root.name}' cannot be keyed; unlock its action and curves."
             )
     _eased(action_curves(root), first)
     return np.array(sorted(frames))

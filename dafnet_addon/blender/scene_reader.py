@@ -98,8 +98,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
         )
     if scene.render.frame_map_old != scene.render.frame_map_new:
         raise InputError(
-            f"The scene '{settings.scene}' stretches time; set its Time Stretching back to 100 : "
-            "100."
+            f"The scene '{settings.scene}' uses time stretching; set it back to 100 : 100."
         )
     unit = metres_per_unit(scene)
     armature = find_object(settings, settings.armature, "character")
@@ -152,17 +151,14 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
         if dependencies.follows(source, armature):
             raise InputError(
                 f"The upper body's source '{source.name}' follows the character itself; mute what "
-                "ties it to it."
+                "links the two."
             )
         bones, bodies = np.array(tracks.bones), np.array(tracks.bodies)
         given["upper_body"], off = _carried(
             source, source_map, bones, bodies, unit, root_matrices, size, fps
         )
         if off:
-            warnings += (
-                f"'{source.name}' is followed, but {off}; see whether its bones are the right "
-                "ones in Your Rig.",
-            )
+            warnings += (f"'{source.name}' is copied, but {off}; check its bones in Your Rig.",)
     elif settings.upper_body_take and "FULL" in modes:
         given["upper_body"] = _of_take(
             settings, np.array([mode == "FULL" for mode in modes]), root_matrices, size, fps
@@ -243,8 +239,8 @@ def _require_independent(
     """
     if dependencies.setting_follows(armature, "dafnet.", armature):
         raise InputError(
-            f"A driver of mode or influences of '{armature.name}' reads the character itself; "
-            "remove it."
+            f"A driver of the mode or an influence of '{armature.name}' reads the character "
+            "itself; remove the driver."
         )
     for what, leader in leading.items():
         if dependencies.follows(leader, armature, shaped=False):
@@ -255,7 +251,7 @@ def _require_independent(
             if _meets(simulation, dependencies, armature):
                 raise InputError(
                     f"The character itself may push '{simulation.name}', which moves the {what}; "
-                    "bake the simulation."
+                    "bake the simulation first."
                 )
 
 
@@ -284,7 +280,7 @@ def _told(
     if laid_over(armature):
         yield (
             f"Bones of '{armature.name}' have constraints or drivers, which change the take; mute "
-            "them to see it as made."
+            "them to see it as generated."
         )
     if furniture:
         yield from furniture.told()
@@ -293,8 +289,8 @@ def _told(
     )
     for name in dict.fromkeys(pushed):
         yield (
-            f"The character itself may push '{name}', so that each take changes the next; bake "
-            "the simulation."
+            f"The character itself may push '{name}', so each take would change the next; bake "
+            "the simulation first."
         )
 
 
@@ -363,14 +359,14 @@ def _of_take(
     take, _ = stored(action)
     if abs(take.fps - fps) > 1e-3:
         raise InputError(
-            f"The take '{action.name}' has {take.fps:g} frames a second, the scene {fps:g}; "
+            f"The take '{action.name}' has {take.fps:g} frames per second, the scene {fps:g}; "
             "generate it again."
         )
     at = np.arange(len(full)) + settings.frame_start - action.dafnet.frame_start
     if ((at < 0) | (at >= len(take)))[full].any():
         raise InputError(
-            f"The take '{action.name}' does not cover the frames whose mode is FULL; choose a "
-            "longer one."
+            f"The take '{action.name}' does not cover all frames whose mode is FULL; choose a "
+            "longer take."
         )
     at = np.clip(at, 0, len(take) - 1)
     path, _ = root_from_matrices(take.root[at])

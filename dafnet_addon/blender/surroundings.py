@@ -66,8 +66,8 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
         near = {name for name, distance in away.items() if distance < _NEAR * size}
         if not near:
             raise InputError(
-                f"No visible mesh lies within {_NEAR:g} m of the root's path; key the root to the "
-                "furniture first."
+                f"No visible mesh lies within {_NEAR:g} m of the root's path; animate the root "
+                "near the furniture first."
             )
         for each in list(made.objects):
             if each.name not in near:
@@ -81,7 +81,7 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
         raise
     if unseen := sorted(f"'{name}'" for name in near if away[name] > REACH * size):
         warnings.append(
-            f"Never nearer than {REACH:g} m, so the character does not see it: {', '.join(unseen)}."
+            f"Never closer than {REACH:g} m, so the character does not see: {', '.join(unseen)}."
         )
     return Found(
         _kept(scene, own, made),
@@ -179,12 +179,8 @@ def _hidden(
     out = []
     if hidden:
         out.append(
-            f"Hidden beside the path, so not there for the character: {', '.join(hidden)}; show "
-            "what is to count."
+            f"Hidden near the path, so ignored: {', '.join(hidden)}; show what should count."
         )
     if others:
-        out.append(
-            f"No meshes, so not there for the character: {', '.join(others)}; convert what is to "
-            "count."
-        )
+        out.append(f"Not meshes, so ignored: {', '.join(others)}; convert what should count.")
     return out

@@ -98,7 +98,8 @@ def stored(action: bpy.types.Action) -> tuple[Take, Controls]:
     data = action.get(PACKED)
     if not isinstance(data, bytes):
         raise InputError(
-            f"The action '{action.name}' is no take, or its motion was removed; generate one."
+            f"The action '{action.name}' is not a take, or its motion was removed; generate a new "
+            "one."
         )
     key, mark = action.as_pointer(), hash(data)
     if key not in _unpacked or _unpacked[key][0] != mark:

@@ -31,7 +31,7 @@ def add_root(context: bpy.types.Context, armature: bpy.types.Object) -> bpy.type
     """
     if not lacks_root(context, armature):
         raise InputError(
-            f"'{armature.name}' has a root already; animate '{armature.dafnet.root.name}'."
+            f"'{armature.name}' already has a root; animate '{armature.dafnet.root.name}'."
         )
     if armature.library:
         raise InputError(f"The character '{armature.name}' is linked; make it local to add a root.")
@@ -67,7 +67,7 @@ def add_targets(context: bpy.types.Context, armature: bpy.types.Object) -> list[
     missing = missing_targets(context, armature)
     if not missing:
         raise InputError(
-            f"'{armature.name}' has targets for head and hands already; animate those."
+            f"'{armature.name}' already has targets for head and hands; animate those."
         )
     if armature.library:
         raise InputError(

@@ -32,7 +32,7 @@ _GERMAN = {
     "From Here On": "Von hier an",
     "Furniture": "Möbel",
     "Generate": "Erzeugen",
-    "Generate lists its takes here": "Erzeugte Takes stehen hier",
+    "Generated takes are listed here": "Erzeugte Takes stehen hier",
     "Ghost": "Geist",
     "Ghosts": "Geister",
     "Head and Hands": "Kopf und Hände",
