@@ -122,6 +122,7 @@ def curves(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
     best.set_title("score, cm (the least is kept)")
     for ax in axes.flat:
         ax.set_xlabel("hours of one core a part")
+        ax.set_xlim(left=0.0)
         if ax.get_legend_handles_labels()[1]:
             ax.legend(fontsize=7)
     figure.suptitle(f"{rows[0]['clips']} captured clips of bodies and makers that choose weights")
