@@ -42,8 +42,8 @@ from dafnet_addon.training import precision
 from dafnet_addon.training.checkpoints import Checkpoint, checkpoint_file
 from dafnet_addon.training.evaluate import Measured, captured, measured, row
 from dafnet_addon.training.export import export
+from dafnet_addon.training.noise import take_noise
 from dafnet_addon.training.processes import spread_out
-from dafnet_addon.training.spread import take_spread
 from dafnet_addon.training.train import Run, TrainingConfig, dataset_pool, train_part, trained
 
 MODEL = SMALL
@@ -166,8 +166,8 @@ def train(
         list(spread_out(partial(_train, dataset, samp), jobs, processes))
         for folder in {job.folder for job in jobs if job.part not in NETWORKS}:
             flow, predictor, statistics = trained(folder)
-            spread = take_spread(flow, predictor, dataset_pool(dataset), statistics)
-            export(folder / "weights.safetensors", flow, predictor, statistics, {}, spread)
+            noise = take_noise(flow, predictor, dataset_pool(dataset), statistics)
+            export(folder / "weights.safetensors", flow, predictor, statistics, {}, noise)
 
 
 def steps_of(folder: Path) -> str:

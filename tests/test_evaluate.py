@@ -220,10 +220,11 @@ def test_rows_keep_kinds_of_clips_apart():
 def test_takes_made_together_are_those_that_generate_makes():
     weights, clip = load_weights(), _clip(40)
     sampler = Sampler(weights)
-    noise = np.concatenate(
-        [sampler.noise(0, temperature=0.0), sampler.noise(3), sampler.noise(3, 5)]
-    )
-    takes = e.made(sampler, e.shot_of(clip, "FREE"), noise)
+    shot = e.shot_of(clip, "FREE")
+    frames = len(shot.conditions)
+    calm = sampler.noise(frames, 0, temperature=0.0)
+    lively = sampler.noise(frames, 3), sampler.noise(frames, 3, 5)
+    takes = e.made(sampler, shot, np.concatenate([calm, *lively], axis=1))
     controls = Controls(fps=30.0, root=clip.path.matrices())
     for take, (seed, lower, temperature) in zip(
         takes, ((0, None, 0.0), (3, None, 1.0), (3, 5, 1.0)), strict=True

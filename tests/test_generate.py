@@ -440,14 +440,15 @@ def test_seeds_that_cannot_be_are_refused(seed):
 def test_seeds_of_numpy_are_seeds(weights):
     assert Draw(np.int64(7), np.uint8(3)) == Draw(7, 3) and type(Draw(np.int32(7)).seed) is int
     sampler = Sampler(weights)
-    drawn = [sampler.noise(seed) for seed in (0, 1, MOST_SEED - 1, MOST_SEED)]
+    drawn = [sampler.noise(1, seed) for seed in (0, 1, MOST_SEED - 1, MOST_SEED)]
     assert (
         all(np.isfinite(each).all() for each in drawn)
         and len({each.tobytes() for each in drawn}) == 4
     )
     # As they have always been: NumPy's generator, seeded with the seed and the part's number.
     upper = np.random.default_rng([1, 0]).standard_normal(42)
-    assert np.allclose(drawn[1][0, :42], (sampler.network.spread @ np.r_[upper, np.zeros(24)])[:42])
+    lasting = sampler.network.noise.lasting @ np.r_[upper, np.zeros(24)]
+    assert np.allclose(drawn[1][0, 0, :42], lasting[:42])
 
 
 def test_bad_temperature_and_bad_mesh_are_refused(weights):

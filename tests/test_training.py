@@ -44,7 +44,7 @@ from dafnet_addon.training.export import (  # noqa: E402
     export,
     tensors_of,
 )
-from dafnet_addon.training.spread import noise_along, take_spread  # noqa: E402
+from dafnet_addon.training.noise import noise_along, take_noise  # noqa: E402
 from dafnet_addon.training.train import Run, TrainingConfig, read_config, train_part, trained  # noqa: E402
 
 TINY = ModelConfig(
@@ -600,13 +600,13 @@ def test_baselines_learn_and_their_weights_run(system: str, dataset: Path, tmp_p
         )
     flow, predictor, statistics = trained(folder)
     assert (predictor is None) == (system == "moglow")
-    spread = take_spread(flow, predictor, _pool(dataset), statistics)
-    export(tmp_path / "w.safetensors", flow, predictor, statistics, {}, spread)
+    noise = take_noise(flow, predictor, _pool(dataset), statistics)
+    export(tmp_path / "w.safetensors", flow, predictor, statistics, {}, noise)
     weights = load_weights(tmp_path / "w.safetensors")
     sampler = sampler_of(weights)
     nothing = {"velocity": 3, "ahead": 18, "occupancy": 2640, "observation": 66, "given": 22}
     conditions = Conditions(**{name: np.zeros((20, size)) for name, size in nothing.items()})
-    made = drained(sampler.run(conditions, sampler.noise(1))).poses
+    made = drained(sampler.run(conditions, sampler.noise(20, 1))).poses
     assert made.shape == (20, 1, 66) and np.isfinite(made).all()
     with pytest.raises(WeightsError, match=f"'{system}'.*dafnet evaluate"):
         Sampler(weights)
@@ -618,36 +618,34 @@ def test_a_budget_in_steps_is_spent_by_steps(dataset: Path, tmp_path: Path):
     assert run.step == 7 and Run.load("whole", tmp_path).step == 7
 
 
-def test_takes_are_drawn_from_what_lasts_of_the_noise_along_captured_motion(
-    dataset: Path, tmp_path: Path
-):
+def test_takes_are_drawn_from_the_noise_along_captured_motion(dataset: Path, tmp_path: Path):
     run = Run("upper", tmp_path, TINY, _config(1), _pool(dataset).statistics())
     pool, predictor = _pool(dataset), run.gmvae.predictor
-    spread = take_spread(run.flow, predictor, pool, run.statistics)
-    batch = pool.batch(torch.arange(12), run.statistics, TINY)
+    tensors = take_noise(run.flow, predictor, pool, run.statistics)
+    batch = pool.batch(torch.arange(12), run.statistics, TINY, noise=0.0)
     for part, noise in noise_along(run.flow, predictor, batch).items():
-        lasting = noise[:, 20:].mean(1)
-        expected = (lasting.T @ lasting / 12).numpy()
-        # Poses are noisy by 3 mm, anew for each batch.
-        assert (
-            np.abs(spread[part] @ spread[part].T - expected).max() < 0.05 * np.abs(expected).max()
-        )
-        assert (np.triu(spread[part], 1) == 0).all()
+        noise = noise[:, 20:].numpy().astype(float)
+        mean = noise.mean(1)
+        rest = (noise - mean[:, None]).reshape(-1, mean.shape[1])
+        for name, found in (("spread", mean), ("passing", rest)):
+            root = tensors[f"{part}.{name}"].astype(float)
+            assert np.abs(root @ root.T - found.T @ found / len(found)).max() < 1e-4
+            assert (np.triu(root, 1) == 0).all()
+        taps = tensors[f"{part}.taps"]
+        assert np.allclose((taps**2).sum(1), 1.0), "a filter changes no variance"
+        assert np.abs(taps.sum(1)).max() < 1.0, "what lasts is not in it"
+
+
+def test_what_weights_do_not_say_of_noise_is_the_paper_s(dataset: Path, tmp_path: Path):
+    file = tmp_path / "w.safetensors"
     for part in ("predictor", "upper", "lower"):
         _until(part, dataset, tmp_path / "run", steps=2)
-    flow, trained_predictor, statistics = trained(tmp_path / "run")
-    export(
-        tmp_path / "w.safetensors",
-        flow,
-        trained_predictor,
-        statistics,
-        {},
-        {"lower": 3.0 * np.eye(24, dtype=np.float32)},
-    )
-    sampler = Sampler(load_weights(tmp_path / "w.safetensors"))
-    plain = np.random.default_rng([5, 0]).standard_normal(42)
-    assert np.allclose(sampler.noise(5)[0, :42], plain), "N(0, I) where the weights say nothing"
-    assert np.allclose(
-        sampler.noise(5)[0, 42:], 3.0 * np.random.default_rng([5, 1]).standard_normal(24)
-    )
-    assert (sampler.noise(5, temperature=0.0) == 0).all()
+    flow, predictor, statistics = trained(tmp_path / "run")
+    tripled = {"lower.spread": 3.0 * np.eye(24, dtype=np.float32)}
+    export(file, flow, predictor, statistics, {}, tripled)
+    sampler = Sampler(load_weights(file))
+    upper, lower = (np.random.default_rng([5, k]).standard_normal(n) for k, n in ((0, 42), (1, 24)))
+    drawn = sampler.noise(9, 5)[:, 0]
+    assert (drawn == drawn[0]).all(), "held"
+    assert np.allclose(drawn[0, :42], upper) and np.allclose(drawn[0, 42:], 3.0 * lower)
+    assert (sampler.noise(9, 5, temperature=0.0) == 0).all()

@@ -281,8 +281,13 @@ def takes_steps(
     shot = yield from within(shot_steps(scene, controls), 0.0, _CONDITIONED)
     conditioned = perf_counter()
     sampler = Sampler(weights, device)
+    frames = len(shot.conditions)
     z = np.concatenate(
-        [sampler.noise(d.seed, d.lower_seed, d.temperature, d.lower_temperature) for d in draws]
+        [
+            sampler.noise(frames, d.seed, d.lower_seed, d.temperature, d.lower_temperature)
+            for d in draws
+        ],
+        axis=1,
     )
     kept = None
     if resume is not None and resume_frame != 0:

@@ -11,6 +11,7 @@ import numpy as np
 from .backend import Array, Backend
 from .checks import shaped
 from .errors import InputError, WeightsError
+from .noise import TAPS, TakeNoise
 from .root import AHEAD
 from .sensor import SPHERES
 from .series import MODEL_FPS
@@ -181,14 +182,14 @@ class Part:
 
 @dataclass(frozen=True)
 class Network:
-    """All of one weights file. ``spread`` (66, 66): takes' noise is this times N(0, I), the
-    identity where the file does not say how far captured takes differ. ``predictor`` is None where
-    the flow is given the past itself. ``parts``: in the order of making.
+    """All of one weights file. ``noise``: what takes are made of, the paper's where the file does
+    not say how captured takes differ. ``predictor`` is None where the flow is given the past
+    itself. ``parts``: in the order of making.
     """
 
     sizes: Sizes
     normalisation: Normalisation
-    spread: np.ndarray
+    noise: TakeNoise
     predictor: Predictor | None
     parts: tuple[Part, ...]
 
@@ -206,7 +207,7 @@ def load_network(weights: Weights, system: System, backend: Backend) -> Network:
     sizes = _sizes(weights, system)
     tensors = _Tensors(weights, backend)
     normalisation = _normalisation(tensors, sizes)
-    spread = _spread(tensors, system.partition)
+    noise = _noise(tensors, system.partition)
     predictor = _predictor(tensors, sizes) if system.predicts else None
 
     places = list(system.partition.items())
@@ -214,7 +215,7 @@ def load_network(weights: Weights, system: System, backend: Backend) -> Network:
         _part(tensors, sizes, system, name, tuple(columns for _, columns in places[:i]))
         for i, (name, _) in enumerate(places)
     )
-    return Network(sizes, normalisation, spread, predictor, parts)
+    return Network(sizes, normalisation, noise, predictor, parts)
 
 
 class _Tensors:
@@ -324,13 +325,18 @@ def _normalisation(tensors: _Tensors, sizes: Sizes) -> Normalisation:
     return found
 
 
-def _spread(tensors: _Tensors, partition: Partition) -> np.ndarray:
-    spread = np.eye(POSE_SIZE)
+def _noise(tensors: _Tensors, partition: Partition) -> TakeNoise:
+    """Of the parts' tensors ``spread``, what lasts, and ``passing`` and ``taps``."""
+    paper = TakeNoise.standard_normal()
+    lasting, passing, taps = paper.lasting, paper.passing, paper.taps
     for name, columns in partition.items():
+        size = columns.stop - columns.start
         if f"{name}.spread" in tensors:
-            size = columns.stop - columns.start
-            spread[columns, columns] = tensors.values(f"{name}.spread", size, size)
-    return spread
+            lasting[columns, columns] = tensors.values(f"{name}.spread", size, size)
+        if f"{name}.passing" in tensors:
+            passing[columns, columns] = tensors.values(f"{name}.passing", size, size)
+            taps[columns] = tensors.values(f"{name}.taps", size, TAPS)
+    return TakeNoise(lasting, passing, taps)
 
 
 def _predictor(tensors: _Tensors, sizes: Sizes) -> Predictor:

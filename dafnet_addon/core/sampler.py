@@ -18,7 +18,7 @@ from .inputs import inputs_of, velocities_up_to
 from .network import DAFNET, CouplingNet, Part, System, load_network, unusable
 from .progress import drained, within
 from .series import smoothstep
-from .skeleton import LOWER_SIZE, POSE_SIZE, UPPER_SIZE, model_order, smpl_order
+from .skeleton import POSE_SIZE, model_order, smpl_order
 from .threads import one_thread
 from .weights import Weights
 
@@ -143,22 +143,15 @@ class Sampler:
 
     def noise(
         self,
+        frames: int,
         seed: int,
         lower_seed: int | None = None,
         temperature: float = 1.0,
         lower_temperature: float | None = None,
     ) -> np.ndarray:
-        """A take's noise vector (1, 66), upper part first, held constant; each part has a seed (0
-        or more) and, if wished, a temperature of its own, so legs vary under one trunk. At
-        temperature 1 takes differ as captured ones do, where the weights say how far those do.
-        """
-        lower_seed = seed if lower_seed is None else lower_seed
-        upper = np.random.default_rng([seed, 0]).standard_normal(UPPER_SIZE)
-        lower = np.random.default_rng([lower_seed, 1]).standard_normal(LOWER_SIZE)
-
-        heat = np.full(POSE_SIZE, temperature)
-        heat[UPPER_SIZE:] = temperature if lower_temperature is None else lower_temperature
-        return heat * (self.network.spread @ np.concatenate([upper, lower]))[None]
+        """One take's noise (T, 1, 66), as ``TakeNoise.draw`` gives it."""
+        drawn = self.network.noise.draw(frames, seed, lower_seed, temperature, lower_temperature)
+        return drawn[:, None]
 
     def standardised(self, poses: np.ndarray) -> np.ndarray:
         """Poses (…, 66) in SMPL order, metres, as the model holds them."""
@@ -336,28 +329,34 @@ class Sampler:
     ) -> Generator[float, None, Samples]:
         """Make every frame of B takes; yields progress in [0, 1].
 
-        ``z`` (B, 66): one noise vector a take, upper part first, held constant. ``kept`` (N, B,
-        66), SMPL order, metres: the first N frames as they are to stay; the model goes on from
-        them, its noise passing over ten frames from the one that the last kept pose is made of to
-        ``z``, so that nothing jumps. ``watch`` is shown each frame of the first take as it is made:
-        its index and pose (66,) as above. ``unchanged``: stretches to be made besides, as the run
-        would go on. Raises WeightsError where the poses are not a body's.
+        ``z`` (T, B, 66): the noise of each take and frame, upper part first; or (B, 66), one vector
+        a take, held constant. ``kept`` (N, B, 66), SMPL order, metres: the first N frames as they
+        are to stay; the model goes on from them, its noise passing over ten frames from the one
+        that the last kept pose is made of to ``z``, so that nothing jumps. ``watch`` is shown each
+        frame of the first take as it is made: its index and pose (66,) as above. ``unchanged``:
+        stretches to be made besides, as the run would go on. Raises WeightsError where the poses
+        are not a body's.
         """
         array, numpy = self.backend.array, self.backend.numpy
-        own_noise = array(z)
-        yield from within(self.start_steps(conditions, takes=len(z)), 0.0, 0.0)
-        known = array(np.zeros((0, *z.shape)) if kept is None else self.standardised(kept))
+        own_noise = array(np.broadcast_to(z, (len(conditions), *z.shape[-2:])))
+        takes = z.shape[-2]
+        yield from within(self.start_steps(conditions, takes), 0.0, 0.0)
+        nothing = np.zeros((0, takes, POSE_SIZE))
+        known = array(nothing if kept is None else self.standardised(kept))
 
-        noise = last_kept = own_noise
+        noise = last_kept = own_noise[0]
         frames: list[Frame] = []
         aside: list[Array] = []
         for t in range(len(conditions)):
-            if t >= len(known):
+            if not len(known):
+                noise = own_noise[t]
+            elif t >= len(known):
                 share = float(smoothstep(np.array((t - len(known) + 1) / _PASSING)))
-                noise = last_kept + (own_noise - last_kept) * share
+                noise = last_kept + (own_noise[t] - last_kept) * share
             for stretch in unchanged:
                 if stretch.start == t:
-                    for pose in self._as_before(conditions, stretch, noise):
+                    going_on = own_noise[t : t + len(stretch.given)] - own_noise[t] + noise
+                    for pose in self._as_before(conditions, stretch, going_on):
                         aside.append(pose)
                         yield t / len(conditions)
 
@@ -386,8 +385,8 @@ class Sampler:
     def _as_before(
         self, conditions: Conditions, stretch: Unchanged, noise: Array
     ) -> Iterator[Array]:
-        """Standardised poses (B, 66) of the stretch, from the memory as it is now, which stays as
-        it is.
+        """Standardised poses (B, 66) of the stretch, of its own ``noise`` (M, B, 66), from the
+        memory as it is now, which stays as it is.
         """
         begin = max(0, stretch.start - self.network.sizes.history)
         stop = stretch.start + len(stretch.given)
@@ -396,11 +395,11 @@ class Sampler:
         there.given[stretch.start - begin :] = stretch.given
 
         other = copy(self)
-        other.start(there, takes=len(noise))
+        other.start(there, takes=noise.shape[1])
         other._memory = self._memory.copy()
-        for t in range(stretch.start, stop):
+        for t, own in zip(range(stretch.start, stop), noise, strict=True):
             with one_thread(), np.errstate(over="ignore", invalid="ignore"):
-                pose = other.decode(t - begin, noise).pose
+                pose = other.decode(t - begin, own).pose
             yield pose
 
     def _stacked(self, arrays: Sequence[Array]) -> np.ndarray:

@@ -158,8 +158,12 @@ class Pool:
             for name, a in self.windows(rows, names).items()
         }
 
-    def batch(self, rows: Tensor, statistics: Statistics, config: ModelConfig) -> Batch:
-        """Windows ``rows`` (whole numbers, on the CPU), poses with dequantisation noise."""
+    def batch(
+        self, rows: Tensor, statistics: Statistics, config: ModelConfig, noise: float = NOISE
+    ) -> Batch:
+        """Windows ``rows`` (whole numbers, on the CPU), poses with dequantisation ``noise``
+        (metres).
+        """
         mean, std, v_mean, v_std, a_mean, a_std = (
             torch.as_tensor(getattr(statistics, name), dtype=torch.float32, device=self.device)
             for name in (
@@ -174,7 +178,7 @@ class Pool:
         a, history = self._rows(rows), config.history
         order = torch.as_tensor(model_order(np.arange(66)), device=self.device)
         poses = a["poses"].float()[..., order] * POSE_UNIT
-        poses = (poses + NOISE * torch.randn_like(poses) - mean) / std
+        poses = (poses + noise * torch.randn_like(poses) - mean) / std
         step = a["velocity"]
         velocity = (step - v_mean) / v_std
         way = ((a["ahead"] - a_mean) / a_std)[..., : config.ahead]

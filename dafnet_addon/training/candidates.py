@@ -16,7 +16,7 @@ from ..model.config import ModelConfig
 from ..model.systems import system_named
 from .checkpoints import Checkpoint, checkpoint_file
 from .export import export
-from .spread import take_spread
+from .noise import take_noise
 from .train import Run, account, before_it_cooled, dataset_pool, train, trained
 
 __all__ = ["cooled", "has_weights", "snapshot", "write_weights"]
@@ -70,8 +70,8 @@ def write_weights(folder: Path, dataset: Path, file: Path) -> None:
     them.
     """
     flow, predictor, statistics = trained(folder)
-    spread = take_spread(flow, predictor, dataset_pool(dataset), statistics)
-    export(file, flow, predictor, statistics, account(folder, dataset), spread)
+    noise = take_noise(flow, predictor, dataset_pool(dataset), statistics)
+    export(file, flow, predictor, statistics, account(folder, dataset), noise)
 
 
 def cooled(

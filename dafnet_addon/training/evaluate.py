@@ -35,7 +35,7 @@ from ..core.occupancy import distance
 from ..core.progress import drained
 from ..core.root import to_world
 from ..core.sampler import Sampler
-from ..core.skeleton import END_EFFECTORS, LOWER, STATURE, UPPER, joint
+from ..core.skeleton import END_EFFECTORS, LOWER, POSE_SIZE, STATURE, UPPER, joint
 from ..core.solids import Scene
 from ..core.take import MODES, Controls
 from ..core.threads import one_thread
@@ -127,12 +127,12 @@ def shot_of(clip: HeldClip, mode: str, scene: Scene | None = None) -> Shot:
 
 
 def made(sampler: Sampler, shot: Shot, noise: np.ndarray) -> np.ndarray:
-    """Takes (S, T, 22, 3) of noise vectors (S, 66): world joints on constant bones, as the model
-    gives them.
+    """Takes (S, T, 22, 3) of noise (T, S, 66), or (S, 66) where it is held: world joints on
+    constant bones, as the model gives them.
     """
     poses = drained(sampler.run(shot.conditions, noise)).poses
     takes = []
-    for s in range(len(noise)):
+    for s in range(poses.shape[1]):
         takes.append(on_bones(to_world(shot.path, poses[PREROLL:, s].reshape(-1, 22, 3))))
     return np.stack(takes)
 
@@ -228,18 +228,19 @@ def _life(clip: HeldClip, takes: np.ndarray) -> Sums:
 
 
 def _noise(
-    sampler: Sampler, seed: int, seeds: int, mode: str
+    sampler: Sampler, frames: int, seed: int, seeds: int, mode: str
 ) -> tuple[np.ndarray, dict[str, list[int]]]:
-    """Noise vectors (S, 66), and which of them each run is of: calm; lively; in FREE one upper body
-    over different legs.
+    """Noise of takes (T, S, 66), and which of them each run is of: calm; lively; in FREE one upper
+    body over different legs.
     """
     lively = list(range(1, 1 + seeds))
-    noise = [sampler.noise(seed, temperature=0.0), *(sampler.noise(seed + s) for s in range(seeds))]
+    noise = [np.zeros((frames, 1, POSE_SIZE))]
+    noise += [sampler.noise(frames, seed + s) for s in range(seeds)]
     runs = {f"{mode.lower()}_t0": [0], f"{mode.lower()}_t1": lively}
     if mode == "FREE":
         runs["legs"] = [1, *range(1 + seeds, 2 * seeds)]
-        noise += [sampler.noise(seed, seed + s) for s in range(1, seeds)]
-    return np.concatenate(noise), runs
+        noise += [sampler.noise(frames, seed, seed + s) for s in range(1, seeds)]
+    return np.concatenate(noise, axis=1), runs
 
 
 def beside(
@@ -261,7 +262,7 @@ def beside(
         shots[mode] = replace(shots["EE"], conditions=conditions, told=other.told)
     runs = {"ground_truth": figures(clip, clip.joints[None])}
     for mode in modes:
-        noise, takes_of = _noise(sampler, seed, seeds, mode)
+        noise, takes_of = _noise(sampler, len(known), seed, seeds, mode)
         takes = made(sampler, shots[mode], noise)
         runs |= {run: figures(clip, takes[chosen], mode) for run, chosen in takes_of.items()}
         calm = f"{mode.lower()}_t0"

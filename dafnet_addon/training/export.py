@@ -138,10 +138,10 @@ def export(
     predictor: ActionPredictor | None,
     statistics: Statistics,
     words: Mapping[str, str],
-    spread: Mapping[str, np.ndarray] | None = None,
+    noise: Mapping[str, np.ndarray] | None = None,
 ) -> None:
     """Write the weights file; ``words`` are its metadata (licence, provenance, metrics), texts or
-    JSON texts; ``spread`` (see ``take_spread``) what its takes' noise is drawn from, N(0, I)
+    JSON texts; ``noise`` (see ``take_noise``) what its takes are drawn from, the paper's N(0, I)
     without it.
 
     Matrices of a thousand values or more are stored in 8 bits with a scale for each row, which
@@ -167,7 +167,7 @@ def export(
             tensors[name] = array
         else:
             tensors[name], tensors[f"{name}.scale"] = quantised(array)
-    tensors |= {f"{part}.spread": matrix for part, matrix in (spread or {}).items()}
+    tensors |= noise or {}
     with whole_file(file) as part:
         write_safetensors(
             part, tensors, {"format": FORMAT, "config": json.dumps(description), **words}

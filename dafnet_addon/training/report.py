@@ -34,7 +34,7 @@ from ..core.paths import Point, Route, Stop, facing, route
 from ..core.progress import drained
 from ..core.root import to_root
 from ..core.sampler import Sampler
-from ..core.skeleton import SEAT_TO_PELVIS
+from ..core.skeleton import POSE_SIZE, SEAT_TO_PELVIS
 from ..core.take import Controls
 from ..core.weights import Weights
 from ..data.boxes import box, placed
@@ -165,13 +165,9 @@ def _walk(sampler: Sampler, room: Room, seeds: int) -> np.ndarray:
     """Takes (1 + seeds, T, 22, 3) in a room: temperature 0 first, then 1."""
     controls = Controls(fps=30.0, root=room.walked.path.matrices())
     shot = drained(shot_steps(Furnishing(room.boxes).scene(), controls))
-    return made(
-        sampler,
-        shot,
-        np.concatenate(
-            [sampler.noise(0, temperature=0.0), *(sampler.noise(s) for s in range(seeds))]
-        ),
-    )
+    frames = len(shot.conditions)
+    noise = [np.zeros((frames, 1, POSE_SIZE)), *(sampler.noise(frames, s) for s in range(seeds))]
+    return made(sampler, shot, np.concatenate(noise, axis=1))
 
 
 def _round(room: Room, takes: np.ndarray, first: int, last: int) -> Figures:
@@ -744,4 +740,4 @@ def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) ->
 
 
 def _calm(sampler: Sampler, clip: HeldClip) -> np.ndarray:
-    return made(sampler, shot_of(clip, "FREE"), sampler.noise(0, temperature=0.0))[0]
+    return made(sampler, shot_of(clip, "FREE"), np.zeros((1, POSE_SIZE)))[0]

@@ -1,0 +1,64 @@
+"""The noise that takes are made of: what lasts all along a take, and what comes and goes in it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .skeleton import LOWER_SIZE, POSE_SIZE, UPPER_SIZE
+
+__all__ = ["TAPS", "TakeNoise"]
+
+TAPS = 49
+"""Frames of a filter: what comes and goes within 1.6 s."""
+
+
+@dataclass(frozen=True)
+class TakeNoise:
+    """How captured takes differ, in the flow's noise; upper part first.
+
+    The paper draws one vector from N(0, I) and holds it (section 4.3). Along captured motion the
+    noise is standard normal as well, but only a part of it lasts; the rest comes and goes within a
+    second, and that is what makes a body that sits or stands look alive.
+
+    ``lasting`` (66, 66): what a take holds is this times N(0, I). ``passing`` (66, 66): what comes
+    and goes is at each frame this times N(0, I), and its values follow one another as those of
+    white noise under the filters ``taps`` (66, 49) do, each of unit length. Zeros where the weights
+    do not say: such takes hold their noise.
+    """
+
+    lasting: np.ndarray
+    passing: np.ndarray
+    taps: np.ndarray
+
+    def draw(
+        self,
+        frames: int,
+        seed: int,
+        lower_seed: int | None = None,
+        temperature: float = 1.0,
+        lower_temperature: float | None = None,
+    ) -> np.ndarray:
+        """The noise of a take's frames (T, 66); of a longer take, the first frames are the same.
+
+        Each part of the body has a seed (0 or more) and, if wished, a temperature of its own, so
+        that legs vary under one trunk. At temperature 1 takes differ as captured ones do.
+        """
+        lower_seed = seed if lower_seed is None else lower_seed
+        held, white = [], []
+        for part, (own_seed, size) in enumerate(((seed, UPPER_SIZE), (lower_seed, LOWER_SIZE))):
+            rng = np.random.default_rng([own_seed, part])
+            held.append(rng.standard_normal(size))
+            white.append(rng.standard_normal((frames + TAPS - 1, size)))
+
+        steps = np.concatenate(white, axis=1) @ self.passing.T
+        rows = np.lib.stride_tricks.sliding_window_view(steps, TAPS, axis=0)
+        passing = np.einsum("tdk,dk->td", rows, self.taps)
+
+        heat = np.full(POSE_SIZE, temperature)
+        heat[UPPER_SIZE:] = temperature if lower_temperature is None else lower_temperature
+        return heat * (self.lasting @ np.concatenate(held) + passing)
+
+    @staticmethod
+    def standard_normal() -> "TakeNoise":
+        """The paper's: one vector from N(0, I), held."""
+        return TakeNoise(np.eye(POSE_SIZE), np.zeros((POSE_SIZE,) * 2), np.zeros((POSE_SIZE, TAPS)))
