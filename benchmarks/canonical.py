@@ -14,16 +14,16 @@ import numpy as np
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.root import root_from_joints
 from dafnet_addon.core.rotations import rotate, transpose
-from dafnet_addon.core.skeleton import PARENTS, TOE_HEIGHT, joint
+from dafnet_addon.core.series import MODEL_FPS, runs
+from dafnet_addon.core.skeleton import FEET, JOINTS, PARENTS, PELVIS, TOE_HEIGHT, WRISTS, joint
 from dafnet_addon.data.canonical import Calibration, calibrate, canonical
 from dafnet_addon.data.cuts import bad_frames
 from dafnet_addon.data.mocap import Clip, read_clips
 
-_FPS = 30.0
 _PLANTED, _STILL = 0.25, 0.04  # metres a second: of a toe on the floor, of a hand that rests
 _TOES, _WRISTS = (
-    (joint("left_foot"), joint("right_foot")),
-    (joint("left_wrist"), joint("right_wrist")),
+    FEET,
+    WRISTS,
 )
 _SLIDE, _TOE, _ANKLE, _WRIST, _SEAT = (
     "toe slide",
@@ -66,12 +66,7 @@ def pairs(clips: list[Clip]) -> list[Pair]:
 
 
 def _speed(joints: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(np.diff(joints, axis=0), axis=-1) * _FPS
-
-
-def _runs(flags: np.ndarray, least: int) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]]))).reshape(-1, 2)
-    return [(int(a), int(b)) for a, b in edges if b - a >= least]
+    return np.linalg.norm(np.diff(joints, axis=0), axis=-1) * MODEL_FPS
 
 
 def _wander(joints: np.ndarray) -> float:
@@ -104,10 +99,10 @@ def measured(found: list[Pair]) -> dict[str, tuple[float, float, int]]:
                 (0.0, d) for d in np.linalg.norm(after[:, toe - 3] - before[:, toe - 3], axis=-1)
             ]
         for wrist in _WRISTS:
-            for a, b in _runs(_speed(before[:, wrist]) < _STILL, 20):
+            for a, b in runs(_speed(before[:, wrist]) < _STILL, 20):
                 if _wander(before[a:b, joint("spine3")]) > 0.04:
                     values[_WRIST].append((_wander(before[a:b, wrist]), _wander(after[a:b, wrist])))
-        for a, b in _runs(
+        for a, b in runs(
             (_speed(before[:, 0]) < 0.1) & (before[:-1, 0, 2] < 0.7) & (before[:-1, 0, 2] > 0.3), 20
         ):
             values[_SEAT].append((_wander(before[a:b, 0]), _wander(after[a:b, 0])))
@@ -157,7 +152,7 @@ def _poses(found: list[Pair]) -> list[Pair]:
         stride = np.linalg.norm(
             joints[:, joint("left_ankle")] - joints[:, joint("right_ankle")], axis=-1
         )
-        height = joints[:, 0, 2]
+        height = joints[:, PELVIS, 2]
         unfit = (height < 0.85) | (joints[:, _TOES, 2].min(1) > 0.04)
         return [
             *(np.abs(stride - apart) + 9.0 * unfit for apart in (0.2, 0.65)),
@@ -203,8 +198,8 @@ def picture(sources: dict[str, list[Pair]], file: Path) -> None:
             shift = np.array([1.1 * place, 0.0])
             for pose, fitted in ((before, False), (after, True)):
                 for j, parent in enumerate(PARENTS[1:], start=1):
-                    side = "#1f6fb4" if j in (1, 4, 7, 10, 13, 16, 18, 20) else "#3a3a3a"
-                    colour = "#e0701a" if j in (2, 5, 8, 11, 14, 17, 19, 21) else side
+                    side = "#1f6fb4" if JOINTS[j].startswith("left_") else "#3a3a3a"
+                    colour = "#e0701a" if JOINTS[j].startswith("right_") else side
                     ends = pose[[parent, j]] + shift
                     ax.plot(
                         *ends.T,

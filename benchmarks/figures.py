@@ -25,10 +25,11 @@ from dafnet_addon.core.conditions import PREROLL, shot_steps
 from dafnet_addon.core.files import whole_file
 from dafnet_addon.core.kinematics import fit, forward_kinematics
 from dafnet_addon.core.paths import Route, Stop, facing, route
-from dafnet_addon.core.progress import drained
+from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.root import RootPath, to_world
 from dafnet_addon.core.sampler import Sampler
-from dafnet_addon.core.skeleton import END_EFFECTORS, SEAT_TO_PELVIS, UPPER
+from dafnet_addon.core.series import MODEL_FPS
+from dafnet_addon.core.skeleton import END_EFFECTORS, PELVIS, SEAT_TO_PELVIS, UPPER
 from dafnet_addon.core.weights import Weights
 from dafnet_addon.data.courses import AT_DESKS
 from dafnet_addon.demo import Place
@@ -36,7 +37,6 @@ from dafnet_addon.model.systems import sampler_of
 
 __all__ = ["FIGURES", "HEIGHTS", "Motion", "draw", "seated_at"]
 
-FPS = 30.0
 HEIGHTS = (0.32, 0.38, 0.45, 0.52, 0.60, 0.70)
 """Seats of figure 11 (metres)."""
 
@@ -165,20 +165,20 @@ def _made(weights: Weights, pieces: Iterable[Piece], controls: Controls) -> Moti
 
 def _made_by(sampler: Sampler, pieces: Iterable[Piece], controls: Controls) -> Motion:
     """One take of any system, in one mode."""
-    shot = drained(shot_steps(_scene(pieces), controls))
-    made = drained(sampler.run(shot.conditions, np.zeros((1, 66))))
+    shot = run_to_end(shot_steps(_scene(pieces), controls))
+    made = run_to_end(sampler.run(shot.conditions, np.zeros((1, 66))))
     return _motion(
         to_world(shot.path, made.poses[PREROLL:, 0].reshape(-1, 22, 3)), made.actions[PREROLL:, 0]
     )
 
 
 def _free(walked: Route) -> Controls:
-    return Controls(fps=FPS, root=walked.path.matrices())
+    return Controls(fps=MODEL_FPS, root=walked.path.matrices())
 
 
 def _staying(seconds: float) -> RootPath:
     """A root that stays at the origin and looks along +y."""
-    frames = round(FPS * seconds)
+    frames = round(MODEL_FPS * seconds)
     return RootPath(np.zeros((frames, 3)), np.zeros(frames))
 
 
@@ -320,7 +320,7 @@ def _put(
     colour: Colour,
     offset: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> None:
-    stage.pose(motion.frames[frame], motion.joints[frame, 0] + offset, colour)
+    stage.pose(motion.frames[frame], motion.joints[frame, PELVIS] + offset, colour)
 
 
 def _strobe(stage: Stage, motion: Motion, frames: Sequence[int], colour: Colour) -> None:
@@ -352,7 +352,7 @@ def _floor_line(stage: Stage, path: RootPath) -> None:
 
 def _around(motion: Motion, frame: int) -> np.ndarray:
     """Corners of the room that a body takes, standing at this frame."""
-    ground = motion.joints[frame, 0] * (1.0, 1.0, 0.0)
+    ground = motion.joints[frame, PELVIS] * (1.0, 1.0, 0.0)
     return ground + np.array(
         [(x, y, z) for x in (-0.7, 0.7) for y in (-0.7, 0.7) for z in (0.0, 1.8)]
     )
@@ -391,17 +391,18 @@ def _actions(studio: _Studio) -> Image.Image:
     _, down, last = walked.rests
     moments = {
         "stands": 15,
-        "walks": down.first - 75,
-        "turns to the chair": down.first - 28,
-        "sits down": down.first - 6,
-        "sits": (down.first + down.last) // 2,
-        "gets up": down.last + 18,
-        "walks on": (down.last + last.first) // 2 + 5,
-        "sits on the stool": last.last - 10,
+        "walks": down.start - 75,
+        "turns to the chair": down.start - 28,
+        "sits down": down.start - 6,
+        "sits": (down.start + down.stop - 1) // 2,
+        "gets up": down.stop + 17,
+        "walks on": (down.stop - 1 + last.start) // 2 + 5,
+        "sits on the stool": last.stop - 11,
     }
     panels = [
         studio.captioned(
-            _moment(studio, pieces, motion, frame, 48.0, 390, 330), f"{frame / FPS:.1f} s: {name}"
+            _moment(studio, pieces, motion, frame, 48.0, 390, 330),
+            f"{frame / MODEL_FPS:.1f} s: {name}",
         )
         for name, frame in moments.items()
     ]
@@ -423,7 +424,10 @@ def _by_furniture(studio: _Studio) -> Image.Image:
     )
     rest = walked.rests[-1]
     # None of the last second before the seat, which would stand between it and the camera.
-    frames = [*_spaced(walked.path, walked.rests[0].last, rest.first - 30, 0.70), rest.last - 15]
+    frames = [
+        *_spaced(walked.path, walked.rests[0].stop - 1, rest.start - 30, 0.70),
+        rest.stop - 16,
+    ]
     kinds: dict[str, tuple[float, list[Piece]]] = {
         "nothing": (0.0, []),
         "chair": (0.45, [(_chair(), _HERE)]),
@@ -450,7 +454,7 @@ def _by_furniture(studio: _Studio) -> Image.Image:
                 (-0.65, 1.6, 0.0),
             ]
         )
-        words = _pelvis(motion.joints[frames[-1], 0, 2], height)
+        words = _pelvis(motion.joints[frames[-1], PELVIS, 2], height)
         title = f"{name}, {height:.2f} m" if height else name
         panels.append(
             studio.captioned(studio.photograph(stage, 525, 300, seen, margin=0.02), title, words)
@@ -474,7 +478,10 @@ def _by_height(studio: _Studio) -> Image.Image:
         )
         feet.append(offset + np.array([0.0, 0.25, 0.0]))
         words.append(
-            (f"seat {height:.2f} m", _pelvis(float(motion.joints[len(motion) - 15, 0, 2]), height))
+            (
+                f"seat {height:.2f} m",
+                _pelvis(float(motion.joints[len(motion) - 15, PELVIS, 2]), height),
+            )
         )
     picture = studio.captioned(studio.photograph(stage, 1600, 430, margin=0.03))
     pen = ImageDraw.Draw(picture)
@@ -493,7 +500,11 @@ def _at_a_desk(course: Callable[[int], tuple[np.ndarray, np.ndarray]], desk: flo
     left, right = course(len(path))
     over = np.array([0.0, 0.0, desk])
     return Controls(
-        fps=FPS, root=path.matrices(), mode="EE", hand_left=left + over, hand_right=right + over
+        fps=MODEL_FPS,
+        root=path.matrices(),
+        mode="EE",
+        hand_left=left + over,
+        hand_right=right + over,
     )
 
 
@@ -507,7 +518,7 @@ def _made_up(kind: int, frames: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _greets(frames: int) -> tuple[np.ndarray, np.ndarray]:
     """The right hand waves twice a second, the left one lies on the desk."""
-    wave = np.sin(2.0 * np.pi * 2.0 * np.arange(frames) / FPS)
+    wave = np.sin(2.0 * np.pi * 2.0 * np.arange(frames) / MODEL_FPS)
     lying = np.tile([-0.20, 0.32, 0.05], (frames, 1))
     return lying, np.stack([0.40 + 0.08 * wave, 0.24 + 0.0 * wave, 0.60 - 0.02 * wave**2], axis=1)
 
@@ -556,7 +567,9 @@ def _carries(weights: Weights) -> tuple[list[Piece], Controls, RootPath]:
     pieces = [(_chair(), _HERE)]
     free = _made(weights, pieces, _free(walked))
     tray = [
-        np.stack([np.full(len(free), x), np.full(len(free), 0.34), free.joints[:, 0, 2] + 0.16], 1)
+        np.stack(
+            [np.full(len(free), x), np.full(len(free), 0.34), free.joints[:, PELVIS, 2] + 0.16], 1
+        )
         for x in (-0.17, 0.17)
     ]
     hands = [to_world(walked.path, each) for each in tray]
@@ -583,7 +596,7 @@ def _draws() -> tuple[list[Piece], Controls]:
     path = _staying(4.0)
     board = (FURNITURE["Whiteboard"], Place((0.0, 0.46), np.pi))
     return [board], Controls(
-        fps=FPS, root=path.matrices(), mode="EE", hand_right=_lying_eight(len(path))
+        fps=MODEL_FPS, root=path.matrices(), mode="EE", hand_right=_lying_eight(len(path))
     )
 
 
@@ -664,9 +677,9 @@ def _through_a_room(studio: _Studio) -> Image.Image:
     ]
     rest = walked.rests[2]
     frames = np.arange(len(walked.path))
-    modes = np.where((frames >= rest.first) & (frames < rest.last), "EE", "FREE")
-    hand = _lying_eight(rest.last - rest.first) + np.array([*board.position, 0.0])
-    target = hand[np.clip(frames - rest.first, 0, len(hand) - 1)]
+    modes = np.where((frames >= rest.start) & (frames < (rest.stop - 1)), "EE", "FREE")
+    hand = _lying_eight(rest.stop - 1 - rest.start) + np.array([*board.position, 0.0])
+    target = hand[np.clip(frames - rest.start, 0, len(hand) - 1)]
     controls = replace(_free(walked), mode=modes.tolist(), hand_right=target)
     motion = _made(studio.weights, pieces, controls)
 
@@ -676,8 +689,10 @@ def _through_a_room(studio: _Studio) -> Image.Image:
     stage.line(hand, _ASKED, 0.010)
     picked: list[int] = []
     for before, after in zip(walked.rests[:-1], walked.rests[1:], strict=True):
-        picked += _spaced(walked.path, before.last + (55 if picked else 0), after.first - 30, 0.90)
-        picked.append((after.first + after.last) // 2)
+        picked += _spaced(
+            walked.path, (before.stop - 1) + (55 if picked else 0), after.start - 30, 0.90
+        )
+        picked.append((after.start + after.stop - 1) // 2)
     for k, frame in enumerate(picked):
         _put(
             stage,
@@ -695,7 +710,7 @@ def _through_a_room(studio: _Studio) -> Image.Image:
         "blue: FREE; orange: EE, from half a second on the hand is "
         f"{_error(motion, controls, 15):.1f} cm off the red line"
     )
-    title = f"{len(motion) / FPS:.0f} seconds: sofa, whiteboard, chair"
+    title = f"{len(motion) / MODEL_FPS:.0f} seconds: sofa, whiteboard, chair"
     return studio.captioned(studio.photograph(stage, 1600, 530, seen, margin=0.02), title, words)
 
 
@@ -722,12 +737,12 @@ def _compared_free(studio: _Studio) -> Image.Image:
     ]
     down = walked.rests[1]
     moments = {
-        "walks": down.first - 70,
-        "turns": down.first - 36,
-        "sits down": down.first - 16,
-        "sits": (down.first + down.last) // 2,
-        "gets up": down.last + 18,
-        "leaves": down.last + 55,
+        "walks": down.start - 70,
+        "turns": down.start - 36,
+        "sits down": down.start - 16,
+        "sits": (down.start + down.stop - 1) // 2,
+        "gets up": down.stop + 17,
+        "leaves": down.stop + 54,
     }
     rows = []
     for system, sampler in _systems(studio).items():

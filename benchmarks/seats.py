@@ -15,6 +15,8 @@ from dafnet_addon import Box, Controls, Scene, Take, generate, load_weights
 from dafnet_addon.core.metrics import Seat, seat_report, standing_pelvis_height
 from dafnet_addon.core.paths import Route, Stop, facing, route
 from dafnet_addon.core.root import root_from_matrices
+from dafnet_addon.core.series import MODEL_FPS
+from dafnet_addon.core.skeleton import PELVIS
 from dafnet_addon.core.weights import Weights
 
 Noise = Sequence[tuple[float, int]]
@@ -56,7 +58,7 @@ def seat(height: float, back: bool) -> Scene:
 def _takes(
     scene: Scene, walked: Route, weights: Weights, noise: Noise
 ) -> Iterator[tuple[float, Take]]:
-    controls = Controls(fps=30, root=walked.path.matrices())
+    controls = Controls(fps=MODEL_FPS, root=walked.path.matrices())
     for temperature, seed in noise:
         yield temperature, generate(scene, controls, weights, seed=seed, temperature=temperature)
 
@@ -101,7 +103,7 @@ def measure(
             path, _ = root_from_matrices(take.root)
             drop = (
                 standing_pelvis_height(take.joints, path, take.fps)
-                - take.joints[rest.first : rest.last, 0, 2].min()
+                - take.joints[rest.start : rest.stop - 1, PELVIS, 2].min()
             )
             empty.append(
                 {"approach": way, "temperature": temperature, "drop": round(float(drop), 4)}

@@ -21,6 +21,7 @@ import torch
 
 from dafnet_addon.baselines.samp import PAPER_SAMP, SampConfig, network_of
 from dafnet_addon.core.sampler import Conditions, Sampler
+from dafnet_addon.core.series import MODEL_FPS
 from dafnet_addon.core.skeleton import OFFSETS
 from dafnet_addon.core.threads import one_thread
 from dafnet_addon.core.weights import FORMAT, Weights, load_weights
@@ -42,7 +43,7 @@ def random_weights(config: ModelConfig) -> Weights:
     flow = BodyFlow(config)
     unit = Statistics(np.zeros(66), np.ones(66), np.zeros(3), np.ones(3), np.zeros(18), np.ones(18))
     tensors = tensors_of(flow, ActionPredictor(config) if config.predicts else None, unit)
-    description = {"model": config.as_dict(), "fps": 30, "offsets": OFFSETS.tolist()}
+    description = {"model": config.as_dict(), "fps": round(MODEL_FPS), "offsets": OFFSETS.tolist()}
     return Weights(tensors, description, {"format": FORMAT}, Path("random"))
 
 

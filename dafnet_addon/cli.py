@@ -22,7 +22,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from .core.checks import MOST_SEED
+from .core.checks import MAX_SEED
 from .core.errors import DafnetError, InputError
 from .core.files import require_writable, save_text
 from .core.stopping import Stop
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 __all__ = ["main", "run"]
 
-_MOST_PROCESSES = 1024
+_MAX_PROCESSES = 1024
 _Result = tuple[Any, str] | None
 """What a command found, for machines and for people."""
 _PACKAGES = {"PIL": "pillow"}
@@ -123,7 +123,7 @@ def _nowhere(stream: TextIO) -> None:
 
 def _say(text: str) -> None:
     """Print on standard output what was asked for; a reader who has read enough, as ``head`` has,
-    is no error.
+    is not an error.
     """
     try:
         if text:
@@ -175,7 +175,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     def sampling(added: argparse.ArgumentParser, temperature: float | None) -> None:
         default = None if temperature is None else 0
         added.add_argument(
-            "--seed", type=_number(int, 0, MOST_SEED), default=default, help="seed of the noise"
+            "--seed", type=_number(int, 0, MAX_SEED), default=default, help="seed of the noise"
         )
         added.add_argument(
             "--temperature",
@@ -290,8 +290,8 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     prepare.add_argument(
         "--windows", type=_number(int, 1), default=12000, help="how many training windows"
     )
-    prepare.add_argument("--processes", type=_number(int, 1, _MOST_PROCESSES), default=cores())
-    prepare.add_argument("--seed", type=_number(int, 0, MOST_SEED), default=0)
+    prepare.add_argument("--processes", type=_number(int, 1, _MAX_PROCESSES), default=cores())
+    prepare.add_argument("--seed", type=_number(int, 0, MAX_SEED), default=0)
 
     train = command(
         "train",
@@ -342,7 +342,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
         metavar="MINUTES",
         help="measure again and again until the run's budget is spent",
     )
-    validate.add_argument("--processes", type=_number(int, 1, _MOST_PROCESSES), default=1)
+    validate.add_argument("--processes", type=_number(int, 1, _MAX_PROCESSES), default=1)
 
     cool = command(
         "cool",
@@ -760,8 +760,8 @@ def _benchmark(name: str) -> dict[str, Any]:
 
 
 def _require(options: argparse.Namespace) -> None:
-    """Raise InputError where the command is no part of this installation, or needs modules that are
-    not there.
+    """Raise InputError where the command is not part of this installation, or needs modules that
+    are not there.
     """
     if not (Path(__file__).parent / options.part).is_dir():
         raise InputError(

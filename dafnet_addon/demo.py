@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .core.metrics import Seat, seat_report, standing_pelvis_height, summary
+from .core.metrics import Seat, motion_metrics, seat_report, standing_pelvis_height
 from .core.occupancy import distance
 from .core.paths import Point, Rest, Route, Stop, facing, route
 from .core.root import root_from_matrices
@@ -71,10 +71,10 @@ def hand_target(rest: Rest, frames: np.ndarray) -> np.ndarray:
     """World positions (N, 3) of the right wrist that draws a wave on the whiteboard during
     ``rest``.
     """
-    u = np.clip((frames - rest.first) / max(rest.last - rest.first, 1), 0.0, 1.0)
-    x = rest.stop.position[0] + 0.08 + 0.30 * u
+    u = np.clip((frames - rest.start) / max(rest.stop - 1 - rest.start, 1), 0.0, 1.0)
+    x = rest.place.position[0] + 0.08 + 0.30 * u
     return np.stack(
-        [x, np.full(len(u), rest.stop.position[1] + 0.36), 1.25 + 0.07 * np.sin(4 * np.pi * u)],
+        [x, np.full(len(u), rest.place.position[1] + 0.36), 1.25 + 0.07 * np.sin(4 * np.pi * u)],
         axis=1,
     )
 
@@ -93,7 +93,7 @@ def demo_report(
         for name in END_EFFECTORS
         if (target := getattr(controls, name)) is not None
     }
-    generated = summary(
+    generated = motion_metrics(
         take.joints,
         take.fps,
         floor=floor,

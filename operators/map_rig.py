@@ -23,7 +23,7 @@ __all__ = ["DAFNET_OT_detect_rig", "DAFNET_OT_load_rig_map", "DAFNET_OT_save_rig
 
 
 class _OfRig(DafnetOperator):
-    """For an armature that is no DAFNet character."""
+    """For an armature that is not a DAFNet character."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -52,7 +52,7 @@ class DAFNET_PT_rig(bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """An armature that is no character is active."""
+        """An armature that is not a character is active."""
         return running_job() is None and rig_of(context) is not None
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -1,6 +1,7 @@
 """One direction of flow: what each part of the project may import, read from its source."""
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -241,3 +242,48 @@ def test_there_is_no_import_circle() -> None:
         for file in leaves:
             del imported[file]
     assert not imported, sorted(file.relative_to(PACKAGE).as_posix() for file in imported)
+
+
+def numbers(node: ast.expr) -> list[int]:
+    """The whole numbers that an index names, alone or in a list."""
+    if isinstance(node, ast.Constant) and type(node.value) is int:
+        return [node.value]
+    return [k for each in node.elts for k in numbers(each)] if isinstance(node, ast.List) else []
+
+
+@pytest.mark.parametrize(
+    "file", sources(*FOLDERS), ids=lambda file: file.relative_to(ROOT).as_posix()
+)
+def test_joints_go_by_name(file: Path) -> None:
+    """``joints[:, HEAD]``, not ``joints[:, 15]``: names are ``core.skeleton``'s."""
+    bare = []
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.Subscript):
+            continue
+        axes = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        array = ast.unparse(node.value).split(".")[-1]
+        if array in ("joints", "targets") and len(axes) > 1 and "..." not in ast.unparse(axes[0]):
+            bare += [node.lineno] * len(numbers(axes[1]))
+        elif array in ("REST", "OFFSETS"):
+            bare += [node.lineno] * len(numbers(axes[0]))
+    assert not bare or file.name == "skeleton.py"
+
+
+ONE_PLACE = {
+    "core/series.py": (r"3\.0 - 2\.0 \*", r"\* 30(\.0)?\b(?!\.)", r"\bfps(: float)? ?= ?30\b"),
+    "core/root.py": (
+        r"arctan2\(-\w+(\[\.\.\., 0\]|\[:, 0\]|\[0\])",
+        r"\[-np\.sin\([\w.]+\), np\.cos\([\w.]+\)\]",
+    ),
+}
+"""What is written down in one file alone: soft steps, the model's frame rate, headings."""
+
+
+@pytest.mark.parametrize(
+    "file", sources(*FOLDERS), ids=lambda file: file.relative_to(ROOT).as_posix()
+)
+def test_what_has_one_place_is_not_written_again(file: Path) -> None:
+    text = file.read_text(encoding="utf-8")
+    for place, patterns in ONE_PLACE.items():
+        if file != PACKAGE / place:
+            assert not [found for each in patterns for found in re.findall(each, text)]

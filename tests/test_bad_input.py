@@ -531,7 +531,7 @@ def test_whatever_becomes_a_mesh_is_read_and_moves(shot: Shot) -> None:
 
 @pytest.mark.parametrize(
     ("output", "words"),
-    [("{tmp}/file/out.blend", "file' is no folder"), ("{tmp}/folder.blend", "is a folder")],
+    [("{tmp}/file/out.blend", "file' is not a folder"), ("{tmp}/folder.blend", "is a folder")],
 )
 def test_an_output_that_cannot_be_written(
     shot: Shot,

@@ -184,7 +184,7 @@ def test_every_take_is_kept_and_mode_keys_stay(blender) -> None:
 
 def test_all_other_curves_play_on_as_they_did(blender) -> None:
     """Muted ones, modifiers, extrapolation, handles, groups, samples, custom properties and bones
-    that are no joints.
+    that are not joints.
     """
     ann = character(blender)
     own = ann.dafnet

@@ -15,7 +15,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.examples import add_example
 from bl_ext.user_default.dafnet.dafnet_addon.blender.scene_reader import read_scene
 from bl_ext.user_default.dafnet.dafnet_addon.blender.settings import settings_of
 from bl_ext.user_default.dafnet.dafnet_addon.core.conditions import shot_steps
-from bl_ext.user_default.dafnet.dafnet_addon.core.progress import drained
+from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end
 
 from kit.stage import Stage
 
@@ -482,14 +482,14 @@ def test_what_a_walk_leads_through_is_said(room: Room) -> None:
 def test_examples_lead_through_nothing(blender, kind: str) -> None:
     armature = add_example(blender.context, kind)
     read = read_scene(blender.context, settings_of(armature, blender.context.scene))
-    shot = drained(shot_steps(read.scene, read.controls))
+    shot = run_to_end(shot_steps(read.scene, read.controls))
     assert not [warning for warning in shot.warnings if "runs through" in warning]
 
 
 def test_the_demo_leads_through_nothing(blender) -> None:
     room = build_room(blender.context)
     read = read_scene(blender.context, settings_of(room.armature, blender.context.scene))
-    shot = drained(shot_steps(read.scene, read.controls))
+    shot = run_to_end(shot_steps(read.scene, read.controls))
     assert not [warning for warning in shot.warnings if "runs through" in warning]
 
 

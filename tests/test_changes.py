@@ -10,7 +10,7 @@ import pytest
 from dafnet_addon import Box, CleanUp, Controls, InputError, Scene, Take, generate, load_weights
 from dafnet_addon.core.generate import clean_again_steps
 from dafnet_addon.core.paths import Stop, route
-from dafnet_addon.core.progress import drained
+from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.resampling import frame_times, resample_path
 from dafnet_addon.core.root import RootPath
 from dafnet_addon.core.rotations import matrix_from_quaternion, yaw_matrix
@@ -280,7 +280,7 @@ def test_a_change_of_mode_is_cleaned_again_as_it_was_made(weights):
     asked = replace(controls, hand_left=target, mode=modes)
     raw, clean = (generate(Scene(), asked, weights, clean_up=each) for each in (CleanUp(), ALL))
     kept, told = unpacked(packed(raw, asked))
-    again = drained(clean_again_steps(Scene(), told, kept, ALL))
+    again = run_to_end(clean_again_steps(Scene(), told, kept, ALL))
     assert np.abs(again.joints - clean.joints).max() < 1e-3
     resumed = generate(Scene(), asked, weights, resume=raw, resume_frame=100, clean_up=ALL)
     assert np.abs(resumed.joints - clean.joints).max() < 0.01, (
@@ -305,7 +305,7 @@ def test_a_take_is_not_cleaned_again_for_other_controls(weights, changed):
         "modes": modes,
     }[changed]
     with pytest.raises(InputError, match="generate it again"):
-        drained(clean_again_steps(Scene(), replace(controls, **other), take, ALL))
+        run_to_end(clean_again_steps(Scene(), replace(controls, **other), take, ALL))
 
 
 @pytest.mark.parametrize("fps", [12.0, 30.0, 60.0])
@@ -321,7 +321,7 @@ def test_one_frame_reaches_turns_and_is_cleaned_again(weights, fps):
     seat = Scene([Box(center=np.array([3.0, 0.0, 0.2]), half_size=np.full(3, 0.2))])
     take = generate(seat, controls, weights, clean_up=ALL)
     assert np.abs(take.joints[:, 21] - place).max() < 2e-4
-    again = drained(clean_again_steps(seat, controls, take, ALL))
+    again = run_to_end(clean_again_steps(seat, controls, take, ALL))
     assert np.abs(again.joints - take.joints).max() < 1e-6
 
 

@@ -10,7 +10,7 @@ from dafnet_addon.core.cleanup import (
     cleaned,
     cleared,
     planted,
-    reaching,
+    reach_targets,
     seated,
     smoothed_out,
     standing_still,
@@ -19,7 +19,7 @@ from dafnet_addon.core.generate import clean_again_steps
 from dafnet_addon.core.kinematics import on_bones, two_bone
 from dafnet_addon.core.metrics import foot_sliding, jerk
 from dafnet_addon.core.paths import Stop, route
-from dafnet_addon.core.progress import drained
+from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.skeleton import (
     END_EFFECTORS,
     JOINTS,
@@ -112,7 +112,7 @@ def test_targets_within_reach_are_met_and_bones_keep_their_length(name):
     if name == "head":
         place[:, 2] -= 0.03
     target = np.where((np.arange(frames) >= 15)[:, None], place, np.nan)
-    out = reaching(joints, {name: target})
+    out = reach_targets(joints, {name: target})
     assert np.linalg.norm(out[15:, END_EFFECTORS[name]] - place[15:], axis=-1).max() < 1e-3
     assert np.abs(_lengths(out) - BONES).max() < 1e-3
     assert np.abs(out[:4] - joints[:4]).max() < 1e-3, "long before the target nothing moves"
@@ -128,7 +128,7 @@ def test_targets_within_reach_are_met_and_bones_keep_their_length(name):
 def test_targets_out_of_reach_are_approached_without_folding_the_body():
     joints = np.repeat(_hanging()[None], 30, axis=0)
     far = joints[:, joint("right_shoulder")] + np.array([0.0, 3.0, 0.0])
-    out = reaching(joints, {"hand_right": far})
+    out = reach_targets(joints, {"hand_right": far})
     assert 0.4 < out[0, joint("right_wrist"), 1] - joints[0, joint("right_shoulder"), 1] < 0.9
     assert np.linalg.norm(out[:, joint("neck")] - joints[:, joint("neck")], axis=-1).max() < 0.35
     assert np.abs(_lengths(out) - BONES).max() < 1e-3
@@ -137,7 +137,7 @@ def test_targets_out_of_reach_are_approached_without_folding_the_body():
 def test_nothing_is_done_where_nothing_is_asked():
     joints = _sliding()
     free = dict.fromkeys(END_EFFECTORS, np.full((len(joints), 3), np.nan))
-    assert reaching(joints, free) is joints and cleaned(joints, free, CleanUp()) is joints
+    assert reach_targets(joints, free) is joints and cleaned(joints, free, CleanUp()) is joints
     half = planted(joints, strength=0.5)
     whole = planted(joints)
     moved = (whole - joints)[:, TOES[0], 0]
@@ -176,7 +176,7 @@ def test_who_sinks_into_a_seat_is_lifted_out_softly_and_keeps_the_feet():
     assert np.abs(_lengths(out) - _lengths(sunk)).max() < 1e-6
     assert seated(right, tops) is right, "who sits right is left alone"
     assert seated(sunk, np.full(80, np.nan)) is sunk
-    assert seated(sunk, np.full(80, 0.75)) is sunk, "what is far over the pelvis is no seat"
+    assert seated(sunk, np.full(80, 0.75)) is sunk, "what is far over the pelvis is not a seat"
     half = seated(sunk, tops, 0.5)
     assert np.allclose(half[60:, 0, 2], 0.50, atol=1e-6)
 
@@ -269,14 +269,14 @@ def test_cleaned_again_is_as_if_generated_so():
     controls = Controls(30.0, path.matrices())
     raw, clean = (generate(scene, controls, weights, clean_up=c) for c in (CleanUp(), ALL))
     kept, asked = unpacked(packed(raw, controls))
-    again = drained(clean_again_steps(scene, asked, kept, ALL))
+    again = run_to_end(clean_again_steps(scene, asked, kept, ALL))
     assert np.abs(again.joints - clean.joints).max() < 1e-4 and np.array_equal(
         again.poses, kept.poses
     )
     assert clean.metrics["foot_sliding_per_frame"] < clean.raw_metrics["foot_sliding_per_frame"]
     assert clean.raw_metrics == raw.metrics and again.log_likelihood == raw.log_likelihood
     with pytest.raises(InputError, match="other frames"):
-        drained(clean_again_steps(scene, Controls(30.0, path.matrices()[:40]), kept, ALL))
+        run_to_end(clean_again_steps(scene, Controls(30.0, path.matrices()[:40]), kept, ALL))
     with pytest.raises(InputError, match="generate it again"):
         unpacked(b"no take")
 

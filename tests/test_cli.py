@@ -189,9 +189,11 @@ def test_the_demo_room_has_its_seats_at_their_heights(blender: ModuleType) -> No
     root = room.armature.dafnet.root
     modes = set()
     for rest in room.route.rests:
-        room.scene.frame_set(1 + (rest.first + rest.last) // 2)
-        np.testing.assert_allclose(root.matrix_world.translation[:2], rest.stop.position, atol=1e-4)
-        modes.add((rest.stop.name, room.armature.dafnet.mode))
+        room.scene.frame_set(1 + (rest.start + rest.stop - 1) // 2)
+        np.testing.assert_allclose(
+            root.matrix_world.translation[:2], rest.place.position, atol=1e-4
+        )
+        modes.add((rest.place.name, room.armature.dafnet.mode))
     assert modes == {("", "FREE"), ("Chair", "FREE"), ("Whiteboard", "EE"), ("Stool", "FREE")}
 
 

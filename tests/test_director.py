@@ -189,7 +189,7 @@ def test_who_starts_inside_furniture_is_led_out_of_it():
     walked = walk_to(solid, Stop((0.0, 0.0), 0.0), Stop((3.0, 0.0), 0.0))
     (met,) = met_along(Scene(solid), walked.path, 30.0, end=())
     outside = np.flatnonzero(np.abs(walked.path.position[:, :2]).max(axis=1) > 0.65)
-    assert met.first == 0 and abs(met.last - outside[0]) < 8 and (np.diff(outside) == 1).all()
+    assert met.start == 0 and abs(met.stop - 1 - outside[0]) < 8 and (np.diff(outside) == 1).all()
     sea = surface_points([_box((-9.0, -9.0, 0.0), (9.0, 9.0, 0.5))], 0.05)
     with pytest.raises(InputError, match="no way"):
         way_round(sea, np.zeros(2), np.array([1.0, 1.0]))

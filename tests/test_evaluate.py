@@ -275,7 +275,7 @@ def test_the_rounds_of_a_long_walk_are_alike():
 
     for room in long_rooms():
         path, rests = room.walked.path, room.walked.rests
-        starts = [rest.first for rest in rests[::3]]
+        starts = [rest.start for rest in rests[::3]]
         length = starts[1] - starts[0]
         assert len(starts) == 4 and np.allclose(np.diff(starts), length) and abs(length - 600) < 3
         first, last = path.position[: length - 1], path.position[starts[2] : starts[2] + length - 1]
@@ -284,10 +284,10 @@ def test_the_rounds_of_a_long_walk_are_alike():
         assert np.abs(np.exp(1j * turn) - 1.0).max() < 1e-6
     for room in [*long_rooms(), *seat_rooms()]:
         for rest in room.walked.rests:
-            if rest.stop.seated:
-                at = np.array(rest.stop.position)
+            if rest.place.seated:
+                at = np.array(rest.place.position)
                 below = room.boxes[(np.abs(room.boxes[:, :2] - at) < 0.05).all(1)]
-                assert np.isclose(below[:, 2] + below[:, 5], room.heights[rest.stop.name]).any()
+                assert np.isclose(below[:, 2] + below[:, 5], room.heights[rest.place.name]).any()
 
 
 def test_actions_that_tell_frames_apart():

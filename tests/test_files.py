@@ -82,8 +82,8 @@ def _left_by(process: int, host: str | None = None) -> str:
 
 
 def test_what_killed_runs_left_is_removed_and_no_more(tmp_path: Path) -> None:
-    """Killed while it writes: what it leaves is no output, and the next run removes it. What others
-    write stays.
+    """Killed while it writes: what it leaves does not count as output, and the next run removes
+    it. What others write stays.
     """
     code = (
         "import os, signal, sys; from pathlib import Path; from dafnet_addon.core.files import "
@@ -140,7 +140,7 @@ def test_outputs_are_looked_at_before_anything_is_computed(tmp_path: Path) -> No
     require_writable(tmp_path / "new" / "folder" / "out.txt")
     with pytest.raises(InputError, match="is a folder"):
         require_writable(tmp_path)
-    with pytest.raises(InputError, match="is no folder"):
+    with pytest.raises(InputError, match="is not a folder"):
         require_writable(tmp_path / "file" / "out.txt")
     if os.name != "nt" and os.geteuid():
         tmp_path.chmod(0o500)

@@ -19,11 +19,11 @@ from dafnet_addon import (
     generate_steps,
     load_weights,
 )
-from dafnet_addon.core.checks import MOST_SEED
+from dafnet_addon.core.checks import MAX_SEED
 from dafnet_addon.core.generate import Draw, takes_steps
 from dafnet_addon.core.metrics import bone_length_variation, end_effector_distance
 from dafnet_addon.core.paths import Stop, route
-from dafnet_addon.core.progress import drained
+from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.root import RootPath
 from dafnet_addon.core.sampler import Sampler
 from dafnet_addon.core.skeleton import END_EFFECTORS, UPPER
@@ -196,7 +196,7 @@ def test_resuming_keeps_what_was_and_goes_on(weights):
 def test_progress_rises_to_one(weights):
     seen: list[float] = []
     assert isinstance(
-        drained(generate_steps(Scene(), _walk(seconds=1.0), weights), seen.append), Take
+        run_to_end(generate_steps(Scene(), _walk(seconds=1.0), weights), seen.append), Take
     )
     assert seen[0] == 0.0 and seen[-1] == 1.0 and all(a <= b for a, b in pairwise(seen))
 
@@ -270,11 +270,11 @@ TURNS = np.tile(np.eye(3), (30, 1, 1))
         ({"head_rotation": np.eye(3)}, "'head_rotation'"),
         (
             {"hand_right_rotation": 2 * TURNS},
-            "'hand_right_rotation' holds a matrix that is no rotation",
+            "'hand_right_rotation' holds a matrix that is not a rotation",
         ),
         (
             {"hand_right_rotation": -TURNS},
-            "'hand_right_rotation' holds a matrix that is no rotation",
+            "'hand_right_rotation' holds a matrix that is not a rotation",
         ),
         ({"hand_left_influence": np.ones(29)}, "'hand_left_influence' has the shape"),
         (
@@ -317,11 +317,11 @@ SHEET = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]
         ),
         (
             lambda: Box(**CUBE, rotation=np.diag([1, 1, 2])),
-            "rotation of the box 'box' holds a matrix that is no rotation",
+            "rotation of the box 'box' holds a matrix that is not a rotation",
         ),
         (
             lambda: Box(**CUBE, rotation=np.diag([1, 1, -1])),
-            "rotation of the box 'box' holds a matrix that is no rotation",
+            "rotation of the box 'box' holds a matrix that is not a rotation",
         ),
         (
             lambda: Box(
@@ -340,7 +340,7 @@ SHEET = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "triangles": [[0, 1, 2]]
         ),
         (
             lambda: Mesh(**SHEET | {"triangles": [[0, 1, 1.5]]}),
-            "triangles of the mesh 'mesh' hold what is no whole number",
+            "triangles of the mesh 'mesh' hold what is not a whole number",
         ),
         (
             lambda: Mesh(**SHEET | {"triangles": [[0, 1, 2, 0]]}),
@@ -426,13 +426,13 @@ def test_lists_do_for_arrays(weights):
 
 @pytest.mark.parametrize(
     "seed",
-    [-1, MOST_SEED + 1, 3_000_000_000, 1.0, 1.5, None, "7", True, float("nan"), 10**400, [1]],
+    [-1, MAX_SEED + 1, 3_000_000_000, 1.0, 1.5, None, "7", True, float("nan"), 10**400, [1]],
 )
 def test_seeds_that_cannot_be_are_refused(seed):
     for given in ({"seed": seed}, {"lower_seed": seed}):
         if given != {"lower_seed": None}:
             with pytest.raises(
-                InputError, match=f"The seed .*give a whole number from 0 to {MOST_SEED}"
+                InputError, match=f"The seed .*give a whole number from 0 to {MAX_SEED}"
             ):
                 Draw(**given)
 
@@ -440,7 +440,7 @@ def test_seeds_that_cannot_be_are_refused(seed):
 def test_seeds_of_numpy_are_seeds(weights):
     assert Draw(np.int64(7), np.uint8(3)) == Draw(7, 3) and type(Draw(np.int32(7)).seed) is int
     sampler = Sampler(weights)
-    drawn = [sampler.noise(1, seed) for seed in (0, 1, MOST_SEED - 1, MOST_SEED)]
+    drawn = [sampler.noise(1, seed) for seed in (0, 1, MAX_SEED - 1, MAX_SEED)]
     assert (
         all(np.isfinite(each).all() for each in drawn)
         and len({each.tobytes() for each in drawn}) == 4
@@ -527,7 +527,7 @@ def test_takes_side_by_side_are_those_made_alone(weights):
     steps = takes_steps(
         scene, controls, weights, draws, watch=lambda frame, joints: seen.append(joints)
     )
-    takes = drained(steps)
+    takes = run_to_end(steps)
     assert len(takes) == 3 and len(seen) == len(controls)
     for take, draw in zip(takes[:2], draws, strict=False):
         alone = generate(scene, controls, weights, seed=draw.seed, temperature=draw.temperature)

@@ -18,9 +18,9 @@ from dafnet_addon.core.rotations import (
     matrix_from_quaternion,
     quaternion_from_matrix,
     rotate,
-    smoothstep,
     yaw_matrix,
 )
+from dafnet_addon.core.series import smoothstep
 from dafnet_addon.core.skeleton import OFFSETS, PARENTS, REST
 
 FRAMES = 240

@@ -15,12 +15,12 @@ from dafnet_addon.core.metrics import (
     end_effector_distance,
     foot_sliding,
     jerk,
+    motion_metrics,
     penetration,
     seat_episodes,
     seat_report,
     skate,
     standing_pelvis_height,
-    summary,
 )
 from dafnet_addon.core.root import RootPath
 from dafnet_addon.core.skeleton import JOINTS, REST, STANDING_PELVIS
@@ -199,14 +199,16 @@ def test_summary_is_fit_for_json_and_agrees() -> None:
     def below(points: np.ndarray) -> np.ndarray:
         return points[..., 2] - 0.5  # furniture that fills everything under half a metre
 
-    report = summary(joints, 30.0, targets={"head": joints[:, 15] + [0, 0, 0.17]}, distance=below)
+    report = motion_metrics(
+        joints, 30.0, targets={"head": joints[:, 15] + [0, 0, 0.17]}, distance=below
+    )
     assert json.loads(json.dumps(report, allow_nan=False)) == report
     assert report["foot_sliding_per_frame"] == 2.0 and report["foot_sliding_4mm_s"] == 2.0
     assert report["skate_cm"] == pytest.approx(13 / 30)
     assert report["bad_collisions_per_frame"] == 2.0  # the knees
     assert report["penetration_max"] == pytest.approx(0.48)
     assert report["end_effector_error"] == pytest.approx(0.1)
-    bare = summary(joints[:1], 24.0)
+    bare = motion_metrics(joints[:1], 24.0)
     assert bare["bad_collisions_per_frame"] is None and bare["penetration_mean"] is None
     assert bare["end_effector_error"] is None and bare["foot_sliding_per_frame"] == 0.0
     assert json.dumps(bare, allow_nan=False)

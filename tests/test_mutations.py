@@ -32,7 +32,7 @@ from dafnet_addon import (
 )
 from dafnet_addon.core import distance, storage
 from dafnet_addon.core.generate import Draw, clean_again_steps, takes_steps
-from dafnet_addon.core.progress import drained
+from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.sampler import Sampler
 from dafnet_addon.core.skeleton import END_EFFECTORS, OFFSETS, UPPER
 from dafnet_addon.core.storage import packed, unpacked
@@ -339,7 +339,7 @@ def test_controls() -> None:
             controls = Controls(**given)
             tally.past += 1
             sound(
-                drained(takes_steps(Scene([SEAT]), controls, SMALL, [draw], clean_up=ALL))[0],
+                run_to_end(takes_steps(Scene([SEAT]), controls, SMALL, [draw], clean_up=ALL))[0],
                 len(controls),
             )
 
@@ -765,7 +765,7 @@ def test_stored_takes(stored: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
 
         def use() -> None:
             take, controls = unpacked(data)
-            sound(drained(clean_again_steps(Scene([SEAT]), controls, take, ALL)))
+            sound(run_to_end(clean_again_steps(Scene([SEAT]), controls, take, ALL)))
             sound(generate(Scene([SEAT]), controls, SMALL, resume=take, resume_frame=3))
 
         tally.attempt(use, names)

@@ -5,7 +5,7 @@ import pytest
 
 from dafnet_addon import Box, CleanUp, Controls, Mesh, Scene, generate, load_weights
 from dafnet_addon.core import conditions, distance
-from dafnet_addon.core.nearby import beside, bounds, extent
+from dafnet_addon.core.nearby import bounds, extent, solids_near
 from dafnet_addon.core.paths import Stop, route
 from dafnet_addon.core.rotations import yaw_matrix
 
@@ -48,10 +48,10 @@ def test_what_comes_near_is_found_and_nothing_else() -> None:
         Box(np.array([1.5, 0.0, 0.5]), np.full(3, 0.2), name="box"),
         Mesh(np.zeros((0, 3)), np.zeros((0, 3), int), name="empty"),
     ]
-    assert names(beside(Scene(solids), places, 1.0)) == ["near", "overhead", "box"]
+    assert names(solids_near(Scene(solids), places, 1.0)) == ["near", "overhead", "box"]
     twice = [cube(tuple(2.0 * s.matrix[:3, 3]), 0.6, s.name) for s in solids[:4]]
-    assert names(beside(Scene(twice), 2.0 * places, 1.0, 2.0)) == ["near", "overhead"]
-    assert beside(Scene(), places, 1.0).solids == ()
+    assert names(solids_near(Scene(twice), 2.0 * places, 1.0, 2.0)) == ["near", "overhead"]
+    assert solids_near(Scene(), places, 1.0).solids == ()
 
 
 def test_what_moves_is_near_only_while_the_body_is_there() -> None:
@@ -69,9 +69,9 @@ def test_what_moves_is_near_only_while_the_body_is_there() -> None:
             for m, n in ((along, "along"), (against, "against"), (apart, "apart"))
         ]
     )
-    assert names(beside(scene, path, 1.0)) == ["along", "against"]
+    assert names(solids_near(scene, path, 1.0)) == ["along", "against"]
     box = Box(apart[:, :3, 3], np.full(3, 0.3), np.tile(np.eye(3), (50, 1, 1)), "box")
-    assert beside(Scene([box]), path, 1.0).solids == ()
+    assert solids_near(Scene([box]), path, 1.0).solids == ()
 
 
 def test_boxes_hold_their_solids() -> None:
@@ -120,7 +120,7 @@ def test_takes_are_the_same_to_the_last_bit_and_far_grids_are_not_built(
     scene = Scene((seat, *crowd))
     take = generate(scene, controls, weights, clean_up=clean)
     few = len(set(built))
-    monkeypatch.setattr(conditions, "beside", lambda scene, *_: scene)
+    monkeypatch.setattr(conditions, "solids_near", lambda scene, *_: scene)
     everything = generate(scene, controls, weights, clean_up=clean)
     assert np.array_equal(take.joints, everything.joints) and np.array_equal(
         take.rotations, everything.rotations

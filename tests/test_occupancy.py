@@ -8,7 +8,7 @@ from dafnet_addon.core.distance import prepared, scaled
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.grid import BAND
 from dafnet_addon.core.occupancy import distance, occupancy, tops_under
-from dafnet_addon.core.progress import drained
+from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.root import RootPath, to_world
 from dafnet_addon.core.rotations import rotate, transpose, yaw_matrix
 from dafnet_addon.core.sensor import SPHERES, occupancy_of_distance
@@ -133,7 +133,7 @@ def test_a_character_of_any_size_sees_what_the_exact_boxes_are(scale):
     root[:, :3, 3] *= scale
     for make, tolerance in ((lambda box: box, 1e-4), (as_mesh, GRID_ERROR)):
         scene = scaled(Scene([make(box) for box in boxes]), scale)
-        shot = drained(shot_steps(scene, Controls(30.0, root, scale=scale)))
+        shot = run_to_end(shot_steps(scene, Controls(30.0, root, scale=scale)))
         exact = expected(boxes, shot.path)
         found = shot.conditions.occupancy[PREROLL:]
         assert np.abs(found - exact).max() < tolerance and found.max() == 1.0
@@ -159,7 +159,7 @@ def test_the_own_scene_lies_where_furniture_is_at_the_own_frames(make, scale):
         np.eye(3),
         "trolley",
     )
-    shot = drained(
+    shot = run_to_end(
         shot_steps(
             Scene([make(moving)]), Controls(fps, np.tile(np.eye(4), (frames, 1, 1)), scale=scale)
         )

@@ -12,7 +12,7 @@ from dafnet_addon.core.conditions import shot_steps
 from dafnet_addon.core.distance import prepared
 from dafnet_addon.core.passage import met_along, passages, seats_along
 from dafnet_addon.core.paths import Route, Stop, facing, route
-from dafnet_addon.core.progress import drained
+from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.root import RootPath
 from dafnet_addon.director.seats import seat_of
 from dafnet_addon.director.walks import walk_to
@@ -75,7 +75,7 @@ def comes(side: float = 2.5) -> Route:
 
 
 def said(solids: list[Box] | list[Mesh], walked: Route) -> list[str]:
-    shot = drained(shot_steps(Scene(tuple(solids)), Controls(30.0, walked.path.matrices())))
+    shot = run_to_end(shot_steps(Scene(tuple(solids)), Controls(30.0, walked.path.matrices())))
     return [warning for warning in shot.warnings if "runs through" in warning]
 
 
@@ -94,7 +94,7 @@ def test_a_desk_over_or_before_the_chair_is_named_with_its_time(make, edge: floa
     assert {each.name for each in met} == {"Desk"}
     y = walked.path.position[:, 1]
     under = np.flatnonzero((y > edge) & (np.abs(walked.path.position[:, 0]) < 0.7))
-    assert abs(met[0].first - under[0]) < 6 and f"from {met[0].first / 30:.1f}"[:-2] in warning
+    assert abs(met[0].start - under[0]) < 6 and f"from {met[0].start / 30:.1f}"[:-2] in warning
 
 
 @pytest.mark.parametrize("height", [0.35, 0.45, 0.55, 0.65, 0.75, 0.84])

@@ -31,13 +31,13 @@ def approaches() -> dict[str, Route]:
 def test_rests_where_it_was_told_and_moves_as_people_do(name: str) -> None:
     walked = approaches()[name]
     rest = walked.rests[1]
-    frames = slice(rest.first, rest.last + 1)
-    assert rest.last - rest.first + 1 == 60
+    frames = slice(rest.start, rest.stop)
+    assert rest.stop - rest.start == 60
     np.testing.assert_allclose(walked.path.position[frames], np.zeros((60, 3)), atol=1e-9)
     np.testing.assert_allclose(np.cos(walked.path.yaw[frames]), 1.0, atol=1e-9)
     end = walked.rests[-1]
-    np.testing.assert_allclose(walked.path.position[end.first], [3.0, 2.0, 0.0], atol=1e-9)
-    assert end.last == len(walked.path) - 1
+    np.testing.assert_allclose(walked.path.position[end.start], [3.0, 2.0, 0.0], atol=1e-9)
+    assert end.stop - 1 == len(walked.path) - 1
 
     velocity = velocities(smoothed(walked.path)) * 30
     speed = np.linalg.norm(velocity[:, :2], axis=1)
@@ -52,10 +52,10 @@ def test_walkers_look_where_they_go_and_back_onto_the_seat() -> None:
     path = approaches()["behind"].path
     velocity = velocities(path)
     rest = approaches()["behind"].rests[1]
-    assert (velocity[40 : rest.first - 100, 1] > 0).all()
-    assert (velocity[rest.first - 20 : rest.first - 2, 1] < 0).all()
-    last_metre = np.linalg.norm(path.position[:, :2], axis=1)[: rest.first] < 0.2
-    assert np.degrees(np.abs(np.angle(np.exp(1j * path.yaw[: rest.first][last_metre])))).max() < 2.0
+    assert (velocity[40 : rest.start - 100, 1] > 0).all()
+    assert (velocity[rest.start - 20 : rest.start - 2, 1] < 0).all()
+    last_metre = np.linalg.norm(path.position[:, :2], axis=1)[: rest.start] < 0.2
+    assert np.degrees(np.abs(np.angle(np.exp(1j * path.yaw[: rest.start][last_metre])))).max() < 2.0
 
 
 def test_standing_stop_turns_to_face_its_yaw() -> None:
@@ -107,6 +107,6 @@ def test_a_captured_sit_down_moves_alike() -> None:
         near = frame - int(np.argmax(distance[frame::-1] > 0.1))
         return distance[near + seconds]
 
-    ours = profile(path.position, made.rests[1].first + 10, np.zeros(3))
+    ours = profile(path.position, made.rests[1].start + 10, np.zeros(3))
     theirs = profile(captured.position, rest, captured.position[rest])
     assert np.abs(ours - theirs).max() < 0.2, f"differs by {np.abs(ours - theirs).max():.2f} m"

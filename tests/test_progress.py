@@ -14,7 +14,7 @@ import pytest
 
 from dafnet_addon import Take, generate
 from dafnet_addon.core import threads
-from dafnet_addon.core.progress import drained, stepwise, within
+from dafnet_addon.core.progress import run_to_end, stepwise, within
 from dafnet_addon.core.threads import _openblas, cores, one_thread
 
 
@@ -30,7 +30,7 @@ def _job(closed: list[bool]) -> Generator[float, None, str]:
 
 def test_a_drained_job_gives_its_result_and_tells_its_progress():
     seen: list[float] = []
-    assert drained(_job([]), seen.append) == "result" and seen == [0.0, 0.5, 1.0]
+    assert run_to_end(_job([]), seen.append) == "result" and seen == [0.0, 0.5, 1.0]
 
 
 def test_a_part_of_a_job_keeps_to_its_share_and_hands_on_its_result():
@@ -38,7 +38,7 @@ def test_a_part_of_a_job_keeps_to_its_share_and_hands_on_its_result():
         return (yield from within(_job([]), 0.2, 0.4))
 
     seen: list[float] = []
-    assert drained(whole(), seen.append) == "result" and np.allclose(seen, [0.2, 0.3, 0.4])
+    assert run_to_end(whole(), seen.append) == "result" and np.allclose(seen, [0.2, 0.3, 0.4])
 
 
 def test_closing_a_job_closes_its_part():
@@ -61,7 +61,7 @@ def doubled(number: float, times: int = 1) -> Generator[float, None, float]:
 def test_a_stepwise_job_runs_to_its_end_or_step_by_step():
     seen: list[float] = []
     assert doubled(3.0, times=2) == 12.0 and doubled(3.0) == 6.0
-    assert drained(doubled.steps(3.0, times=2), seen.append) == 12.0 and seen == [0.0, 0.5]
+    assert run_to_end(doubled.steps(3.0, times=2), seen.append) == 12.0 and seen == [0.0, 0.5]
 
 
 def test_a_stepwise_job_is_told_of_as_the_function_that_it_is():

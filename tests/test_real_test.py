@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dafnet_addon.core.conditions import shot_steps
-from dafnet_addon.core.progress import drained
+from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.take import Controls
 from dafnet_addon.data.flesh import probes
 from dafnet_addon.data.real_test import FROZEN_REAL, real_test
@@ -51,7 +51,7 @@ def test_frozen_clips_sit_where_their_pieces_carry_them(role: str) -> None:
     assert [clip.piece for clip in clips] == [
         frozen["piece"] for frozen in FROZEN if frozen["role"] == role
     ]
-    seen = drained(
+    seen = run_to_end(
         shot_steps(clips[0].scene, Controls(fps=30.0, root=clips[0].path.matrices()))
     ).conditions.occupancy
     assert seen[-1].max() > 0.9, "a generation sees the furniture"

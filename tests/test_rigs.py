@@ -70,7 +70,7 @@ def test_a_body_of_its_own_keeps_the_motion(takes: dict[str, Take]) -> None:
         retargeting.canonical_body(1.0),
         take.root[:, :3, 3],
     )
-    same = retargeting.onto(motion, body, body, root)
+    same = retargeting.retarget(motion, body, body, root)
     assert (
         np.abs(same.motion.joints - take.joints).max() < 2e-3
         and np.abs(same.motion.frames - frames).max() < 0.02
@@ -80,12 +80,12 @@ def test_a_body_of_its_own_keeps_the_motion(takes: dict[str, Take]) -> None:
         turn = rotations.matrix_from_vector(np.array([0.0, -0.8 * sign, 0.0]))
         down[[elbow, wrist]] = down[shoulder] + (down[[elbow, wrist]] - down[shoulder]) @ turn.T
     down[[3, 13, 14]] = np.nan
-    lesser = retargeting.laid(down)
+    lesser = retargeting.lay_in_t_pose(down)
     assert np.abs(lesser.rest - skeleton.REST).max() < 0.05
-    landed = retargeting.onto(motion, body, lesser, root).motion
-    off = np.linalg.norm(landed.joints - take.joints, axis=-1).mean(axis=0)
+    retargeted = retargeting.retarget(motion, body, lesser, root).motion
+    off = np.linalg.norm(retargeted.joints - take.joints, axis=-1).mean(axis=0)
     assert off[[1, 2, 7, 8, 10, 11]].max() < 1e-6 and off[[15, 20, 21]].max() < CENTIMETRE
-    assert np.abs(landed.frames[:, [20, 21]] - frames[:, [20, 21]]).max() < 1e-9
+    assert np.abs(retargeted.frames[:, [20, 21]] - frames[:, [20, 21]]).max() < 1e-9
 
 
 GOLDEN = [(kind, "FK") for kind in MEASURED] + [("rigify", "IK")]

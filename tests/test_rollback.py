@@ -17,7 +17,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender import job
 from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import create_character
 from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
 from bl_ext.user_default.dafnet.dafnet_addon.core.generate import Draw, takes_steps
-from bl_ext.user_default.dafnet.dafnet_addon.core.progress import drained
+from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end
 from bl_ext.user_default.dafnet.dafnet_addon.core.solids import Scene
 from bl_ext.user_default.dafnet.dafnet_addon.core.take import Controls
 
@@ -169,7 +169,7 @@ def test_a_failure_at_any_write_leaves_the_file_as_it_was(
         [Draw(seed) for seed in range(2)],
     )
     scene, weights = Scene(), load_weights()
-    made = drained(takes_steps(scene, controls, weights, draws))
+    made = run_to_end(takes_steps(scene, controls, weights, draws))
     settings = job.settings_of(armature, blender.context.scene)
 
     def bake() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dafnet_addon.core.errors import WeightsError
-from dafnet_addon.core.progress import drained
+from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.sampler import Conditions, Sampler
 from dafnet_addon.core.skeleton import OFFSETS, model_order, smpl_order
 from dafnet_addon.core.weights import load_weights
@@ -69,7 +69,7 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     description = {"model": config.as_dict(), "fps": 30, "offsets": OFFSETS.tolist()}
     weights = Weights(tensors, description, {"format": FORMAT}, tmp_path)
     conditions, z = _conditions(30), rng.normal(size=(2, 66))
-    made, actions, density, _ = drained(Sampler(weights, dtype="float64").run(conditions, z))
+    made, actions, density, _ = run_to_end(Sampler(weights, dtype="float64").run(conditions, z))
 
     # The same, by the model's own forward: poses must go back to the noise that they were made
     # from.
@@ -151,7 +151,7 @@ def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: 
     conditions, z = _conditions(30), rng.normal(size=(2, 66))
     weights = Weights(tensors, description, {"format": FORMAT}, tmp_path)
     sampler = sampler_of(weights, dtype="float64")
-    made, actions, density, _ = drained(sampler.run(conditions, z))
+    made, actions, density, _ = run_to_end(sampler.run(conditions, z))
     assert actions.shape == (30, 2, 0 if system == "moglow" else 10)
 
     # The same, by the model's own forward: poses must go back to the noise that they were made
@@ -199,15 +199,15 @@ def weights():
 def test_numpy_and_torch_agree_over_300_frames(weights):
     pytest.importorskip("torch")
     z = 0.7 * np.random.default_rng(1).normal(size=(1, 66))
-    ours = drained(Sampler(weights).run(_conditions(300), z)).poses
-    theirs = drained(Sampler(weights, device="cpu").run(_conditions(300), z)).poses
+    ours = run_to_end(Sampler(weights).run(_conditions(300), z)).poses
+    theirs = run_to_end(Sampler(weights, device="cpu").run(_conditions(300), z)).poses
     assert np.abs(ours - theirs).max() < 1e-4
 
 
 def test_shipped_weights_invert(weights):
     sampler = Sampler(weights)
     conditions, z = _conditions(100), 0.7 * np.random.default_rng(1).normal(size=(1, 66))
-    made = drained(sampler.run(conditions, z)).poses
+    made = run_to_end(sampler.run(conditions, z)).poses
     again = Sampler(weights)
     again.start(conditions)
     standard = again.standardised(made).astype(np.float32)
@@ -217,22 +217,22 @@ def test_shipped_weights_invert(weights):
 
 def test_a_batch_is_its_single_takes(weights):
     z = np.random.default_rng(2).normal(size=(3, 66))
-    together = drained(Sampler(weights).run(_conditions(40), z)).poses
-    alone = drained(Sampler(weights).run(_conditions(40), z[1:2])).poses
+    together = run_to_end(Sampler(weights).run(_conditions(40), z)).poses
+    alone = run_to_end(Sampler(weights).run(_conditions(40), z[1:2])).poses
     assert np.abs(together[:, 1] - alone[:, 0]).max() < 1e-4
 
 
 def test_resuming_goes_on_as_if_never_stopped(weights):
     conditions, z = _conditions(160), 0.5 * np.random.default_rng(4).normal(size=(1, 66))
-    whole = drained(Sampler(weights).run(conditions, z)).poses
-    resumed = drained(Sampler(weights).run(conditions, z, kept=whole[:90])).poses
+    whole = run_to_end(Sampler(weights).run(conditions, z)).poses
+    resumed = run_to_end(Sampler(weights).run(conditions, z, kept=whole[:90])).poses
     assert np.abs(resumed - whole).max() < 1e-3
 
 
 def test_lower_noise_leaves_the_upper_body_alone_at_the_first_frame(weights):
     z = np.zeros((2, 66))
     z[1, 42:] = 1.0
-    made = drained(Sampler(weights).run(_conditions(1), z)).poses
+    made = run_to_end(Sampler(weights).run(_conditions(1), z)).poses
     upper = model_order(made)[..., :42]
     assert np.abs(upper[0, 0] - upper[0, 1]).max() < 1e-5
     assert np.abs(made[0, 0] - made[0, 1]).max() > 1e-3
@@ -324,7 +324,7 @@ def test_poses_that_are_no_bodys_are_refused_before_they_are_shown(weights):
     with pytest.raises(
         WeightsError, match="the poses they give are not numbers, or farther than 100 metres"
     ):
-        drained(
+        run_to_end(
             sampler.run(conditions, np.zeros((1, 66)), None, lambda frame, pose: shown.append(pose))
         )
     assert not shown

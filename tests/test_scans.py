@@ -61,7 +61,7 @@ for frame, (position, yaw) in enumerate(zip(walked.path.position, walked.path.ya
 armature.dafnet.furniture = furniture
 scene.frame_start, scene.frame_end = 1, len(walked.path)
 bpy.ops.wm.save_as_mainfile(filepath={out!r})
-print("RESTS", [(rest.stop.name, rest.first, rest.last) for rest in walked.rests], flush=True)
+print("RESTS", [(rest.place.name, rest.start, rest.stop - 1) for rest in walked.rests], flush=True)
 import os
 os._exit(0)  # see cli.run
 """

@@ -23,8 +23,8 @@ def test_the_benchmark_puts_its_seat_under_the_pelvis_and_nothing_in_the_way(bac
         distance = np.min(
             [box_distance(position - box.center, box.half_size) for box in scene.solids], axis=0
         )
-        assert distance[way.rests[-1].last] < 0.41
-        assert distance[: way.rests[-1].first - 60].min() > 0.25, "the way leads through the seat"
+        assert distance[way.rests[-1].stop - 1] < 0.41
+        assert distance[: way.rests[-1].start - 60].min() > 0.25, "the way leads through the seat"
 
 
 def test_sits_at_four_heights_from_three_sides_and_stands_elsewhere() -> None:

@@ -88,7 +88,7 @@ def test_what_moved_becomes_a_root_that_looks_where_it_goes() -> None:
     made = followed(way + rng.normal(scale=0.003, size=way.shape), 30.0, yaw=0.5)
     assert len(made.path) == len(way) and np.abs(made.path.position[:, :2] - way).max() < 0.09
     assert [
-        (abs(rest.first - a) < 12, abs(rest.last - b) < 12)
+        (abs(rest.start - a) < 12, abs(rest.stop - 1 - b) < 12)
         for rest, a, b in zip(made.rests, (0, 150), (60, 225), strict=True)
     ] == [(True, True)] * 2
     yaw = made.path.yaw
@@ -98,7 +98,7 @@ def test_what_moved_becomes_a_root_that_looks_where_it_goes() -> None:
         and np.degrees(np.abs(np.diff(yaw)).max() * 30) < 161
     )
     rest = made.rests[1]
-    assert np.abs(np.diff(made.path.position[rest.first : rest.last + 1], axis=0)).max() < 5e-3
+    assert np.abs(np.diff(made.path.position[rest.start : rest.stop], axis=0)).max() < 5e-3
     with pytest.raises(InputError, match="hardly moves"):
         followed(np.zeros((50, 2)), 30.0)
 

@@ -62,7 +62,7 @@ def _npy(array: np.ndarray) -> bytes:
 
 
 def _words(**changes: Any) -> Any:
-    """A change of what is no array; None takes the word out."""
+    """A change of what is not an array; None takes the word out."""
 
     def change(members: dict[str, bytes]) -> dict[str, bytes]:
         said = json.loads(np.load(BytesIO(members["plain"])).tobytes())

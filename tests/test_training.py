@@ -21,7 +21,7 @@ torch = pytest.importorskip("torch", reason="training needs torch")
 
 from dafnet_addon import cli  # noqa: E402
 from dafnet_addon.core.errors import InputError, WeightsError  # noqa: E402
-from dafnet_addon.core.progress import drained  # noqa: E402
+from dafnet_addon.core.progress import run_to_end  # noqa: E402
 from dafnet_addon.core.root import RootPath  # noqa: E402
 from dafnet_addon.core.sampler import Conditions, Sampler  # noqa: E402
 from dafnet_addon.core.skeleton import MODEL_ORDER  # noqa: E402
@@ -329,12 +329,12 @@ def test_a_root_that_is_led_live_has_no_way_ahead(dataset, tmp_path):
     )
     z = np.zeros((1, 66))
     live = load_weights(_exported(dataset, tmp_path / "live", LIVE))
-    made = [drained(Sampler(live, device).run(conditions, z)).poses for device in (None, "cpu")]
+    made = [run_to_end(Sampler(live, device).run(conditions, z)).poses for device in (None, "cpu")]
     assert np.isfinite(made[0]).all() and np.abs(made[0] - made[1]).max() < 1e-4
     known = replace(conditions, ahead=np.zeros((5, 18)))
-    assert np.abs(drained(Sampler(live).run(known, z)).poses - made[0]).max() > 1e-6
+    assert np.abs(run_to_end(Sampler(live).run(known, z)).poses - made[0]).max() > 1e-6
     with pytest.raises(InputError, match="whole path"):
-        drained(Sampler(load_weights()).run(conditions, z))
+        run_to_end(Sampler(load_weights()).run(conditions, z))
 
 
 def test_a_wider_network_begins_as_the_narrower_one(dataset, tmp_path):
@@ -606,7 +606,7 @@ def test_baselines_learn_and_their_weights_run(system: str, dataset: Path, tmp_p
     sampler = sampler_of(weights)
     nothing = {"velocity": 3, "ahead": 18, "occupancy": 2640, "observation": 66, "given": 22}
     conditions = Conditions(**{name: np.zeros((20, size)) for name, size in nothing.items()})
-    made = drained(sampler.run(conditions, sampler.noise(20, 1))).poses
+    made = run_to_end(sampler.run(conditions, sampler.noise(20, 1))).poses
     assert made.shape == (20, 1, 66) and np.isfinite(made).all()
     with pytest.raises(WeightsError, match=f"'{system}'.*dafnet evaluate"):
         Sampler(weights)

@@ -15,20 +15,20 @@ from torch import Tensor
 from ..core.kinematics import fit
 from ..core.root import RootPath
 from ..core.rotations import rotate, yaw_matrix
+from ..core.series import MODEL_FPS, runs
 from ..core.skeleton import SEAT_TO_PELVIS, joint
 from ..data.boxes import distances
 from ..data.contacts import CONTACTS, contacts
 from ..data.held_out import HeldClip
 from ..data.prepare import POSE_UNIT
-from ..data.uses import runs
-from .samp_state import ACTIONS, CELL, FPS, OFFSETS, VOXELS, Parts, pose_seen, seen_from
+from .samp_state import ACTIONS, CELL, OFFSETS, VOXELS, Parts, pose_seen, seen_from
 
 __all__ = ["FIELDS", "Track", "goals_seen", "of_clip", "of_windows", "parts_of"]
 
 FIELDS = ("poses", "velocity", "ahead", "root", "boxes")
 """What is needed of training windows."""
 
-_SECOND = 30
+_SECOND = round(MODEL_FPS)
 # frames between two way points, so that a goal is 1 to 2.7 seconds ahead, as in a training window
 _SEGMENT = 50
 _HORIZON = 80  # frames before a rest in which it is the goal
@@ -129,7 +129,7 @@ def _speed(root: np.ndarray) -> np.ndarray:
     frames = np.arange(root.shape[1])
     before, after = np.maximum(frames - 5, 0), np.minimum(frames + 5, len(frames) - 1)
     moved = root[:, after, :2] - root[:, before, :2]
-    return np.linalg.norm(moved, axis=-1) * FPS / (after - before)
+    return np.linalg.norm(moved, axis=-1) * MODEL_FPS / (after - before)
 
 
 def _goals(
@@ -190,7 +190,7 @@ def _track(
     # One long motion: where one begins and another ends, straight limbs may twist a little.
     frames = fit(joints.reshape(-1, 22, 3))[1].reshape(*joints.shape[:2], 22, 3, 3)
     axes = np.concatenate([frames[..., 1], frames[..., 2]], axis=-1)
-    velocity = np.diff(joints, axis=1, prepend=joints[:, :1]) * FPS
+    velocity = np.diff(joints, axis=1, prepend=joints[:, :1]) * MODEL_FPS
     if joints.shape[1] > 1:
         velocity[:, 0] = velocity[:, 1]
     arrays = {

@@ -20,13 +20,13 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from ..core.series import MODEL_FPS
 from ..core.skeleton import OFFSETS as BONES
 from ..core.skeleton import PARENTS
 
 __all__ = [
     "ACTIONS",
     "CELL",
-    "FPS",
     "LAST",
     "NOW",
     "OFFSETS",
@@ -57,7 +57,6 @@ NOW, LAST = 6, 12
 _SAMPLES = len(OFFSETS)
 _SIZES = (22 * 12, 22 * 3, _SAMPLES * 9, 5, _SAMPLES * 4, _SAMPLES * 11)
 STATE, SENSOR = sum(_SIZES), 8**3 * 4
-FPS = 30.0
 CELL = 0.175
 """Metres; the voxels are a cube of 1.4 m on the floor."""
 _LATTICE = torch.cartesian_prod(*[torch.arange(8.0)] * 3) + 0.5
@@ -78,7 +77,7 @@ class Parts:
 
 
 def _turned(v: Tensor, forward: Tensor) -> Tensor:
-    """Horizontal vectors (…, 2 or 3) as one sees them who looks along ``forward`` (…, 2); the
+    """Horizontal vectors (…, 2 or 3) seen from a place that faces ``forward`` (…, 2); the
     height stays.
     """
     x, y, fx, fy = v[..., 0], v[..., 1], forward[..., 0], forward[..., 1]
@@ -208,7 +207,7 @@ def read(made: Parts, last: Tensor) -> Parts:
     """The pose as the authors' program reads it: half its positions, half the ``last`` ones moved
     on by its velocities.
     """
-    positions = 0.5 * (made.pose[..., :3] + last[..., :3] + made.pose[..., 9:] / FPS)
+    positions = 0.5 * (made.pose[..., :3] + last[..., :3] + made.pose[..., 9:] / MODEL_FPS)
     return replace(made, pose=torch.cat([_on_bones(positions), made.pose[..., 3:]], dim=-1))
 
 

@@ -29,7 +29,7 @@ def train_samp(
     """Train "samp" or "samp-ob", or go on with it, until its budget is spent; the number of steps
     that it took.
 
-    ``file`` is saved as it goes; a loss that is no number stops the run with the last good state
+    ``file`` is saved as it goes; a loss that is not a number stops the run with the last good state
     kept. Raises InputError then, without a dataset, and where ``file`` is another network's.
     """
     torch.set_num_threads(threads)
@@ -55,8 +55,8 @@ def train_samp(
             mean = sum(losses) / len(losses)
             if not math.isfinite(mean):
                 raise InputError(
-                    f"The loss of '{kind}' is no number by step {step}; resume with a lower peak "
-                    "rate."
+                    f"The loss of '{kind}' is not a number by step {step}; resume with a lower "
+                    "peak rate."
                 )
             drawn = {f"generator.{name}": state for name, state in generators(device).items()}
             state = {"kind": kind, "config": asdict(run.config), "step": step, "seconds": seconds}

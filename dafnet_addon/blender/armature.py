@@ -49,7 +49,7 @@ def metres_per_unit(scene: bpy.types.Scene) -> float:
 
 
 def missing_bones(armature: bpy.types.Object) -> list[str]:
-    """Names of ``JOINTS`` that are no bones of the armature."""
+    """Names of ``JOINTS`` that are not bones of the armature."""
     return [name for name in JOINTS if name not in armature.data.bones]
 
 
@@ -108,7 +108,7 @@ def sent(context: bpy.types.Context) -> tuple[bpy.types.Object | None, bpy.types
     """The character to direct, and the mesh that it is to go to: from what is active and selected.
 
     The character is the active one, else a selected one, else the only one of the scene. The mesh
-    is the active or the only selected object that is no part of a character.
+    is the active or the only selected object that is not part of a character.
     """
     characters = [o for o in context.scene.objects if is_character(o)]
     chosen = [character_of(context), *(o for o in context.selected_objects if o in characters)]

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.root import yaw_of
 from ..core.rotations import (
     continuous_signs,
     matrix_from_quaternion,
@@ -13,7 +14,7 @@ from ..core.rotations import (
     rotate,
     transpose,
 )
-from ..core.skeleton import JOINTS
+from ..core.skeleton import JOINTS, PELVIS
 from ..core.take import Take
 from .armature import character_scale
 from .compat import action_curves, assign_action, new_action
@@ -112,8 +113,8 @@ def bake(
 
     frames = frame_start + np.arange(len(take), dtype=float)
     to_root = transpose(take.root[:, :3, :3])
-    heading = np.unwrap(np.arctan2(-take.root[:, 0, 1], take.root[:, 1, 1])) + np.pi
-    pelvis = rotate(FACING @ to_root, take.joints[:, 0] - take.root[:, :3, 3]) / (
+    heading = np.unwrap(yaw_of(take.root[:, :2, 1])) + np.pi
+    pelvis = rotate(FACING @ to_root, take.joints[:, PELVIS] - take.root[:, :3, 3]) / (
         unit * armature.scale[0]
     )
     local = matrix_from_quaternion(take.rotations)

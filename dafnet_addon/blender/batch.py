@@ -13,7 +13,7 @@ import bpy
 
 from ..core.errors import InputError
 from ..core.files import require_writable, whole_file
-from ..core.progress import drained
+from ..core.progress import run_to_end
 from . import job
 from .armature import is_character
 from .properties import ensure_registered
@@ -73,7 +73,7 @@ def bake_takes(
     with _active(chosen):
         armature = _character(chosen, character)
         settings = job.settings_of(armature, chosen, **{"take_count": takes, **(changes or {})})
-        result = drained(job.steps(bpy.context, settings, weights), progress)
+        result = run_to_end(job.steps(bpy.context, settings, weights), progress)
     save_scene(written, lambda: progress(1.0))
     return written, replace(result, warnings=warnings + result.warnings)
 

@@ -16,7 +16,7 @@ from mathutils import Euler, Matrix
 
 from ..core.files import require_writable, save_text
 from ..core.paths import Route
-from ..core.progress import drained
+from ..core.progress import run_to_end
 from ..core.root import smoothed
 from ..core.weights import load_weights
 from ..demo import FPS, PLACES, Place, demo_report, demo_route, hand_target
@@ -213,12 +213,12 @@ def build_room(context: bpy.types.Context) -> Room:
     turns[:, 2] = walked.path.yaw
     key_channels(settings.root, frames, location=walked.path.position, rotation_euler=turns)
 
-    board = next(rest for rest in walked.rests if rest.stop.name == "Whiteboard")
+    board = next(rest for rest in walked.rests if rest.place.name == "Whiteboard")
     hand = settings.hand_right
     key_channels(hand, frames, location=hand_target(board, frames - 1))
     hand.empty_display_size = 0.08
     settings.head = settings.hand_left = None  # the animator asks for the drawing hand only
-    for frame, mode in ((1, "FREE"), (board.first + 5, "EE"), (board.last - 5, "FREE")):
+    for frame, mode in ((1, "FREE"), (board.start + 5, "EE"), (board.stop - 6, "FREE")):
         settings.mode = mode
         armature.keyframe_insert("dafnet.mode", frame=frame)
     scene.frame_set(1)
@@ -248,7 +248,7 @@ def run_demo(
     use_workbench(room.scene)
     settings = job.settings_of(room.armature, room.scene, seed=seed, temperature=temperature)
     generating = 0.2 if preview else 1.0
-    result = drained(
+    result = run_to_end(
         job.steps(bpy.context, settings, loaded), lambda part: progress(generating * part)
     )
 

@@ -195,7 +195,7 @@ def _followed(owner: bpy.types.ID, what: str) -> Iterator[_Aspect]:
 
 
 def _inside(owner: bpy.types.ID) -> Iterator[Any]:
-    """What a datablock that is no object is made of, as far as shapes may depend on it."""
+    """What a datablock that is not an object is made of, as far as shapes may depend on it."""
     if isinstance(owner, bpy.types.Collection):
         yield from owner.all_objects
     elif isinstance(owner, bpy.types.NodeTree):

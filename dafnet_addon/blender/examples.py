@@ -13,6 +13,7 @@ from ..core.errors import InputError
 from ..core.paths import Rest, Route, Stop, facing, route
 from ..core.root import RootPath
 from ..core.rotations import rotate, yaw_matrix
+from ..core.series import smoothstep
 from ..demo import Place
 from .armature import create_character, metres_per_unit
 from .demo_room import FURNITURE, Part, add_piece, key_channels, new_collection
@@ -62,7 +63,7 @@ def _writing(
     """
     number, u = np.floor(seconds / line), (seconds % line) / line
     back = np.clip((u - 0.85) / 0.15, 0.0, 1.0)
-    ease = back * back * (3.0 - 2.0 * back)
+    ease = smoothstep(back)
     pen = np.sin(np.pi * np.clip(u / 0.85, 0.0, 1.0)) ** 0.25  # still at both ends of a line
     along = width * (np.clip(u / 0.85, 0.0, 1.0) * (1.0 - ease))
     letters = (
@@ -79,7 +80,7 @@ def _during(rest: Rest, frames: int, fps: float) -> tuple[np.ndarray, tuple[int,
     """Seconds (T,) since the hands are there, held before and after; and the frames in which they
     are.
     """
-    first, last = rest.first + round(_COMES_OVER * fps), rest.last - round(_COMES_OVER * fps)
+    first, last = rest.start + round(_COMES_OVER * fps), rest.stop - 1 - round(_COMES_OVER * fps)
     return (np.clip(np.arange(frames), first, last) - first) / fps, (first, last)
 
 
@@ -145,8 +146,7 @@ def _bed(fps: float) -> Plan:
     after = (np.arange(frames) - start) / fps
 
     def eased(begin: float, seconds: float) -> np.ndarray:
-        u = np.clip((after - begin) / seconds, 0.0, 1.0)
-        return u * u * (3.0 - 2.0 * u)
+        return smoothstep((after - begin) / seconds)
 
     # One leans back before one turns: the legs then come up first, else they would swing through
     # the bed.
@@ -177,7 +177,7 @@ def _bed(fps: float) -> Plan:
     rests = (
         sits.rests[0],
         sits.rests[1],
-        Rest(Stop((0.0, -inward), turn), frames - round(stays * fps), frames - 1),
+        Rest(Stop((0.0, -inward), turn), frames - round(stays * fps), frames),
     )
     return Plan(Route(path, rests), targets, (start, frames))
 

@@ -17,7 +17,7 @@ from .. import load_weights
 from ..core.cleanup import CleanUp
 from ..core.errors import InputError
 from ..core.generate import Draw, clean_again_steps, takes_steps
-from ..core.progress import drained, stepwise, within
+from ..core.progress import run_to_end, stepwise, within
 from ..core.take import Controls, Take
 from .armature import metres_per_unit
 from .baker import bake
@@ -204,7 +204,7 @@ def clean_again_of(
         armature, context.scene, frame_start=start, frame_end=start + len(take) - 1, mode="FREE"
     )
     read = read_scene(context, settings)
-    again = drained(clean_again_steps(read.scene, controls, take, _clean_up(settings)))
+    again = run_to_end(clean_again_steps(read.scene, controls, take, _clean_up(settings)))
     draw = draw_of(action)
-    actions = drained(_bake_steps(settings, [again], controls, [draw]))
+    actions = run_to_end(_bake_steps(settings, [again], controls, [draw]))
     return Result(tuple(actions), (again,), (draw,), again.warnings, again.seconds)

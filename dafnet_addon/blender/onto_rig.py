@@ -12,10 +12,10 @@ import numpy as np
 from mathutils import Euler, Matrix, Quaternion
 
 from ..core.errors import InputError
-from ..core.retargeting import canonical_body, limb_errors, onto
+from ..core.retargeting import canonical_body, limb_errors, retarget
 from ..core.root import root_from_matrices
 from ..core.rotations import continuous_signs, normalised, quaternion_from_matrix
-from ..core.skeleton import JOINTS
+from ..core.skeleton import ANKLES, HEAD, HIPS, JOINTS, WRISTS
 from .armature import character_scale, metres_per_unit
 from .baker import TRANSFORMS, driven, key_curves
 from .compat import action_curves, assign_action, new_action
@@ -186,12 +186,17 @@ def _bake(
     shape = shape_of(rig, rig_map, pose_matrices(evaluated, places), scale)
     path, _ = root_from_matrices(_facing(read.bodies))
     motion = character_motion(character, read.bodies, read.poses)
-    landed = onto(motion, canonical_body(wish.size), shape.body, path.position)
+    retargeted = retarget(motion, canonical_body(wish.size), shape.body, path.position)
     carrier = path.matrices()
     carrier[:, :3, :3] = scale * carrier[:, :3, :3] @ shape.axes.T
     objects = carrier if wish.root_motion == "OBJECT" else still
     made = channels(
-        controls, held, shape, landed, objects, carrier if wish.root_motion == "BONE" else objects
+        controls,
+        held,
+        shape,
+        retargeted,
+        objects,
+        carrier if wish.root_motion == "BONE" else objects,
     )
 
     _key_object(rig, add_curve, wish, np.linalg.inv(read.above) @ objects, basis)
@@ -203,8 +208,8 @@ def _bake(
         previous.use_fake_user = True
     if held.loose:
         _settle_loose(context, rig, controls, held, made, curves, wish.frames)
-    errors, angles = _measured(context, rig, rig_map, landed.targets, motion.joints, wish)
-    return Baked(action, errors, angles, landed.ratio, _overruled(rig, controls))
+    errors, angles = _measured(context, rig, rig_map, retargeted.targets, motion.joints, wish)
+    return Baked(action, errors, angles, retargeted.ratio, _overruled(rig, controls))
 
 
 def _overruled(rig: bpy.types.Object, controls: list[Control]) -> tuple[str, ...]:
@@ -488,10 +493,10 @@ def _measured(
 
     off = played - targets[chosen]
     parts = {
-        "wrists": off[:, [20, 21]],
-        "ankles": off[:, [7, 8]],
-        "head": off[:, [15]],
-        "pelvis": off[:, [1, 2]].mean(axis=1, keepdims=True),
+        "wrists": off[:, WRISTS],
+        "ankles": off[:, ANKLES],
+        "head": off[:, [HEAD]],
+        "pelvis": off[:, HIPS].mean(axis=1, keepdims=True),
     }
     errors = {
         part: told(wish.unit * np.linalg.norm(values, axis=-1)) for part, values in parts.items()

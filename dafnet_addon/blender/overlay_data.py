@@ -17,11 +17,12 @@ from ..core.cleanup import standing_still
 from ..core.errors import DafnetError
 from ..core.metrics import BAD_COLLISION_JOINTS, bad_collisions
 from ..core.occupancy import distance, occupancy
-from ..core.resampling import MODEL_FPS, frame_times, resample_nearest, resample_positions
+from ..core.resampling import frame_times, resample_nearest, resample_positions
 from ..core.root import RootPath, root_from_matrices, to_world
 from ..core.rotations import matrix_from_quaternion
 from ..core.sensor import SPHERES
-from ..core.skeleton import END_EFFECTORS, joint
+from ..core.series import MODEL_FPS
+from ..core.skeleton import END_EFFECTORS, FEET
 from ..core.take import Controls, Take
 from .armature import character_scale, is_character, metres_per_unit, sent
 from .compat import action_curves
@@ -83,7 +84,6 @@ _TICKS_A_SECOND = 4
 """How many facings of the path, and gaps to a target, are drawn for each second."""
 _CAPACITY = 24
 """Takes that stay unpacked, since ghosts are shown together."""
-_TOES = (joint("left_foot"), joint("right_foot"))
 
 
 def forget() -> None:
@@ -166,7 +166,7 @@ class _Played:
 
 
 def _played(context: bpy.types.Context, armature: bpy.types.Object) -> _Played | None:
-    """What the armature plays; None where that is no take."""
+    """What the armature plays; None where that is not a take."""
     action = played_take(armature)
     unpacked = _unpacked(action) if action else None
     if action is None or unpacked is None:
@@ -401,7 +401,7 @@ def _contacts(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[D
         distances = distance(solids, judged[None] / size, root[2] / size)[0]
 
         lines, beads = [], []
-        for toe, planted in zip(_TOES, played.unpacked.planted[frame], strict=True):
+        for toe, planted in zip(FEET, played.unpacked.planted[frame], strict=True):
             if planted:
                 place = np.append(joints[toe, :2], root[2] + ABOVE_FLOOR)
                 lines.append((ring(place, 0.08 * size) / unit, _PLANTED))

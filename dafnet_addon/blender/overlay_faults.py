@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.distance import prepared, scaled
 from ..core.metrics import BAD_COLLISION_JOINTS, bad_collisions, foot_sliding
-from ..core.nearby import REACH_OF_A_BODY, beside
+from ..core.nearby import REACH_OF_A_BODY, solids_near
 from ..core.occupancy import distance
 from .scene_reader import read_scene
 from .settings import settings_of
@@ -68,7 +68,7 @@ def faults_of(
 
         floor = take.root[:, 2, 3] / take.scale
         joints = take.joints / take.scale
-        near = beside(scenes[frames], take.root[:, :3, 3], REACH_OF_A_BODY, take.scale)
+        near = solids_near(scenes[frames], take.root[:, :3, 3], REACH_OF_A_BODY, take.scale)
         solids, _ = prepared(scaled(near, 1.0 / take.scale), float(np.median(floor)))
         apart = distance(solids, joints[:, list(BAD_COLLISION_JOINTS)], floor)
         found[action.session_uid] = Faults(

@@ -13,6 +13,7 @@ from ..core.distance import scaled
 from ..core.errors import InputError
 from ..core.passage import Passage, met_along
 from ..core.paths import AFTER_SEAT, Route, Stop, facing, route
+from ..core.root import forward_of
 from ..core.solids import Scene
 from ..core.trails import FASTEST, followed, trail
 from ..director.seats import on_a_seat
@@ -77,7 +78,7 @@ def chosen(
 
 
 def floor_points(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The selected empties that are no part of a character, in the order of their names; 10 comes
+    """The selected empties that are not part of a character, in the order of their names; 10 comes
     after 9.
     """
     characters = [o for o in context.scene.objects if is_character(o)]
@@ -300,7 +301,7 @@ def _way(at: _Directed, start: Stop, goals: list[np.ndarray]) -> np.ndarray:
     """Corners (N, 2) of the way round the furniture from ``start`` through the places ``goals``
     (2,), with these.
     """
-    forward = np.array([-np.sin(start.yaw), np.cos(start.yaw)])
+    forward = forward_of(start.yaw)
     here, corners = np.array(start.position) + (AFTER_SEAT if start.seated else 0.0) * forward, []
     points = surface_points(at.solids.solids, _SPACING, around([here, *goals])) - np.array(
         [0.0, 0.0, at.floor]

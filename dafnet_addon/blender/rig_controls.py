@@ -14,9 +14,9 @@ import numpy as np
 from mathutils import Matrix
 
 from ..core.errors import InputError
-from ..core.retargeting import LIMBS, Landed
+from ..core.retargeting import RetargetedMotion
 from ..core.rotations import matrix_from_vector, normalised, rotate, transpose
-from ..core.skeleton import JOINTS
+from ..core.skeleton import JOINTS, LIMBS
 from .rig_reading import Shape, pose_matrices
 from .rigs import RigMap
 
@@ -236,11 +236,11 @@ def channels(
     controls: list[Control],
     held: Attachments,
     shape: Shape,
-    landed: Landed,
+    retargeted: RetargetedMotion,
     objects: np.ndarray,
     carrier: np.ndarray,
 ) -> Channels:
-    """Channels of all controls for a motion that has landed on the rig.
+    """Channels of all controls for a motion that has retargeted on the rig.
 
     ``objects`` (T, 4, 4): the rig's object in the world. ``carrier`` (T, 4, 4): where the root bone
     carries the rig, as a matrix that the object would otherwise have.
@@ -269,22 +269,22 @@ def channels(
         )
         if control.pole is not None:
             _, middle, end = list(LIMBS.values())[control.pole]
-            out = landed.bends[:, control.pole] * (
+            out = retargeted.bends[:, control.pole] * (
                 shape.body.length(middle) + shape.body.length(end)
             )
-            wanted[:, i], place[:, i] = free, to_rig(landed.motion.joints[:, middle] + out)
+            wanted[:, i], place[:, i] = free, to_rig(retargeted.motion.joints[:, middle] + out)
         elif control.joint == _ROOT:
             motion = transpose(turned) @ carrier[:, :3, :3] / scale
             wanted[:, i] = motion @ neutral[i]
             place[:, i] = to_rig(rotate(carrier[:, :3, :3], start[i]) + carrier[:, :3, 3])
         else:
             j = control.joint
-            body = landed.turns[:, j] @ shape.axes.T
+            body = retargeted.turns[:, j] @ shape.axes.T
             wanted[:, i] = transpose(turned) @ body @ neutral[i]
             place[:, i] = rest
             if control.moves:
                 beside = np.nan_to_num(scale * (start[i] - shape.rest[j, :3, 3]))
-                place[:, i] = to_rig(landed.motion.joints[:, j] + rotate(body, beside))
+                place[:, i] = to_rig(retargeted.motion.joints[:, j] + rotate(body, beside))
         turns[:, i] = transpose(free) @ wanted[:, i]
         if control.moves:
             moves[:, i] = rotate(np.linalg.inv(turn @ held.axes[i]), place[:, i] - rest)

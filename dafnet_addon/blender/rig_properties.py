@@ -30,7 +30,7 @@ class RigRow(bpy.types.PropertyGroup):
 
 
 class RigSettings(bpy.types.PropertyGroup):
-    """Settings of one armature that is no DAFNet character."""
+    """Settings of one armature that is not a DAFNet character."""
 
     rows: CollectionProperty(type=RigRow, options=set(), description="Bones of the joints")
     active_row: IntProperty(name="Joint", options=set(), description="The row that is selected")

@@ -8,9 +8,9 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.retargeting import Body, Motion, canonical_body, laid, limb_errors, onto
+from ..core.retargeting import Body, Motion, canonical_body, lay_in_t_pose, limb_errors, retarget
 from ..core.rotations import normalised, rotate, rotation_between, transpose
-from ..core.skeleton import JOINTS, PARENTS
+from ..core.skeleton import JOINTS, PARENTS, PELVIS
 from .mannequin import FACING
 from .rigs import RigMap
 
@@ -89,7 +89,9 @@ def shape_of(armature: bpy.types.Object, rig_map: RigMap, rest: np.ndarray, scal
     return Shape(
         axes,
         rest,
-        laid(scale * heads @ axes, present, np.array([_hand(bone) @ axes for bone in bones])),
+        lay_in_t_pose(
+            scale * heads @ axes, present, np.array([_hand(bone) @ axes for bone in bones])
+        ),
     )
 
 
@@ -208,8 +210,8 @@ def joints_of(
     )
     shape = shape_of(armature, rig_map, matrices, scale)
     motion = motion_of(shape, bodies, poses)
-    floor = motion.joints[:, 0] * (1.0, 1.0, 0.0) + (0.0, 0.0, bodies[0, 2, 3])
-    joints = onto(motion, shape.body, canonical_body(size), floor, landing=False).motion.joints
+    floor = motion.joints[:, PELVIS] * (1.0, 1.0, 0.0) + (0.0, 0.0, bodies[0, 2, 3])
+    joints = retarget(motion, shape.body, canonical_body(size), floor, landing=False).motion.joints
     return joints, {
         limb: float(off.mean()) for limb, off in limb_errors(joints, motion.joints).items()
     }

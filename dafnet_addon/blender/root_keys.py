@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.paths import Route
+from ..core.root import yaw_of
 from .compat import action_curves, shares_curves
 from .lookup import find_object
 from .playback import frame_kept
@@ -155,7 +156,7 @@ def keyed_along(
                 root.evaluated_get(context.evaluated_depsgraph_get()).matrix_world, float
             )
             off = np.linalg.norm(matrix[:3, 3] - route.path.position[k] * scale) / scale
-            wrong = np.arctan2(-matrix[0, 1], matrix[1, 1]) - route.path.yaw[k]
+            wrong = yaw_of(matrix[:2, 1]) - route.path.yaw[k]
             if not off < _NEAR or not abs(np.angle(np.exp(1j * wrong))) < _TURNED:
                 raise InputError(
                     f"Something other than its keys moves the root '{root.name}', so nothing was "
@@ -173,7 +174,10 @@ def write_keys(
     ``InputError``: Blender takes no keys.
     """
     frames = set(range(0, len(route.path), max(1, round(fps / _KEYS_A_SECOND))))
-    frames |= {len(route.path) - 1, *(k for rest in route.rests for k in (rest.first, rest.last))}
+    frames |= {
+        len(route.path) - 1,
+        *(k for rest in route.rests for k in (rest.start, rest.stop - 1)),
+    }
     for k in sorted(frames):
         root.location = route.path.position[k] * scale
         root.rotation_euler = (0.0, 0.0, float(route.path.yaw[k]))

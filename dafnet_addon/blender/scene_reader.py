@@ -25,6 +25,7 @@ from ..core.root import (
     to_world,
 )
 from ..core.rotations import normalised
+from ..core.series import MODEL_FPS
 from ..core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
 from ..core.solids import Scene
 from ..core.take import Controls
@@ -329,8 +330,8 @@ def _upper_body_source(
     settings: Settings,
     armature: bpy.types.Object,
 ) -> tuple[bpy.types.Object | None, RigMap | None]:
-    """The upper body's source, and which of its bones are which joints where it is no character of
-    ours.
+    """The upper body's source, and which of its bones are which joints where it is not a character
+    of ours.
     """
     if settings.upper_body_source is None:
         return None, None
@@ -378,7 +379,11 @@ def _onto(root: np.ndarray, fps: float, local: np.ndarray) -> np.ndarray:
     (T, 4, 4).
     """
     return to_world(
-        smoothed(root_from_matrices(root)[0], POSITION_SIGMA * fps / 30.0, YAW_SIGMA * fps / 30.0),
+        smoothed(
+            root_from_matrices(root)[0],
+            POSITION_SIGMA * fps / MODEL_FPS,
+            YAW_SIGMA * fps / MODEL_FPS,
+        ),
         local,
     )
 

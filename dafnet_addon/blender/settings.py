@@ -5,7 +5,7 @@ from typing import Any
 
 import bpy
 
-from ..core.checks import MOST_FRAMES, MOST_SEED, whole
+from ..core.checks import MAX_FRAMES, MAX_SEED, whole
 from ..core.errors import InputError
 from ..core.take import MODES
 
@@ -76,13 +76,11 @@ class Settings:
                 f"{self.frame_start}; "
                 "set the end after the start."
             )
-        whole(
-            self.frame_end - self.frame_start + 1, "The length of the frame range", 1, MOST_FRAMES
-        )
+        whole(self.frame_end - self.frame_start + 1, "The length of the frame range", 1, MAX_FRAMES)
         whole(self.take_count, "The number of takes", 1, MAX_TAKES)
         for seed in (self.seed, self.lower_seed or 0):
-            whole(seed, "The seed", 0, MOST_SEED)
-        whole(self.seed + self.take_count - 1, "The last take's seed", 0, MOST_SEED)
+            whole(seed, "The seed", 0, MAX_SEED)
+        whole(self.seed + self.take_count - 1, "The last take's seed", 0, MAX_SEED)
 
 
 def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides: Any) -> Settings:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core.conditions import shot_steps
 from ..core.errors import InputError
-from ..core.progress import drained
+from ..core.progress import run_to_end
 from ..core.sensor import REACH
 from ..core.solids import Mesh
 from ..director.surfaces import surface_points
@@ -26,7 +26,7 @@ _LOW, _HIGH = 0.07, 2.0
 _SPACING = 0.1  # metres between points on a surface
 _LOOKS = 10  # places a second along the path
 _UNSEEN = {"CURVE", "SURFACE", "META", "FONT"}
-"""Types of objects that may have faces, but are no meshes."""
+"""Types of objects that may have faces, but are not meshes."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
         read = read_scene(
             context, settings_of(armature, scene, mode="FREE", furniture=made.name_full)
         )
-        warnings = [*read.warnings, *drained(shot_steps(read.scene, read.controls)).warnings]
+        warnings = [*read.warnings, *run_to_end(shot_steps(read.scene, read.controls)).warnings]
     except InputError:
         bpy.data.collections.remove(made)
         raise

@@ -27,7 +27,7 @@ def lacks_root(context: bpy.types.Context, armature: bpy.types.Object) -> bool:
 def add_root(context: bpy.types.Context, armature: bpy.types.Object) -> bpy.types.Object:
     """Make the root where the armature stands and looks in the current frame, in its collection.
 
-    ``InputError``: it has one already, or is no character or linked; nothing is changed then.
+    ``InputError``: it has one already, or is not a character or linked; nothing is changed then.
     """
     if not lacks_root(context, armature):
         raise InputError(
@@ -61,7 +61,7 @@ def add_targets(context: bpy.types.Context, armature: bpy.types.Object) -> list[
     """Make the missing ones where head and hands are in the current frame, in the character's
     collection.
 
-    ``InputError``: nothing is missing, or the armature is no character or linked; nothing is
+    ``InputError``: nothing is missing, or the armature is not a character or linked; nothing is
     changed then.
     """
     missing = missing_targets(context, armature)

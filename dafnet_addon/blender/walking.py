@@ -10,6 +10,7 @@ from ..core.distance import scaled
 from ..core.errors import InputError
 from ..core.passage import Passage, SatOn, listed, met_along
 from ..core.paths import BEFORE_SEAT, Route, Stop
+from ..core.root import yaw_of
 from ..core.solids import Mesh, Scene
 from ..director.seats import on_a_seat, seat_of
 from ..director.walks import walk_to
@@ -91,7 +92,7 @@ def extended_to(scene: bpy.types.Scene, armature: bpy.types.Object, last: int) -
 
 def told_of(met: Sequence[Passage], first: int) -> tuple[str, ...]:
     """A sentence about the furniture that a walk from frame ``first`` on leads through, if any."""
-    places = listed(met, lambda each: f"from frame {first + each.first} to {first + each.last}")
+    places = listed(met, lambda each: f"from frame {first + each.start} to {first + each.stop - 1}")
     return (
         (
             f"The walk leads through furniture, {places}; make room there, or key the root "
@@ -142,7 +143,7 @@ def _route(
     )
     if seat is None:
         away = goal[:2] - place[:2]
-        end = Stop((float(goal[0]), float(goal[1])), float(np.arctan2(-away[0], away[1])), seconds)
+        end = Stop((float(goal[0]), float(goal[1])), float(yaw_of(away)), seconds)
         route = walk_to(everything.solids, start, end, speed, fps, floor, size)
         return route, met_along(everything, route.path, fps, end=())
     names = [
@@ -164,7 +165,7 @@ def _route(
     away = np.linalg.norm(route.path.position[:, :2] - spot.position, axis=1)
     comes = int(np.flatnonzero(away > _BEFORE_SEAT)[-1])
     for each in met:
-        if each.last > comes and each.name not in names:
+        if each.stop - 1 > comes and each.name not in names:
             raise InputError(
                 f"'{each.name}' stands where one comes to sit on '{seat.name}'; pull "
                 f"'{seat.name}' out, or choose another seat."

@@ -13,8 +13,8 @@ from .text import printable
 
 __all__ = [
     "FARTHEST",
-    "MOST_FRAMES",
-    "MOST_SEED",
+    "MAX_FRAMES",
+    "MAX_SEED",
     "array",
     "corners",
     "in_frames",
@@ -29,11 +29,11 @@ FARTHEST = 1e8
 """Metres from the world's origin (a quarter of the way to the moon); single-precision numbers mean
 nothing long before.
 """
-MOST_FRAMES = 100_000
+MAX_FRAMES = 100_000
 """Of one shot, at the scene's rate and at the model's: 55 minutes at 30 frames a second, a gigabyte
 of what is seen.
 """
-MOST_SEED = 2**31 - 1
+MAX_SEED = 2**31 - 1
 """The largest seed, which is the largest whole number that Blender keeps in a file."""
 
 _UNTRUE = 0.01  # of a rotation matrix: how far its axes may be from unit length and right angles
@@ -109,13 +109,13 @@ def _brief(shape: tuple[int, ...]) -> str:
 def inside(
     found: np.ndarray,
     what: str,
-    most: float,
+    upper_bound: float,
     *,
     free: bool = False,
     fix: str = "give finite numbers",
 ) -> np.ndarray:
-    """The array, whose numbers are finite and from -``most`` to ``most``; ``free``: NaN is allowed,
-    and means that.
+    """The array, whose numbers are finite and from -``upper_bound`` to ``upper_bound``; ``free``:
+    NaN is allowed, and means that.
 
     ``fix``: what the refusal tells to do about what is not a number.
     """
@@ -126,10 +126,10 @@ def inside(
             f"{what} holds {'an infinite number' if is_infinite else 'what is not a number'}; "
             f"{fix}."
         )
-    if known.size and float(np.abs(known).max()) > most:
+    if known.size and float(np.abs(known).max()) > upper_bound:
         raise InputError(
             f"{what} holds {float(np.abs(known).max()):.3g}, which is too far off; keep within "
-            f"{most:g}."
+            f"{upper_bound:g}."
         )
     return found
 
@@ -143,7 +143,7 @@ def rotations(found: np.ndarray, what: str) -> np.ndarray:
         off = np.abs(np.swapaxes(known, -1, -2) @ known - np.eye(3))
     if not (off < _UNTRUE).all() or not (np.linalg.det(known) > 0).all():
         raise InputError(
-            f"{what} holds a matrix that is no rotation; give right-handed axes of length 1 at "
+            f"{what} holds a matrix that is not a rotation; give right-handed axes of length 1 at "
             "right angles."
         )
     return found
@@ -155,7 +155,7 @@ def corners(value: object, what: str, vertices: int) -> np.ndarray:
     found = found.reshape(0, 3) if found.size == 0 else found
     _require_shape(found, what, (-1, 3))
     if found.dtype.kind == "f" and not (found == np.floor(found)).all():
-        raise InputError(f"{what} hold what is no whole number; number the vertices from 0.")
+        raise InputError(f"{what} hold what is not a whole number; number the vertices from 0.")
     if found.size and not 0 <= found.min() <= found.max() < vertices:
         raise InputError(
             f"{what} name missing vertices; number them from 0, or clean the mesh up and try again."

@@ -17,8 +17,22 @@ from .errors import InputError
 from .kinematics import on_bones, two_bone
 from .progress import stepwise
 from .root import gaussian
-from .rotations import matrix_from_vector, smoothstep
-from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, TOE_HEIGHT, joint
+from .rotations import matrix_from_vector
+from .series import MODEL_FPS, runs, smoothstep
+from .skeleton import (
+    ANKLES,
+    END_EFFECTORS,
+    FEET,
+    HIPS,
+    JOINTS,
+    KNEES,
+    LIMBS,
+    OFFSETS,
+    PARENTS,
+    PELVIS,
+    TOE_HEIGHT,
+    joint,
+)
 
 __all__ = [
     "CleanUp",
@@ -28,23 +42,15 @@ __all__ = [
     "seated",
     "smoothed_out",
     "standing_still",
-    "reaching",
+    "reach_targets",
 ]
 
 Distance = Callable[[np.ndarray], np.ndarray]
 """Signed distances (T, N) of world points (T, N, 3) to the furniture, negative inside; metres."""
 
-_TOES, _ANKLES = (
-    [joint("left_foot"), joint("right_foot")],
-    [joint("left_ankle"), joint("right_ankle")],
-)
-_KNEES, _HIPS = [joint("left_knee"), joint("right_knee")], [joint("left_hip"), joint("right_hip")]
-_OVER_LEGS = [j for j in range(22) if j not in {*_KNEES, *_ANKLES, *_TOES}]
+_OVER_LEGS = [j for j in range(len(JOINTS)) if j not in {*KNEES, *ANKLES, *FEET}]
 _THIGH, _SHIN = (float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("knee", "ankle"))
-_ARMS = {
-    f"hand_{side}": [joint(f"{side}_{n}") for n in ("shoulder", "elbow", "wrist")]
-    for side in ("left", "right")
-}
+_ARMS = {f"hand_{side}": list(LIMBS[f"{side}_arm"]) for side in ("left", "right")}
 _UPPER_ARM, _FOREARM = (
     float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("elbow", "wrist")
 )
@@ -115,8 +121,8 @@ class CleanUp:
 
 def _below() -> np.ndarray:
     """(22, 22): whether a joint hangs from another, or is it."""
-    out = np.eye(22, dtype=bool)
-    for j in range(1, 22):
+    out = np.eye(len(JOINTS), dtype=bool)
+    for j in range(1, len(JOINTS)):
         out[j] |= out[PARENTS[j]]
     return out
 
@@ -124,18 +130,13 @@ def _below() -> np.ndarray:
 _HANGS = _below()
 
 
-def _runs(flags: np.ndarray) -> np.ndarray:
-    """(N, 2) start and end (exclusive) of the runs of True."""
-    return np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]]))).reshape(-1, 2)
-
-
-def _between(offset: np.ndarray, asked: np.ndarray, fps: float = 30.0) -> np.ndarray:
+def _between(offset: np.ndarray, asked: np.ndarray, fps: float = MODEL_FPS) -> np.ndarray:
     """Offsets (T, 3) where they are ``asked`` (T,), led over to the next ones or faded out
     elsewhere.
     """
     longest = max(1, round(_FADE * fps))
     out = np.where(asked[:, None], offset, 0.0)
-    for start, end in _runs(~asked):
+    for start, end in runs(~asked):
         before = out[start - 1] if start else np.zeros(3)
         after = out[end] if end < len(out) else np.zeros(3)
         t = np.arange(1, end - start + 1, dtype=float)
@@ -157,21 +158,21 @@ def standing_still(
     not fast; it is let go, and stands anew, where it has slipped too far for that.
     """
     stands = []
-    for foot, toe in enumerate(_TOES):
+    for foot, toe in enumerate(FEET):
         place = joints[:, toe]
         speed = (
-            np.linalg.norm(np.gradient(place, axis=0), axis=-1) * 30.0
+            np.linalg.norm(np.gradient(place, axis=0), axis=-1) * MODEL_FPS
             if len(joints) > 1
             else np.zeros(len(joints))
         )
         on = (place[:, 2] - floor < TOE_HEIGHT + _LOW) & (speed < _SLOW)
-        for start, end in _runs(~on):
+        for start, end in runs(~on):
             if start > 0 and end < len(on) and end - start <= _MENDS:
                 on[start:end] = (
                     place[start:end, 2] - np.broadcast_to(floor, len(on))[start:end]
                     < TOE_HEIGHT + _LOW
                 ).all()
-        for start, end in _runs(on):
+        for start, end in runs(on):
             while end - start >= _PLANTS:
                 away = np.linalg.norm(place[start:end, :2] - place[start, :2], axis=-1) > _SLIPS
                 stop = start + int(np.argmax(away)) if away.any() else end
@@ -194,7 +195,7 @@ def planted(
     moved = np.zeros((len(joints), 2, 3))
     held = np.zeros((len(joints), 2), dtype=bool)
     for foot, start, end in stands:
-        toe = joints[start:end, _TOES[foot]]
+        toe = joints[start:end, FEET[foot]]
         # Where it is slowest it is nearest to where it should stand.
         speed = np.linalg.norm(np.gradient(toe[:, :2], axis=0), axis=-1)
         place = np.average(toe, axis=0, weights=1.0 / (speed + 1e-3) ** 2)
@@ -203,9 +204,9 @@ def planted(
         held[start:end, foot] = True
     for foot in (0, 1):
         moved[:, foot] = _between(moved[:, foot], held[:, foot])
-    ankles = joints[:, _ANKLES] + moved
-    down = _lowered(joints[:, _HIPS], ankles, held)
-    return _on_legs(joints, -down, ankles, joints[:, _KNEES] + moved / 2)
+    ankles = joints[:, ANKLES] + moved
+    down = _lowered(joints[:, HIPS], ankles, held)
+    return _on_legs(joints, -down, ankles, joints[:, KNEES] + moved / 2)
 
 
 def _on_legs(
@@ -216,8 +217,8 @@ def _on_legs(
     """
     out = joints.copy()
     out[:, _OVER_LEGS, 2] += lift[:, None]
-    out[:, _KNEES], out[:, _ANKLES] = two_bone(out[:, _HIPS], ankles, poles, _THIGH, _SHIN)
-    out[:, _TOES] = out[:, _ANKLES] + joints[:, _TOES] - joints[:, _ANKLES]
+    out[:, KNEES], out[:, ANKLES] = two_bone(out[:, HIPS], ankles, poles, _THIGH, _SHIN)
+    out[:, FEET] = out[:, ANKLES] + joints[:, FEET] - joints[:, ANKLES]
     return out
 
 
@@ -257,16 +258,16 @@ def seated(joints: np.ndarray, tops: np.ndarray, strength: float = 1.0) -> np.nd
     not give way.
     """
     need = np.maximum(
-        _SITS_OVER - joints[:, 0, 2] + np.where(np.isfinite(tops), tops, -np.inf), 0.0
+        _SITS_OVER - joints[:, PELVIS, 2] + np.where(np.isfinite(tops), tops, -np.inf), 0.0
     )
-    for start, end in _runs(need > 0.0):
+    for start, end in runs(need > 0.0):
         if need[start:end].max() > _SINKS:
             need[start:end] = 0.0  # under a table, not on it
     lift = strength * _covering(need)
     if not lift.any():
         return joints
     return _on_legs(
-        joints, lift, joints[:, _ANKLES], joints[:, _KNEES] + lift[:, None, None] * (0.0, 0.0, 0.5)
+        joints, lift, joints[:, ANKLES], joints[:, KNEES] + lift[:, None, None] * (0.0, 0.0, 0.5)
     )
 
 
@@ -297,7 +298,7 @@ def cleared(
     Sitting thighs and a back that leans on something are not touched.
     """
     wrists = [chain[2] for chain in _ARMS.values()]
-    out_of = strength * _out_of(joints[:, [*wrists, *_ANKLES]], distance)
+    out_of = strength * _out_of(joints[:, [*wrists, *ANKLES]], distance)
     if not out_of.any():
         return joints
     for k, name in enumerate(_ARMS):
@@ -306,8 +307,8 @@ def cleared(
     out = _on_legs(
         joints,
         np.zeros(len(joints)),
-        joints[:, _ANKLES] + out_of[:, 2:],
-        joints[:, _KNEES] + out_of[:, 2:] / 2,
+        joints[:, ANKLES] + out_of[:, 2:],
+        joints[:, KNEES] + out_of[:, 2:] / 2,
     )
     for k, (shoulder, elbow, wrist) in enumerate(_ARMS.values()):
         goal, pole = joints[:, wrist] + out_of[:, k], joints[:, elbow] + out_of[:, k] / 2
@@ -317,19 +318,19 @@ def cleared(
     return out
 
 
-def _limited(vectors: np.ndarray, most: float) -> np.ndarray:
+def _limited(vectors: np.ndarray, limit: float) -> np.ndarray:
     return vectors * np.minimum(
-        1.0, most / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
+        1.0, limit / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
     )
 
 
-def _softly_limited(vectors: np.ndarray, most: float) -> np.ndarray:
-    """Vectors whose lengths near ``most`` as they grow, without a kink."""
+def _softly_limited(vectors: np.ndarray, limit: float) -> np.ndarray:
+    """Vectors whose lengths near ``limit`` as they grow, without a kink."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    bend = _SOFT * most
-    over = np.maximum(length - (most - bend), 0.0)
+    bend = _SOFT * limit
+    over = np.maximum(length - (limit - bend), 0.0)
     return vectors * (
-        np.where(over > 0.0, most - bend * np.exp(-over / bend), length) / np.maximum(length, 1e-9)
+        np.where(over > 0.0, limit - bend * np.exp(-over / bend), length) / np.maximum(length, 1e-9)
     )
 
 
@@ -352,11 +353,11 @@ def _wished(
     return out
 
 
-def reaching(
+def reach_targets(
     joints: np.ndarray,
     targets: dict[str, np.ndarray],
     strength: float = 1.0,
-    fps: float = 30.0,
+    fps: float = MODEL_FPS,
 ) -> np.ndarray:
     """Joints (T, 22, 3) whose head and wrists are at their ``targets``: (T, 3) by the names of
     ``END_EFFECTORS``, NaN if free.
@@ -371,10 +372,10 @@ def reaching(
     out, goals = joints.copy(), {}
     for name, goal in wished.items():
         if name == "head":
-            base, most = joints[:, END_EFFECTORS[name]], _FARTHEST_HEAD
+            base, limit = joints[:, END_EFFECTORS[name]], _FARTHEST_HEAD
         else:
-            base, most = joints[:, _ARMS[name][0]], _UPPER_ARM + _FOREARM + _FARTHEST_LEAN
-        goals[END_EFFECTORS[name]] = base + _softly_limited(goal - base, most)
+            base, limit = joints[:, _ARMS[name][0]], _UPPER_ARM + _FOREARM + _FARTHEST_LEAN
+        goals[END_EFFECTORS[name]] = base + _softly_limited(goal - base, limit)
     damping = np.full(len(joints), _DAMPING)
     for _ in range(_ROUNDS):
         wants = [(j, goal - out[:, j]) for j, goal in goals.items()]
@@ -426,7 +427,7 @@ def _bent(
     joints = joints.copy()
     for k, at in enumerate(turning):
         turn = matrix_from_vector(_SUPPLE[at] * turns[:, 3 * k : 3 * k + 3])
-        moving = [j for j in range(22) if _HANGS[j, at] and j != at]
+        moving = [j for j in range(len(JOINTS)) if _HANGS[j, at] and j != at]
         arms = joints[:, moving] - joints[:, at, None]
         joints[:, moving] = joints[:, at, None] + np.einsum("tij,tbj->tbi", turn, arms)
     return joints
@@ -460,5 +461,5 @@ def cleaned(
         joints = seated(joints, tops, settings.seat)
         yield 0.8
     if settings.reach > 0.0:
-        joints = reaching(joints, targets, settings.reach)
+        joints = reach_targets(joints, targets, settings.reach)
     return joints

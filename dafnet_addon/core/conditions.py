@@ -1,5 +1,5 @@
-"""From the animator's controls and the scene to what the model is told at each frame, at 30 fps and
-on the canonical body.
+"""From the animator's controls and the scene to what the model is given at each frame, at 30 fps
+and on the canonical body.
 """
 
 from collections.abc import Generator
@@ -12,12 +12,11 @@ from .distance import prepared, rigid_split, scaled
 from .errors import InputError
 from .grid import BAND
 from .kinematics import Turn
-from .nearby import REACH_OF_A_BODY, beside
+from .nearby import REACH_OF_A_BODY, solids_near
 from .occupancy import occupancy
 from .passage import listed, passages, seats_along
 from .progress import within
 from .resampling import (
-    MODEL_FPS,
     covering_frames,
     frame_times,
     resample_nearest,
@@ -26,9 +25,10 @@ from .resampling import (
     resample_rigid,
 )
 from .root import RootPath, ahead, root_from_matrices, smoothed, to_root, to_world, velocities
-from .rotations import normalised, smoothstep
+from .rotations import normalised
 from .sampler import Conditions
 from .sensor import SPHERES
+from .series import MODEL_FPS, smoothstep
 from .skeleton import END_EFFECTORS, MODEL_ORDER, UPPER
 from .solids import Box, Mesh, Scene
 from .take import Controls
@@ -36,7 +36,7 @@ from .take import Controls
 __all__ = [
     "Change",
     "Shot",
-    "Told",
+    "Request",
     "over_a_seat",
     "rolled",
     "shot_steps",
@@ -67,7 +67,7 @@ class Change:
     """A change of mode at the frame ``start``; ``ease`` (M,): how far the new mode counts at that
     frame and those after it.
 
-    ``observation`` (M, 66), ``share`` (M, 22): what would be told at these frames if the mode
+    ``observation`` (M, 66), ``share`` (M, 22): what would be asked at these frames if the mode
     stayed as it was before.
     """
 
@@ -83,7 +83,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Told:
+class Request:
     """What is asked of the body at N frames of a root's path, in its frames, canonical metres.
 
     ``observation`` (N, 66): c_ob, model order; ``share`` (N, 22): how far each joint in it counts,
@@ -98,17 +98,17 @@ class Told:
 @dataclass(frozen=True)
 class Shot:
     """``conditions`` of ``PREROLL`` + N frames at 30 fps; ``path`` (N): R^τ, canonical metres;
-    ``told``: what is asked at its frames; ``scene``: the furniture within reach at these frames,
-    canonical metres. ``own_path``, ``own_told``, ``own_scene``: the same at the controls' own
+    ``request``: what is asked at its frames; ``scene``: the furniture within reach at these frames,
+    canonical metres. ``own_path``, ``own_request``, ``own_scene``: the same at the controls' own
     frames. ``warnings``: sentences for the user.
     """
 
     conditions: Conditions
     path: RootPath
-    told: Told
+    request: Request
     scene: Scene
     own_path: RootPath
-    own_told: Told
+    own_request: Request
     own_scene: Scene
     warnings: tuple[str, ...]
 
@@ -226,7 +226,7 @@ def _observed(
     return observation.reshape(frames, -1), share
 
 
-def _told(controls: Controls, path: RootPath, fps: float, warnings: list[str]) -> Told:
+def _request(controls: Controls, path: RootPath, fps: float, warnings: list[str]) -> Request:
     """What is asked at the frames of ``path``, ``fps`` of them a second."""
     times, target = frame_times(len(controls), controls.fps), frame_times(len(path), fps)
     modes = resample_nearest(_modes(controls), times, target)
@@ -240,7 +240,7 @@ def _told(controls: Controls, path: RootPath, fps: float, warnings: list[str]) -
         _hold(change, observation[start - 1], share[start - 1])
         if _altered(change, observation, share).any():
             changes.append(change)
-    return Told(observation, share, tuple(changes))
+    return Request(observation, share, tuple(changes))
 
 
 def _modes(controls: Controls) -> np.ndarray:
@@ -257,11 +257,11 @@ def _starts(modes: np.ndarray, length: float) -> list[tuple[int, np.ndarray]]:
     No more than two are under way at once: of modes that change sooner the first has come over when
     the third begins.
     """
-    most = round(length)
-    starts = (np.flatnonzero(modes[1:] != modes[:-1]) + 1).tolist() if most else []
+    longest_ease = round(length)
+    starts = (np.flatnonzero(modes[1:] != modes[:-1]) + 1).tolist() if longest_ease else []
     out = []
-    for start, third in zip(starts, [*starts[2:], *2 * [len(modes) + most]], strict=False):
-        longest = min(most, third - start)
+    for start, third in zip(starts, [*starts[2:], *2 * [len(modes) + longest_ease]], strict=False):
+        longest = min(longest_ease, third - start)
         out.append(
             (
                 start,
@@ -277,11 +277,11 @@ def _hold(change: Change, observation: np.ndarray, share: np.ndarray) -> None:
 
     ``observation`` (66,), ``share`` (22,): of the frame before the change.
     """
-    for t, told in enumerate(change.observation.reshape(-1, 22, 3)):
+    for t, stayed in enumerate(change.observation.reshape(-1, 22, 3)):
         gone = (change.share[t] == 0.0) & (share > 0.0)
         change.share[t, gone] = share[gone]
-        told[gone] = observation.reshape(22, 3)[gone]
-        observation, share = told, change.share[t]
+        stayed[gone] = observation.reshape(22, 3)[gone]
+        observation, share = stayed, change.share[t]
 
 
 def _altered(change: Change, observation: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -293,14 +293,14 @@ def _altered(change: Change, observation: np.ndarray, share: np.ndarray) -> np.n
     return (counts != change.share) | ((counts > 0.0) & (now != then).any(-1))
 
 
-def targets_of(path: RootPath, told: Told) -> dict[str, np.ndarray]:
+def targets_of(path: RootPath, request: Request) -> dict[str, np.ndarray]:
     """Where head and wrists have to be: world positions (N, 3), canonical metres, NaN where they
     are free, even in part, or on their way from what another mode asked.
     """
-    places = to_world(path, told.observation.reshape(-1, 22, 3))
-    given = told.share >= 1.0
-    for change in told.changes:
-        given[change.frames] &= ~_altered(change, told.observation, told.share)
+    places = to_world(path, request.observation.reshape(-1, 22, 3))
+    given = request.share >= 1.0
+    for change in request.changes:
+        given[change.frames] &= ~_altered(change, request.observation, request.share)
     return {
         name: np.where(given[:, slot, None], places[:, slot], np.nan)
         for name, slot in _EFFECTORS.items()
@@ -356,7 +356,10 @@ def _look_around(scene: Scene, path: RootPath, occupied: np.ndarray, warnings: l
     met = passages(scene, path, MODEL_FPS, seats_along(scene, path, MODEL_FPS))
     if met:
         places = listed(
-            met, lambda each: f"from {each.first / MODEL_FPS:.1f} to {each.last / MODEL_FPS:.1f} s"
+            met,
+            lambda each: (
+                f"from {each.start / MODEL_FPS:.1f} to {(each.stop - 1) / MODEL_FPS:.1f} s"
+            ),
         )
         warnings.append(
             f"The root runs through furniture in the shot, {places}; move the path or the "
@@ -380,7 +383,7 @@ def over_a_seat(occupancy: np.ndarray) -> bool:
 
 
 def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]:
-    """Everything that the model is told; yields progress in [0, 1], solid by solid. Raises
+    """Everything that the model is given; yields progress in [0, 1], solid by solid. Raises
     InputError for bad controls.
     """
     if not isinstance(scene, Scene) or not isinstance(controls, Controls):
@@ -395,16 +398,16 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     frames = covering_frames(len(controls), controls.fps)
     times, target = frame_times(len(controls), controls.fps), frame_times(frames, MODEL_FPS)
     path = _path_of(controls, times, target, warnings)
-    told = _told(controls, path, MODEL_FPS, warnings)
+    request = _request(controls, path, MODEL_FPS, warnings)
 
     if not scene.solids:
         warnings.append("There is no furniture; the character walks and stands on a bare floor.")
     # Nothing farther away than the body, or the upper body that it is given, is felt or seen: it
     # need not be measured.
-    farthest = float(np.linalg.norm(told.observation.reshape(-1, 3), axis=1).max())
+    farthest = float(np.linalg.norm(request.observation.reshape(-1, 3), axis=1).max())
     places = path.position * controls.scale
     moved = _at_model_rate(scene, times, target)
-    near = beside(moved, places, max(REACH_OF_A_BODY, farthest + BAND), controls.scale)
+    near = solids_near(moved, places, max(REACH_OF_A_BODY, farthest + BAND), controls.scale)
     # Measured in the body's own metres: a giant's grids reach as far for its size as a child's, and
     # are as fine.
     own_scene = scaled(_those(scene, moved, near), 1.0 / controls.scale)
@@ -424,17 +427,17 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
         velocities(whole),
         ahead(whole),
         np.concatenate([np.repeat(before, PREROLL, axis=0), occupied]),
-        rolled(told.observation),
-        rolled(told.share > 0.0).astype(float),
+        rolled(request.observation),
+        rolled(request.share > 0.0).astype(float),
     )
     own_path = resample_path(path, MODEL_FPS, controls.fps, len(controls))
     return Shot(
         conditions,
         path,
-        told,
+        request,
         scene,
         own_path,
-        _told(controls, own_path, controls.fps, []),
+        _request(controls, own_path, controls.fps, []),
         _with_grids(own_scene, scene),
         tuple(warnings),
     )

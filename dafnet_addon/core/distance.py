@@ -287,7 +287,7 @@ def _inside(
 def _furniture(
     corners: np.ndarray, part: np.ndarray, floor: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which triangles (F,) are no floor, and which of them belong to rooms and buildings, as
+    """Which triangles (F,) are not floor, and which of them belong to rooms and buildings, as
     ``build_grid`` tells.
     """
     parts = int(part.max()) + 1

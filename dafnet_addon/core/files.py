@@ -39,7 +39,7 @@ def require_writable(path: Path) -> None:
         raise InputError(f"'{path}' is a folder; give the output another name.")
     folder = _existing(path.absolute().parent)
     if not folder.is_dir():
-        raise InputError(f"'{folder}' is no folder; give the output another place.")
+        raise InputError(f"'{folder}' is not a folder; give the output another place.")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise InputError(
             f"The folder '{folder}' may not be written to; give the output another place."

@@ -9,8 +9,8 @@ from time import perf_counter
 
 import numpy as np
 
-from .checks import MOST_SEED, number, whole
-from .cleanup import CleanUp, cleaned, reaching
+from .checks import MAX_SEED, number, whole
+from .cleanup import CleanUp, cleaned, reach_targets
 from .conditions import PREROLL, Change, Shot, rolled, shot_steps, targets_of, turns_of
 from .errors import InputError
 from .kinematics import (
@@ -22,19 +22,14 @@ from .kinematics import (
     local_from_global,
     turned,
 )
-from .metrics import summary
+from .metrics import motion_metrics
 from .occupancy import distance, tops_under
 from .progress import stepwise, within
-from .resampling import (
-    MODEL_FPS,
-    covering_frames,
-    frame_times,
-    resample_positions,
-    resample_rotations,
-)
+from .resampling import covering_frames, frame_times, resample_positions, resample_rotations
 from .root import RootPath, to_root, to_world
 from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix
 from .sampler import Sampler, Unchanged
+from .series import MODEL_FPS
 from .skeleton import model_order
 from .solids import Scene
 from .take import Controls, Take
@@ -64,7 +59,7 @@ class Draw:
     """What one take is drawn with: ``seed`` and ``temperature``; the legs may have their own, None
     goes with the body's.
 
-    Seeds are whole numbers from 0 to ``MOST_SEED``, temperatures from 0 to 10. Raises InputError
+    Seeds are whole numbers from 0 to ``MAX_SEED``, temperatures from 0 to 10. Raises InputError
     for others.
     """
 
@@ -75,10 +70,10 @@ class Draw:
 
     def __post_init__(self) -> None:
         hold = partial(object.__setattr__, self)
-        hold("seed", whole(self.seed, "The seed", 0, MOST_SEED))
+        hold("seed", whole(self.seed, "The seed", 0, MAX_SEED))
         hold("temperature", number(self.temperature, "The temperature", 0.0, _HOTTEST))
         if self.lower_seed is not None:
-            hold("lower_seed", whole(self.lower_seed, "The seed of the legs", 0, MOST_SEED))
+            hold("lower_seed", whole(self.lower_seed, "The seed of the legs", 0, MAX_SEED))
         if self.lower_temperature is not None:
             hold(
                 "lower_temperature",
@@ -121,7 +116,7 @@ def cleaned_up(
     floor = shot.path.position[:, 2]
     reach = partial(distance, shot.scene, floor=floor) if shot.scene.solids else None
     yield 0.2
-    targets = targets_of(shot.path, shot.told)
+    targets = targets_of(shot.path, shot.request)
     return (
         yield from within(cleaned.steps(joints, targets, settings, floor, tops, reach), 0.2, 1.0)
     )
@@ -168,7 +163,7 @@ def _eased(motion: Bent, poses: np.ndarray, unchanged: np.ndarray, shot: Shot) -
     its own (PREROLL + N, 66).
     """
     changes, used = [], 0
-    for change in shot.told.changes:
+    for change in shot.request.changes:
         own = unchanged[used : used + len(change.ease)]
         changes.append((change.start, change.ease, _as_unchanged(poses, own, change, shot.path)))
         used += len(change.ease)
@@ -199,8 +194,8 @@ def _finished_steps(
     same = len(source) == len(target) and np.allclose(source, target)
     floor = shot.own_path.position[:, 2]
     reach = partial(distance, shot.own_scene, floor=floor) if shot.own_scene.solids else None
-    targets = targets_of(shot.own_path, shot.own_told)
-    judged = partial(summary, fps=controls.fps, floor=floor, targets=targets, distance=reach)
+    targets = targets_of(shot.own_path, shot.own_request)
+    judged = partial(motion_metrics, fps=controls.fps, floor=floor, targets=targets, distance=reach)
 
     def at_own_rate(motion: Bent) -> Bent:
         """A motion at the controls' frames."""
@@ -225,7 +220,7 @@ def _finished_steps(
         if not same:
             joints = _joints(at_own_rate(_bent(joints)))
         if clean_up.reach > 0.0:
-            joints = reaching(joints, targets, clean_up.reach, controls.fps)
+            joints = reach_targets(joints, targets, clean_up.reach, controls.fps)
         own = _bent(joints, controls.fps)
         yield 0.8
         metrics = judged(_joints(own))
@@ -302,8 +297,8 @@ def takes_steps(
             )
             watch(frame - PREROLL, to_world(at, pose.reshape(1, 22, 3))[0] * controls.scale)
 
-    conditions, share, sampling = shot.conditions, rolled(shot.told.share), _CONDITIONED
-    changes = shot.told.changes
+    conditions, share, sampling = shot.conditions, rolled(shot.request.share), _CONDITIONED
+    changes = shot.request.changes
     if any(
         ((each > 0.0) & (each < 1.0)).any()
         for each in (share, *(change.share for change in changes))
@@ -368,7 +363,7 @@ def clean_again_steps(
         raise InputError(
             "The take was made for another root or size than the controls'; generate it again."
         )
-    if len(take.unchanged) != sum(len(change.ease) for change in shot.told.changes):
+    if len(take.unchanged) != sum(len(change.ease) for change in shot.request.changes):
         raise InputError(
             "The take was made for other modes or targets than the controls'; generate it again."
         )

@@ -20,7 +20,8 @@ from .rotations import (
     slerp,
     transpose,
 )
-from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, joint
+from .series import MODEL_FPS
+from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, PELVIS, joint
 
 __all__ = [
     "Bent",
@@ -70,7 +71,7 @@ def forward_kinematics(rotations: np.ndarray, pelvis: np.ndarray, scale: float =
     metres.
     """
     joints = np.empty((*rotations.shape[:-2], 3))
-    joints[..., 0, :] = pelvis
+    joints[..., PELVIS, :] = pelvis
     for j in range(1, len(PARENTS)):
         joints[..., j, :] = joints[..., PARENTS[j], :] + rotations[..., PARENTS[j], :, :] @ (
             scale * OFFSETS[j]
@@ -157,7 +158,9 @@ def _last_clear(values: np.ndarray, clear: np.ndarray) -> np.ndarray:
     return np.take_along_axis(values, np.broadcast_to(last, values.shape), axis=0)
 
 
-def fit(joints: np.ndarray, scale: float = 1.0, fps: float = 30.0) -> tuple[np.ndarray, np.ndarray]:
+def fit(
+    joints: np.ndarray, scale: float = 1.0, fps: float = MODEL_FPS
+) -> tuple[np.ndarray, np.ndarray]:
     """Pelvis (T, 3) and global joint frames (T, 22, 3, 3) of the body whose bones fit world joints
     (T, 22, 3) best.
 
@@ -303,7 +306,7 @@ def _bend_direction(
     seen = (offset * reference).sum(-1) + 1j * (offset * np.cross(along, reference)).sum(-1)
     seen = seen / np.maximum(size, 1e-9)
     weight = (2.0 * size / _CLEAR_BEND) ** 4 * (1.0 + seen.real) / 2.0
-    turn = _smoothed_circle(seen, weight, _CARRY * (fps / 30.0) ** 2)[..., None]
+    turn = _smoothed_circle(seen, weight, _CARRY * (fps / MODEL_FPS) ** 2)[..., None]
     return normalised(turn.real * reference + turn.imag * np.cross(along, reference), reference)
 
 

@@ -8,20 +8,19 @@ Each measure means little alone; it stands beside the same measure of captured m
 import numpy as np
 
 from .root import gaussian
-from .skeleton import joint
+from .skeleton import NECK, PELVIS, WRISTS, joint
 
 __all__ = ["BANDS", "LIVELY", "band_speeds", "descent", "lean", "speed", "sway"]
 
 LIVELY = {
     "head": (joint("head"),),
     "chest": (joint("spine3"),),
-    "wrists": (joint("left_wrist"), joint("right_wrist")),
+    "wrists": tuple(WRISTS),
 }
 """The joints that show life."""
 BANDS = {"slow": (0.2, 1.0), "middle": (1.0, 3.0), "quick": (3.0, 8.0)}
 """Hertz: shifting one's weight; gestures, breath and steps; trembling."""
 
-_PELVIS, _NECK = joint("pelvis"), joint("neck")
 _SMOOTH = 0.5  # seconds: sigma of the path that a body sways about
 _WALKS = (0.7, 1.6)  # metres a second
 _TURNS = 0.35  # radians a second, above which a path is not straight
@@ -66,7 +65,7 @@ def sway(joints: np.ndarray, fps: float) -> float:
     peak to peak within a second, metres, the median over such seconds; NaN where it does not walk
     straight for a second.
     """
-    place = joints[:, _PELVIS, :2]
+    place = joints[:, PELVIS, :2]
     second = round(fps)
     if len(place) < 2 * second:
         return float("nan")
@@ -91,7 +90,7 @@ def descent(joints: np.ndarray, fps: float, seated: int) -> float:
     NaN where it came from no higher.
     """
     start = max(0, seated - round(_BEFORE * fps))
-    height = joints[start : seated + 1, _PELVIS, 2]
+    height = joints[start : seated + 1, PELVIS, 2]
     resting, highest = height[-1], height.max()
     if highest - resting < 0.15:
         return float("nan")
@@ -105,5 +104,5 @@ def lean(joints: np.ndarray, forward: np.ndarray) -> np.ndarray:
     """How far the trunk leans forward (T,), radians, negative backward; ``forward`` (T, 2): where
     the root faces.
     """
-    trunk = joints[:, _NECK] - joints[:, _PELVIS]
+    trunk = joints[:, NECK] - joints[:, PELVIS]
     return np.arctan2((trunk[:, :2] * forward).sum(-1), trunk[:, 2])

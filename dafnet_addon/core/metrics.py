@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .root import RootPath
-from .skeleton import END_EFFECTORS, PARENTS, SEAT_TO_PELVIS, TOE_HEIGHT, joint
+from .series import MODEL_FPS, runs
+from .skeleton import END_EFFECTORS, FEET, PARENTS, PELVIS, SEAT_TO_PELVIS, TOE_HEIGHT, joint
 
 __all__ = [
     "BAD_COLLISION_JOINTS",
@@ -31,15 +32,23 @@ __all__ = [
     "bone_length_variation",
     "jerk",
     "diversity",
-    "summary",
+    "motion_metrics",
     "entropy",
     "action_information",
     "mutual_information",
 ]
 
-_FEET = [joint("left_foot"), joint("right_foot")]
-_PAPER_STATURE = 1.7  # metres; the paper divides end-effector errors by it
-_COLLIDER = 0.10  # metres; radius of the paper's sphere colliders
+
+# The paper's thresholds (section 6.2).
+_PAPER_STATURE = 1.7  # metres; end-effector errors are divided by it
+_COLLIDER = 0.10  # metres; radius of the sphere colliders
+_LOW_TOE = 0.07  # metres over the floor, under which a toe base slides
+_SLIDES = 0.004  # metres in a frame of 1/30 s, above which it does
+
+# Those of mode-adaptive networks and the Neural State Machine.
+_SKATES_UNDER = 0.025  # metres over the height of a planted toe base
+
+_WALKS = 0.3  # metres a second of the root, above which it walks
 
 BAD_COLLISION_JOINTS = tuple(
     joint(name)
@@ -90,10 +99,10 @@ def foot_sliding(
     of 1/30 s (12 cm/s) must be meant, the default. Speed is that of the joint in space, as printed;
     vertical motion counts.
     """
-    toes = joints[:, _FEET]
+    toes = joints[:, FEET]
     speed = np.linalg.norm(_per_second(toes, fps), axis=-1)
-    low = _over_floor(toes[..., 2], floor) < 0.07
-    return (low & (speed > (0.004 * 30.0 if per_frame else 0.004))).sum(axis=1)
+    low = _over_floor(toes[..., 2], floor) < _LOW_TOE
+    return (low & (speed > (_SLIDES * MODEL_FPS if per_frame else _SLIDES))).sum(axis=1)
 
 
 def skate(joints: np.ndarray, fps: float, floor: np.ndarray | float = 0.0) -> float:
@@ -104,10 +113,10 @@ def skate(joints: np.ndarray, fps: float, floor: np.ndarray | float = 0.0) -> fl
     is the toe base's horizontal speed. Their h is a foot's height over the ground; ours is over the
     height of a planted toe base, so that a planted foot has the full weight.
     """
-    toes = joints[:, _FEET]
-    speed = np.linalg.norm(_per_second(toes[..., :2], fps), axis=-1) * 100.0 / 30.0
-    height = np.clip(_over_floor(toes[..., 2], floor) - TOE_HEIGHT, 0.0, 0.025)
-    return float((speed * (2.0 - 2.0 ** (height / 0.025))).mean())
+    toes = joints[:, FEET]
+    speed = np.linalg.norm(_per_second(toes[..., :2], fps), axis=-1) * 100.0 / MODEL_FPS
+    height = np.clip(_over_floor(toes[..., 2], floor) - TOE_HEIGHT, 0.0, _SKATES_UNDER)
+    return float((speed * (2.0 - 2.0 ** (height / _SKATES_UNDER))).mean())
 
 
 def end_effector_distance(joints: np.ndarray, targets: Mapping[str, np.ndarray | None]) -> float:
@@ -194,12 +203,15 @@ def seat_episodes(
     The pelvis' height tells which: ``standing_pelvis_height``.
     """
     rests = np.linalg.norm(_per_second(path.position[:, :2], fps), axis=-1) < speed
-    edges = np.flatnonzero(np.diff(rests, prepend=False, append=False))
-    height = joints[:, 0, 2] - path.position[:, 2]
+    height = joints[:, PELVIS, 2] - path.position[:, 2]
     return [
-        SeatEpisode(int(a), int(b), path.position[a:b].mean(axis=0), float(np.median(height[a:b])))
-        for a, b in edges.reshape(-1, 2)
-        if b - a >= seconds * fps
+        SeatEpisode(
+            start=start,
+            stop=stop,
+            position=path.position[start:stop].mean(axis=0),
+            pelvis_height=float(np.median(height[start:stop])),
+        )
+        for start, stop in runs(rests, at_least=seconds * fps)
     ]
 
 
@@ -236,9 +248,9 @@ def standing_pelvis_height(joints: np.ndarray, path: RootPath, fps: float) -> fl
     """Median height of the pelvis over the local floor while the root walks (over 0.3 m/s); NaN
     where it never does.
     """
-    walks = np.linalg.norm(_per_second(path.position[:, :2], fps), axis=-1) > 0.3
+    walks = np.linalg.norm(_per_second(path.position[:, :2], fps), axis=-1) > _WALKS
     return (
-        float(np.median((joints[:, 0, 2] - path.position[:, 2])[walks]))
+        float(np.median((joints[:, PELVIS, 2] - path.position[:, 2])[walks]))
         if walks.any()
         else float("nan")
     )
@@ -279,7 +291,7 @@ def diversity(samples: np.ndarray) -> float:
     )
 
 
-def summary(
+def motion_metrics(
     joints: np.ndarray,
     fps: float,
     *,

@@ -10,7 +10,7 @@ from .distance import rigid_split
 from .sensor import HEIGHT
 from .solids import Box, Mesh, Scene
 
-__all__ = ["REACH_OF_A_BODY", "beside", "bounds", "extent"]
+__all__ = ["REACH_OF_A_BODY", "bounds", "extent", "solids_near"]
 
 REACH_OF_A_BODY = 2.0
 """Metres from the upright line over a root within which all of the body, what it can feel and the
@@ -20,7 +20,7 @@ sensor are.
 _CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 
 
-def beside(scene: Scene, places: np.ndarray, reach: float, size: float = 1.0) -> Scene:
+def solids_near(scene: Scene, places: np.ndarray, reach: float, size: float = 1.0) -> Scene:
     """The solids that come within ``reach`` of a body that stands at ``places`` (T, 3), on the
     floor; canonical metres.
 

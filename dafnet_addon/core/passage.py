@@ -1,8 +1,8 @@
 """Where a root path leads a body through furniture, and which furniture that is.
 
 The body is told by its upright axis from the thighs to the chest. What it sits on, comes to sit on
-or gets up from is no hindrance, and neither is what its legs are under while it sits: near a seat
-only what stands higher than it is met.
+or gets up from is not a hindrance, and neither is what its legs are under while it sits: near a
+seat only what stands higher than it is met.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from .distance import prepared, rigid_frames
-from .nearby import beside
+from .nearby import solids_near
 from .occupancy import distance
 from .root import RootPath
 from .rotations import rotate, transpose
+from .series import runs
 from .solids import Box, Mesh, Scene
 
 __all__ = ["Passage", "SatOn", "listed", "met_along", "passages", "seats_along"]
@@ -53,13 +54,13 @@ class SatOn:
 
 @dataclass(frozen=True)
 class Passage:
-    """The body's axis is in the furniture ``name`` from frame ``first`` to ``last`` of the path
-    (both included).
+    """The body's axis is in the furniture ``name`` from frame ``start`` to ``stop`` (exclusive) of
+    the path.
     """
 
     name: str
-    first: int
-    last: int
+    start: int
+    stop: int
 
 
 def _upright(path: RootPath, heights: np.ndarray) -> np.ndarray:
@@ -70,7 +71,7 @@ def _upright(path: RootPath, heights: np.ndarray) -> np.ndarray:
 def _pieces(scene: Scene, path: RootPath) -> dict[str, Scene]:
     """The furniture beside the axis by its names."""
     found: dict[str, Scene] = {}
-    for solid in beside(scene, path.position, _BESIDE).solids:
+    for solid in solids_near(scene, path.position, _BESIDE).solids:
         found[solid.name] = Scene((*found.get(solid.name, Scene()).solids, solid))
     return found
 
@@ -121,15 +122,6 @@ def seats_along(scene: Scene, path: RootPath, fps: float) -> tuple[SatOn, ...]:
     return tuple(found[::-1])
 
 
-def _runs(flags: np.ndarray, pause: float) -> list[tuple[int, int]]:
-    """First and last frames of the runs of flags (T,) that are set; runs no more than ``pause``
-    frames apart are one.
-    """
-    frames = np.flatnonzero(flags)
-    parts = np.split(frames, np.flatnonzero(np.diff(frames) > max(pause, 1)) + 1)
-    return [(int(part[0]), int(part[-1])) for part in parts if len(part)]
-
-
 def _inside(piece: Scene, path: RootPath, fps: float) -> np.ndarray:
     """Whether (T, H) the axis is in a piece of furniture, not just at an edge of it that the body
     passes along.
@@ -165,21 +157,26 @@ def passages(
         for seat, gap in zip(seats, away, strict=True):
             if name not in seat.pieces:
                 continue
-            for first, last in _runs(inside.any(axis=1), _PAUSE * fps):
+            over_seat = np.maximum(limit, seat.top + _OVER_SEAT - floor)
+            for start, stop in _visits(inside.any(axis=1), fps):
                 # A bed or a deep sofa is under the body for longer than where it sits.
-                if (
-                    gap[max(first - round(_PAUSE * fps), 0) : last + round(_PAUSE * fps) + 1]
-                    < _COMES
-                ).any():
-                    limit[first : last + 1] = np.maximum(limit, seat.top + _OVER_SEAT - floor)[
-                        first : last + 1
-                    ]
+                around = slice(max(start - round(_PAUSE * fps), 0), stop + round(_PAUSE * fps))
+                if (gap[around] < _COMES).any():
+                    limit[start:stop] = over_seat[start:stop]
             limit[gap < _RESTS] = np.inf
         met[name] = (inside & (limit[:, None] <= _HEIGHTS)).any(axis=1)
+
     found = [
-        Passage(name, *run) for name, frames in met.items() for run in _runs(frames, _PAUSE * fps)
+        Passage(name, start, stop)
+        for name, frames in met.items()
+        for start, stop in _visits(frames, fps)
     ]
-    return tuple(sorted(found, key=lambda each: each.first))
+    return tuple(sorted(found, key=lambda each: each.start))
+
+
+def _visits(flags: np.ndarray, fps: float) -> list[tuple[int, int]]:
+    """The (start, stop) of runs in which the flags (T,) are set; short pauses do not part them."""
+    return runs(flags, gap=max(_PAUSE * fps - 1, 0))
 
 
 def met_along(
@@ -190,7 +187,9 @@ def met_along(
     ``end``: what the body sits on at the path's end, nothing where it stands there; None for what
     it seems to sit on.
     """
-    near = prepared(beside(scene, path.position, _BESIDE), float(np.median(path.position[:, 2])))[0]
+    near = prepared(
+        solids_near(scene, path.position, _BESIDE), float(np.median(path.position[:, 2]))
+    )[0]
     seats = seats_along(near, path, fps)
     if end is not None:
         last = path.position[-1, :2]

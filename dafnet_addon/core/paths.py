@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .errors import InputError
-from .root import RootPath
+from .root import RootPath, forward_of, yaw_of
+from .series import MODEL_FPS, smoothstep
 
 __all__ = ["AFTER_SEAT", "BEFORE_SEAT", "Rest", "Route", "Stop", "facing", "route", "walked_along"]
 
@@ -48,11 +49,11 @@ class Stop:
 
 @dataclass(frozen=True)
 class Rest:
-    """Frames ``first`` to ``last`` (both included) in which the root stands still at ``stop``."""
+    """Frames from ``start`` to ``stop`` (exclusive) in which the root stands still at ``place``."""
 
-    stop: Stop
-    first: int
-    last: int
+    place: Stop
+    start: int
+    stop: int
 
 
 @dataclass(frozen=True)
@@ -63,13 +64,9 @@ class Route:
     rests: tuple[Rest, ...]
 
 
-def facing(direction: Sequence[float]) -> float:
+def facing(direction: Sequence[float] | np.ndarray) -> float:
     """Yaw of a horizontal direction (x, y), radians; 0 looks along +y."""
-    return float(np.arctan2(-direction[0], direction[1]))
-
-
-def _forward(yaw: float) -> np.ndarray:
-    return np.array([-np.sin(yaw), np.cos(yaw)])
+    return float(yaw_of(np.asarray(direction)))
 
 
 def _wrapped(angle: float) -> float:
@@ -81,11 +78,6 @@ def _turn_seconds(turn: float) -> float:
     90, 1.7 s for 180.
     """
     return 0.6 + 1.1 * abs(turn) / np.pi
-
-
-def _blend(u: np.ndarray) -> np.ndarray:
-    u = np.clip(u, 0.0, 1.0)
-    return u * u * (3.0 - 2.0 * u)
 
 
 def _rounded(points: np.ndarray) -> tuple[np.ndarray, float, list[tuple[float, float]]]:
@@ -157,10 +149,10 @@ def _leg(origin: Stop, via: Sequence[Point], goal: Stop, cruise: float, fps: flo
     """
     points: list[np.ndarray] = [np.asarray(origin.position, float)]
     if origin.seated:
-        points.append(points[0] + AFTER_SEAT * _forward(origin.yaw))
+        points.append(points[0] + AFTER_SEAT * forward_of(origin.yaw))
     points += [np.asarray(p, float) for p in via]
     if goal.seated:
-        points.append(np.asarray(goal.position, float) + BEFORE_SEAT * _forward(goal.yaw))
+        points.append(np.asarray(goal.position, float) + BEFORE_SEAT * forward_of(goal.yaw))
     points.append(np.asarray(goal.position, float))
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if not np.isfinite(gaps).all() or (gaps < 0.05).any():
@@ -195,7 +187,7 @@ def walked_along(
     """
     step = np.diff(curve, axis=0)
     arc = np.linspace(0.0, length, len(curve))
-    tangent = np.unwrap(np.arctan2(-step[:, 0], step[:, 1]))
+    tangent = np.unwrap(yaw_of(step))
     tangent = np.concatenate([tangent, tangent[-1:]])
     heading = (
         np.interp(np.clip(arc, *told), arc, tangent) if yaw is None else np.full(len(arc), yaw)
@@ -232,8 +224,8 @@ def walked_along(
     walking = np.interp(time, clock, heading)
     # Both turns are offsets from the walker's heading that fade out and in, so they may overlap on
     # a short leg.
-    leaving = 1.0 - _blend((time - leave) / (leave_end - leave))
-    arriving = _blend((time - arrive) / (arrive_end - arrive))
+    leaving = 1.0 - smoothstep((time - leave) / (leave_end - leave))
+    arriving = smoothstep((time - arrive) / (arrive_end - arrive))
     from_origin = _wrapped(origin.yaw - walked(leave_end)) + walked(leave_end)
     to_goal = walked(arrive) + arrive_turn
     return RootPath(
@@ -242,7 +234,11 @@ def walked_along(
 
 
 def route(
-    start: Stop, *places: Point | Stop, speed: float = 1.1, fps: float = 30.0, floor: float = 0.0
+    start: Stop,
+    *places: Point | Stop,
+    speed: float = 1.1,
+    fps: float = MODEL_FPS,
+    floor: float = 0.0,
 ) -> Route:
     """Root path that rests at ``start``, passes the points and rests at every ``Stop``; it must end
     at a stop.
@@ -266,7 +262,7 @@ def route(
         frames = max(1, round(stop.seconds * fps))
         positions.append(np.broadcast_to([*stop.position, 0.0], (frames, 3)))
         yaws.append(np.full(frames, yaw))
-        rests.append(Rest(stop, count, count + frames - 1))
+        rests.append(Rest(stop, count, count + frames))
         count += frames
 
     rest(start, start.yaw)

@@ -5,14 +5,14 @@ from functools import wraps
 from inspect import signature
 from typing import Any, ParamSpec, Protocol, TypeVar
 
-__all__ = ["Stepwise", "drained", "stepwise", "within"]
+__all__ = ["Stepwise", "run_to_end", "stepwise", "within"]
 
 _T = TypeVar("_T")
 _Given = ParamSpec("_Given")
 _Result = TypeVar("_Result", covariant=True)
 
 
-def drained(
+def run_to_end(
     steps: Generator[float, None, _T], progress: Callable[[float], None] = lambda share: None
 ) -> _T:
     """Run a job to its end and give its result; ``progress`` is called with every share done."""
@@ -62,7 +62,7 @@ def stepwise(
 
     @wraps(job)
     def at_once(*given: _Given.args, **named: _Given.kwargs) -> _Result:
-        return drained(job(*given, **named))
+        return run_to_end(job(*given, **named))
 
     shown: Any = at_once
     shown.steps = job

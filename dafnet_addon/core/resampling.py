@@ -9,9 +9,9 @@ import numpy as np
 
 from .root import RootPath
 from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix, slerp
+from .series import MODEL_FPS
 
 __all__ = [
-    "MODEL_FPS",
     "frame_times",
     "covering_frames",
     "resample_positions",
@@ -20,9 +20,6 @@ __all__ = [
     "resample_rigid",
     "resample_path",
 ]
-
-MODEL_FPS = 30.0
-"""Frames a second inside the model."""
 
 _SAME = 1e-6  # fractions of a frame closer to one than this lie on it
 

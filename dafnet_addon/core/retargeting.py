@@ -2,10 +2,11 @@
 and where its end lands.
 
 Rigs rest in all kinds of poses, so nothing is told as a rotation from rest. Every body is first
-laid into the canonical T-pose (x right, y forward, z up; ``laid``), and joints that it lacks are
-filled in. Two kinds of global joint frames occur. *Frames* are the identity in that T-pose, so the
-same frames are the same pose in the world on every body; *turns* are the identity in the rig's own
-rest pose. A body's ``alignment`` leads from one to the other: turns = frames @ alignment.
+laid into the canonical T-pose (x right, y forward, z up; ``lay_in_t_pose``), and joints that it
+lacks are filled in. Two kinds of global joint frames occur. *Frames* are the identity in that
+T-pose, so the same frames are the same pose in the world on every body; *turns* are the identity in
+the rig's own rest pose. A body's ``alignment`` leads from one to the other: turns = frames @
+alignment.
 """
 
 from collections.abc import Callable
@@ -26,27 +27,36 @@ from .rotations import (
     slerp,
     transpose,
 )
-from .skeleton import PARENTS, REST
+from .series import smoothstep
+from .skeleton import (
+    ANKLES,
+    COLLARS,
+    ELBOWS,
+    FEET,
+    HEAD,
+    HIPS,
+    JOINTS,
+    KNEES,
+    LIMBS,
+    NECK,
+    PARENTS,
+    PELVIS,
+    REST,
+    SHOULDERS,
+    SPINE,
+    WRISTS,
+)
 
 __all__ = [
-    "LIMBS",
     "Body",
-    "Landed",
+    "RetargetedMotion",
     "Motion",
     "canonical_body",
-    "laid",
+    "lay_in_t_pose",
     "limb_errors",
-    "onto",
+    "retarget",
     "size_ratio",
 ]
-
-LIMBS = {
-    "left_arm": (16, 18, 20),
-    "right_arm": (17, 19, 21),
-    "left_leg": (1, 4, 7),
-    "right_leg": (2, 5, 8),
-}
-"""First, middle and end joint of the limbs."""
 
 _AXIS = {
     "left_arm": (-1.0, 0, 0),
@@ -60,7 +70,8 @@ _BEND = {
     "left_leg": (0, 1.0, 0),
     "right_leg": (0, 1.0, 0),
 }
-_TRUNK = (3, 6, 9, 12)  # the joints that bring the head to its place
+_FOOT_OF = dict(zip(ANKLES, FEET, strict=True))
+_TRUNK = (*SPINE, NECK)  # the joints that bring the head to its place
 # bodies whose legs differ by less count as of one size, so that hands stay on what they touch
 _SAME_SIZE = 0.03
 # arms, and shoulders over the hips, of the same build, over the body's size
@@ -88,7 +99,7 @@ _AHEAD = np.sin(np.radians(10.0))
 
 @dataclass(frozen=True)
 class Body:
-    """A body laid into the canonical T-pose, whatever pose its rig rests in (``laid``).
+    """A body laid into the canonical T-pose, whatever pose its rig rests in (``lay_in_t_pose``).
 
     ``rest`` (22, 3): its joints in that pose, canonical frame, any unit of length. ``present``
     (22,): which of them a bone turns; the others are rigid on their parents. ``alignment`` (22, 3,
@@ -106,21 +117,22 @@ class Body:
 
     def leg(self) -> float:
         """Length of the legs, mean of both, hip to ankle."""
-        return 0.5 * sum(self.length(j) for j in (4, 5, 7, 8))
+        return 0.5 * sum(self.length(j) for j in KNEES + ANKLES)
 
     def arm(self) -> float:
         """Length of the arms, mean of both, shoulder to wrist."""
-        return 0.5 * sum(self.length(j) for j in (18, 19, 20, 21))
+        return 0.5 * sum(self.length(j) for j in ELBOWS + WRISTS)
 
     def chest(self) -> float:
         """From the middle of the hip joints to the middle of the shoulders."""
         return float(
-            np.linalg.norm(self.rest[[16, 17]].mean(axis=0) - self.rest[[1, 2]].mean(axis=0))
+            np.linalg.norm(self.rest[SHOULDERS].mean(axis=0) - self.rest[HIPS].mean(axis=0))
         )
 
     def trunk(self) -> float:
         """From the middle of the hip joints to the head joint."""
-        return float(np.linalg.norm(self.rest[15] - 0.5 * (self.rest[1] + self.rest[2])))
+        left, right = self.rest[HIPS]
+        return float(np.linalg.norm(self.rest[HEAD] - 0.5 * (left + right)))
 
 
 @dataclass(frozen=True)
@@ -134,7 +146,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Landed:
+class RetargetedMotion:
     """``motion`` on the body; ``turns`` (T, 22, 3, 3): global, the identity in its rest pose.
 
     ``targets`` (T, 22, 3): where its joints were to lie; of these wrists, ankles, head and the
@@ -153,10 +165,10 @@ def canonical_body(scale: float) -> Body:
     """The DAFNet character's own body; ``scale``: its size over the canonical one, times the unit
     of length wanted.
     """
-    return Body(scale * REST, np.ones(22, bool), np.tile(np.eye(3), (22, 1, 1)))
+    return Body(scale * REST, np.ones(len(JOINTS), bool), np.tile(np.eye(3), (len(JOINTS), 1, 1)))
 
 
-def laid(
+def lay_in_t_pose(
     rest: np.ndarray, present: np.ndarray | None = None, hands: np.ndarray | None = None
 ) -> Body:
     """The body of a rig that rests in any pose: standing, arms anywhere, sitting, bent or twisted.
@@ -177,29 +189,31 @@ def laid(
     """
     rest = _with_column(np.array(rest, float))
     present = np.isfinite(rest).all(axis=1) if present is None else present
-    size = np.linalg.norm(rest[[4, 5, 7, 8]] - rest[[1, 2, 4, 5]]) / np.linalg.norm(
-        REST[[4, 5, 7, 8]] - REST[[1, 2, 4, 5]]
+    size = np.linalg.norm(rest[KNEES + ANKLES] - rest[HIPS + KNEES]) / np.linalg.norm(
+        REST[KNEES + ANKLES] - REST[HIPS + KNEES]
     )
-    turn = np.tile(np.eye(3), (22, 1, 1))
+    turn = np.tile(np.eye(3), (len(JOINTS), 1, 1))
     pelvis, chest = _trunk_laid(rest)
-    spine = [j for j in (3, 6, 9) if present[j]]
+    spine = [j for j in SPINE if present[j]]
     low, high = quaternion_from_matrix(np.array([pelvis, chest]))
-    for j in (0, 3, 6, 9):
-        turn[j] = matrix_from_quaternion(slerp(low, high, np.array(j / 9.0)))
+    for k, j in enumerate((PELVIS, *SPINE)):
+        turn[j] = matrix_from_quaternion(slerp(low, high, np.array(k / len(SPINE))))
     if spine:
         turn[spine[-1]] = chest
     else:
         chest = pelvis
     if _angle(chest @ pelvis.T) > _BENT:
-        for j, child in pairwise([0, *spine]):
+        for j, child in pairwise([PELVIS, *spine]):
             if j:
                 turn[j] = (
                     rotation_between(turn[j] @ (rest[child] - rest[j]), REST[child] - REST[j])
                     @ turn[j]
                 )
-    turn[[9, 12, 13, 14]] = chest
-    turn[15], ground = _level(chest), _level(pelvis)
-    for j, base, up in ((13, chest, 16), (14, chest, 17), (10, ground, 7), (11, ground, 8)):
+    turn[[SPINE[-1], NECK, *COLLARS]] = chest
+    turn[HEAD], ground = _level(chest), _level(pelvis)
+    hung = [(collar, chest, shoulder) for collar, shoulder in zip(COLLARS, SHOULDERS, strict=True)]
+    hung += [(foot, ground, ankle) for foot, ankle in zip(FEET, ANKLES, strict=True)]
+    for j, base, up in hung:
         if not np.isfinite(rest[j]).all():
             rest[j] = rest[up] + size * base.T @ (REST[j] - REST[up])
 
@@ -222,21 +236,20 @@ def laid(
                 hands[k] if hands is not None else np.full((2, 3), np.nan),
             )
         else:
-            turn[end] = turn[end + 3] = _foot_laid(
-                turn[middle], ground, rest[end + 3] - rest[end], end
-            )
-    for j in range(1, 22):
+            foot = _FOOT_OF[end]
+            turn[end] = turn[foot] = _foot_laid(turn[middle], ground, rest[foot] - rest[end], end)
+    for j in range(1, len(JOINTS)):
         if not present[j]:
             turn[j] = turn[PARENTS[j]]
     straight = rest.copy()
-    for j in range(1, 22):
+    for j in range(1, len(JOINTS)):
         straight[j] = straight[PARENTS[j]] + turn[PARENTS[j]] @ (rest[j] - rest[PARENTS[j]])
     return Body(straight, present, turn)
 
 
 def _with_column(rest: np.ndarray) -> np.ndarray:
     """Spine and neck where they are missing, on the way from pelvis to head."""
-    column = [0, 3, 6, 9, 12, 15]
+    column = [PELVIS, *SPINE, NECK, HEAD]
     known = [j for j in column if np.isfinite(rest[j]).all()]
     along = np.concatenate(
         [[0.0], np.cumsum(np.linalg.norm(np.diff(REST[column], axis=0), axis=1))]
@@ -249,19 +262,20 @@ def _with_column(rest: np.ndarray) -> np.ndarray:
 
 def _trunk_laid(rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rotations (3, 3) that lay pelvis and chest upright, by joints at rest with a whole column."""
-    hips, canonical_hips = rest[[1, 2]].mean(axis=0), REST[[1, 2]].mean(axis=0)
-    across_hips, across_chest = normalised(rest[2] - rest[1]), normalised(rest[17] - rest[16])
-    along, canonical = rest[12] - hips, REST[12] - canonical_hips
+    hips, canonical_hips = rest[HIPS].mean(axis=0), REST[HIPS].mean(axis=0)
+    across_hips = normalised(rest[HIPS[1]] - rest[HIPS[0]])
+    across_chest = normalised(rest[SHOULDERS[1]] - rest[SHOULDERS[0]])
+    along, canonical = rest[NECK] - hips, REST[NECK] - canonical_hips
 
     def upright(across: np.ndarray, up: np.ndarray, meant: np.ndarray) -> np.ndarray:
         return frame_from(np.array([1.0, 0.0, 0.0]), meant, "xz") @ frame_from(across, up, "xz").T
 
     size = np.linalg.norm(along)
-    low = next((j for j in (3, 6, 9) if np.linalg.norm(rest[j] - hips) > 0.1 * size), 12)
+    low = next((j for j in SPINE if np.linalg.norm(rest[j] - hips) > 0.1 * size), NECK)
     high, top = next(
         (j, end)
-        for j in (9, 6, 3, 0)
-        for end in (12, 15)
+        for j in (*SPINE[::-1], PELVIS)
+        for end in (NECK, HEAD)
         if np.linalg.norm(rest[end] - rest[j]) > 0.15 * size
     )
     pelvis = upright(across_hips, rest[low] - hips, REST[low] - canonical_hips)
@@ -298,7 +312,7 @@ def _foot_laid(shin: np.ndarray, ground: np.ndarray, foot: np.ndarray, ankle: in
     """Rotation that lays a foot: its sole counts as flat at rest where toes lie ahead of the ankle
     and lower.
     """
-    ahead, seen = REST[ankle + 3] - REST[ankle], ground @ normalised(foot)
+    ahead, seen = REST[_FOOT_OF[ankle]] - REST[ankle], ground @ normalised(foot)
     if seen[1] > _AHEAD and seen[2] < _AHEAD:
         flat = np.array([1.0, 1.0, 0.0])
         return rotation_between(seen * flat, ahead * flat) @ ground
@@ -316,9 +330,9 @@ def size_ratio(source: Body, body: Body) -> float:
     return 1.0 if abs(ratio - 1.0) < _SAME_SIZE else ratio
 
 
-def onto(
+def retarget(
     source: Motion, source_body: Body, body: Body, root: np.ndarray, landing: bool = True
-) -> Landed:
+) -> RetargetedMotion:
     """The motion on another body. ``root`` (T, 3): the place on the floor under the source, about
     which it is scaled.
 
@@ -344,34 +358,36 @@ def onto(
     lands = dict.fromkeys(LIMBS, landing)
     lands["left_arm"] = lands["right_arm"] = arms_land = landing and _arms_land(source_body, body)
     frames, joints = source.frames.copy(), targets.copy()
-    spine = [j for j in (3, 6, 9) if body.present[j]]
+    spine = [j for j in SPINE if body.present[j]]
     if spine:
-        frames[:, spine[-1]] = source.frames[:, 9]  # neck and arms hang on it
+        frames[:, spine[-1]] = source.frames[:, SPINE[-1]]  # neck and arms hang on it
 
     def place(*which: int) -> None:
         for j in which:
             parent = PARENTS[j]
-            if not body.present[parent] and parent != 0:
+            if not body.present[parent] and parent != PELVIS:
                 frames[:, parent] = frames[:, PARENTS[parent]]
             joints[:, j] = joints[:, parent] + rotate(
                 frames[:, parent], body.rest[j] - body.rest[parent]
             )
 
-    middle = 0.5 * (body.rest[1] + body.rest[2])
-    joints[:, 0] = targets[:, [1, 2]].mean(axis=1) + rotate(frames[:, 0], body.rest[0] - middle)
-    place(1, 2)
+    middle = 0.5 * (body.rest[HIPS[0]] + body.rest[HIPS[1]])
+    joints[:, PELVIS] = targets[:, HIPS].mean(axis=1) + rotate(
+        frames[:, PELVIS], body.rest[PELVIS] - middle
+    )
+    place(*HIPS)
     if landing:
-        joints[:, 0, 2] -= _sunk(joints, targets, body)
-        place(1, 2)
+        joints[:, PELVIS, 2] -= _sunk(joints, targets, body)
+        place(*HIPS)
 
     trunk = [j for j in _TRUNK if body.present[j]]
-    _bring_head(joints, frames, targets[:, 15], trunk, place)
-    place(13, 14, 16, 17)
-    if arms_land and spine and not body.present[[13, 14]].any():
+    _bring_head(joints, frames, targets[:, HEAD], trunk, place)
+    place(*COLLARS, *SHOULDERS)
+    if arms_land and spine and not body.present[COLLARS].any():
         _lean(joints, frames, targets, spine[-1], body)
-        _bring_head(joints, frames, targets[:, 15], [j for j in trunk if j != spine[-1]], place)
-        place(13, 14, 16, 17)
-    for collar, shoulder, elbow, wrist in ((13, 16, 18, 20), (14, 17, 19, 21)):
+        _bring_head(joints, frames, targets[:, HEAD], [j for j in trunk if j != spine[-1]], place)
+        place(*COLLARS, *SHOULDERS)
+    for collar, shoulder, elbow, wrist in zip(COLLARS, SHOULDERS, ELBOWS, WRISTS, strict=True):
         arm = sum(
             body.length(j) * normalised(source.joints[:, j] - source.joints[:, PARENTS[j]])
             for j in (elbow, wrist)
@@ -382,14 +398,14 @@ def onto(
             _shrug(joints, frames, targets[:, wrist], collar, shoulder, kept, reach)
         elif body.present[collar] and not landing:
             # The shoulder to its place, then a little to where the wrist would come to its own.
-            for place_of, most in (
+            for place_of, limit in (
                 (targets[:, shoulder], _SHRUG),
                 (targets[:, wrist] - arm, 0.5 * _EASE),
             ):
                 turn = rotation_between(
                     joints[:, shoulder] - joints[:, collar], place_of - joints[:, collar]
                 )
-                frames[:, collar] = _limited(turn, most) @ frames[:, collar]
+                frames[:, collar] = _limited(turn, limit) @ frames[:, collar]
                 place(shoulder)
         place(shoulder)
 
@@ -417,11 +433,11 @@ def onto(
             )
             frames[:, at] = straight @ source.frames[:, at]
         bends.append(bend)
-    place(10, 11)
-    for j in range(1, 22):
+    place(*FEET)
+    for j in range(1, len(JOINTS)):
         if not body.present[j]:
             frames[:, j] = frames[:, PARENTS[j]]
-    return Landed(
+    return RetargetedMotion(
         Motion(joints, frames), frames @ body.alignment, targets, np.stack(bends, axis=1), ratio
     )
 
@@ -434,8 +450,8 @@ def _arms_land(source: Body, body: Body) -> bool:
     if ratio == 1.0:
         return True
 
-    def alike(ours: float, theirs: float, most: float) -> bool:
-        return 1.0 / most < ours / (ratio * theirs) < most
+    def alike(ours: float, theirs: float, limit: float) -> bool:
+        return 1.0 / limit < ours / (ratio * theirs) < limit
 
     return alike(body.arm(), source.arm(), _SAME_ARMS) and alike(
         body.chest(), source.chest(), _SAME_CHEST
@@ -451,11 +467,11 @@ def limb_errors(joints: np.ndarray, source: np.ndarray) -> dict[str, np.ndarray]
     """
 
     def ways(at: np.ndarray) -> dict[str, list[np.ndarray]]:
-        hips = at[:, [1, 2]].mean(axis=1)
+        hips = at[:, HIPS].mean(axis=1)
         limbs = {
             name: [at[:, b] - at[:, a], at[:, c] - at[:, b]] for name, (a, b, c) in LIMBS.items()
         }
-        return limbs | {"trunk": [at[:, 15] - hips, at[:, 17] - at[:, 16]]}
+        return limbs | {"trunk": [at[:, HEAD] - hips, at[:, SHOULDERS[1]] - at[:, SHOULDERS[0]]]}
 
     ours, theirs, found = ways(joints), ways(source), {}
     for name in ours:
@@ -473,30 +489,30 @@ def _degrees(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def _targets(
     source: Motion, source_body: Body, body: Body, root: np.ndarray, landing: bool
 ) -> np.ndarray:
-    """Where the joints (T, 22, 3) are to lie on the body, as for ``onto``."""
-    ratio, feet = size_ratio(source_body, body), [7, 8, 10, 11]
+    """Where the joints (T, 22, 3) are to lie on the body, as for ``retarget``."""
+    ratio, feet = size_ratio(source_body, body), ANKLES + FEET
     targets = root[:, None] + ratio * (source.joints - root[:, None])
     targets[:, feet, :2] = source.joints[:, feet, :2]
     # Feet stand apart as the hips do; sideways of the foot itself, since a planted one does not
     # turn.
-    wider = 0.5 * (np.ptp(body.rest[[1, 2], 0]) - np.ptp(source_body.rest[[1, 2], 0]))
-    for ankle, side in ((7, -1.0), (8, 1.0)):
+    wider = 0.5 * (np.ptp(body.rest[HIPS, 0]) - np.ptp(source_body.rest[HIPS, 0]))
+    for ankle, side in zip(ANKLES, (-1.0, 1.0), strict=True):
         out = source.frames[:, ankle, :, 0] * (1.0, 1.0, 0.0)
-        targets[:, [ankle, ankle + 3]] += (side * wider * normalised(out))[:, None]
+        targets[:, [ankle, _FOOT_OF[ankle]]] += (side * wider * normalised(out))[:, None]
     trunk = body.trunk() / source_body.trunk()
     if not landing or ratio != 1.0 or abs(trunk - 1.0) > _SAME_SIZE:
-        upper = [15] if landing else [15, 16, 17, 20, 21]
-        upright = source.joints[:, upper] - source.joints[:, [1, 2]].mean(axis=1, keepdims=True)
-        targets[:, upper] = targets[:, [1, 2]].mean(axis=1, keepdims=True) + trunk * upright
-    if body.present[[10, 11]].all():
-        rise = (body.rest[[7, 8], 2] - body.rest[[10, 11], 2]) - ratio * (
-            source_body.rest[[7, 8], 2] - source_body.rest[[10, 11], 2]
+        upper = [HEAD] if landing else [HEAD, *SHOULDERS, *WRISTS]
+        upright = source.joints[:, upper] - source.joints[:, HIPS].mean(axis=1, keepdims=True)
+        targets[:, upper] = targets[:, HIPS].mean(axis=1, keepdims=True) + trunk * upright
+    if body.present[FEET].all():
+        rise = (body.rest[ANKLES, 2] - body.rest[FEET, 2]) - ratio * (
+            source_body.rest[ANKLES, 2] - source_body.rest[FEET, 2]
         )
-        targets[:, [7, 8]] += source.frames[:, [7, 8]][..., 2] * rise[:, None]
+        targets[:, ANKLES] += source.frames[:, ANKLES][..., 2] * rise[:, None]
         if abs(rise.mean()) > _SAME_ANKLES * body.leg():
             # Hands of a body of the same size stay on what they touch.
             carried = [
-                j for j in range(22) if j not in feet and (ratio != 1.0 or j not in (20, 21))
+                j for j in range(len(JOINTS)) if j not in feet and (ratio != 1.0 or j not in WRISTS)
             ]
             targets[:, carried, 2] += (rise.mean() * _standing(source.joints))[:, None]
     return targets
@@ -513,8 +529,8 @@ def _sunk(joints: np.ndarray, targets: np.ndarray, body: Body) -> np.ndarray:
     return sunk
 
 
-def _limited(turn: np.ndarray, most: float) -> np.ndarray:
-    """Rotations (T, 3, 3), none by more than ``most`` radians (which is under half a circle)."""
+def _limited(turn: np.ndarray, limit: float) -> np.ndarray:
+    """Rotations (T, 3, 3), none by more than ``limit`` radians (which is under half a circle)."""
     vector = 0.5 * np.stack(
         [
             turn[:, 2, 1] - turn[:, 1, 2],
@@ -526,7 +542,7 @@ def _limited(turn: np.ndarray, most: float) -> np.ndarray:
     angle = np.arctan2(
         np.linalg.norm(vector, axis=-1), 0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0)
     )
-    return matrix_from_vector(normalised(vector) * np.minimum(angle, most)[:, None])
+    return matrix_from_vector(normalised(vector) * np.minimum(angle, limit)[:, None])
 
 
 def _bring_head(
@@ -540,16 +556,16 @@ def _bring_head(
     coordinate descent.
     """
     meant = frames[:, trunk].copy()
-    place(3, 6, 9, 12, 15)
+    place(*_TRUNK, HEAD)
     for _ in range(_ROUNDS if trunk else 0):
         for k, j in enumerate(trunk):
-            turn = rotation_between(joints[:, 15] - joints[:, j], head - joints[:, j])
+            turn = rotation_between(joints[:, HEAD] - joints[:, j], head - joints[:, j])
             for i, above in enumerate(trunk[k:], k):
                 asked = turn @ frames[:, above]
                 frames[:, above] = (
                     _limited(asked @ transpose(meant[:, i]), _TRUNK_TURN) @ meant[:, i]
                 )
-            place(3, 6, 9, 12, 15)
+            place(*_TRUNK, HEAD)
 
 
 def _lean(
@@ -560,7 +576,7 @@ def _lean(
     turn = np.broadcast_to(np.eye(3), meant.shape)
     for _ in range(_LEANS):
         pull = np.zeros_like(center)
-        for shoulder, elbow, wrist in ((16, 18, 20), (17, 19, 21)):
+        for shoulder, elbow, wrist in (LIMBS["left_arm"], LIMBS["right_arm"]):
             arm = rotate(turn, joints[:, shoulder] - center)
             away = targets[:, wrist] - center - arm
             short = np.linalg.norm(away, axis=-1, keepdims=True) - _REACH * (
@@ -591,7 +607,7 @@ def _shrug(
     """
     meant, arm = frames[:, collar].copy(), joints[:, shoulder] - joints[:, collar]
     turn = np.broadcast_to(np.eye(3), meant.shape)
-    for most, short in ((_EASE, False), (_SHRUG, True)):
+    for limit, short in ((_EASE, False), (_SHRUG, True)):
         for _ in range(_SHRUGS):
             at = joints[:, collar] + rotate(turn, arm)
             away = np.linalg.norm(wrist - at, axis=-1, keepdims=True)
@@ -599,9 +615,9 @@ def _shrug(
             aim = at + missing * normalised(wrist - at) - joints[:, collar]
             asked = rotation_between(arm, aim)
             turn = (
-                np.where(missing[..., None] > 0.0, _limited(asked, most), turn)
+                np.where(missing[..., None] > 0.0, _limited(asked, limit), turn)
                 if short
-                else _limited(asked, most)
+                else _limited(asked, limit)
             )
     frames[:, collar] = turn @ meant
 
@@ -615,8 +631,7 @@ def _standing(joints: np.ndarray) -> np.ndarray:
     )
     length = np.linalg.norm(knees - hips, axis=-1) + np.linalg.norm(ankles - knees, axis=-1)
     extended = (np.linalg.norm(ankles - hips, axis=-1) / length).max(axis=1)
-    x = np.clip((extended - _SEATED) / (_STANDS - _SEATED), 0.0, 1.0)
-    return x * x * (3.0 - 2.0 * x)
+    return smoothstep((extended - _SEATED) / (_STANDS - _SEATED))
 
 
 def _bend(source: Motion, limb: str, first: np.ndarray, target: np.ndarray) -> np.ndarray:

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from .rotations import normalised, rotate, transpose, yaw_matrix
-from .skeleton import joint
+from .skeleton import PELVIS, joint
 
 __all__ = [
     "RootPath",
+    "forward_of",
     "gaussian",
     "raw_root_from_joints",
     "root_from_joints",
@@ -23,6 +24,7 @@ __all__ = [
     "integrate",
     "to_root",
     "to_world",
+    "yaw_of",
     "AHEAD",
     "ahead",
 ]
@@ -31,6 +33,16 @@ POSITION_SIGMA, YAW_SIGMA = 3.0, 6.0
 _MAX_TURN = np.radians(15.0)
 AHEAD = (5, 10, 15, 20, 25, 30)
 """How far ahead the model is told of the root, in 30-fps frames."""
+
+
+def yaw_of(direction: np.ndarray) -> np.ndarray:
+    """Yaw (…) of directions (…, 2 or 3) over the floor; 0 looks along +y."""
+    return np.asarray(np.arctan2(-direction[..., 0], direction[..., 1]))
+
+
+def forward_of(yaw: np.ndarray | float) -> np.ndarray:
+    """Unit directions (…, 2) over the floor in which a yaw (…) looks."""
+    return np.stack([-np.sin(yaw), np.cos(yaw)], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -87,7 +99,7 @@ def _held_yaw(forward: np.ndarray, certainty: np.ndarray) -> np.ndarray:
     """Yaw of horizontal vectors; held where ``certainty`` is under 0.35, and limited to 15 degrees
     a frame.
     """
-    yaw = np.arctan2(-forward[:, 0], forward[:, 1])
+    yaw = yaw_of(forward)
     good = certainty > 0.35
     if not good.any():
         return np.zeros(len(yaw))
@@ -115,7 +127,7 @@ def raw_root_from_joints(joints: np.ndarray, floor: float = 0.0) -> RootPath:
         normalised(left_shoulder - right_shoulder) + normalised(left_hip - right_hip)
     )
     forward = np.cross(across, [0.0, 0.0, 1.0])
-    position = joints[:, 0].copy()
+    position = joints[:, PELVIS].copy()
     position[:, 2] = floor
     return RootPath(
         position.astype(float), _held_yaw(forward, np.linalg.norm(forward[:, :2], axis=-1))
@@ -135,7 +147,7 @@ def root_from_matrices(matrices: np.ndarray) -> tuple[RootPath, float]:
     forward = matrices[:, :3, 1]
     certainty = np.linalg.norm(normalised(forward)[:, :2], axis=-1)
     tilt = float(np.arccos(np.clip(up[:, 2], -1.0, 1.0)).max())
-    yaw = np.arctan2(-forward[:, 0], forward[:, 1])
+    yaw = yaw_of(forward)
     good = certainty > 0.1
     last = np.maximum.accumulate(np.where(good, np.arange(len(yaw)), -1))
     yaw = np.unwrap(yaw[np.where(last < 0, np.argmax(good), last)])

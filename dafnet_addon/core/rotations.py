@@ -16,7 +16,6 @@ __all__ = [
     "matrix_from_vector",
     "continuous_signs",
     "slerp",
-    "smoothstep",
 ]
 
 
@@ -139,9 +138,3 @@ def slerp(a: np.ndarray, b: np.ndarray, t: np.ndarray) -> np.ndarray:
     wa = np.where(near, 1 - t, np.sin((1 - t) * angle) / sine)
     wb = np.where(near, t, np.sin(t * angle) / sine)
     return normalised(wa * a + wb * b)
-
-
-def smoothstep(x: np.ndarray) -> np.ndarray:
-    """From 0 to 1 as ``x`` goes there, beginning and ending softly."""
-    x = np.clip(x, 0.0, 1.0)
-    return x * x * (3.0 - 2.0 * x)

@@ -16,7 +16,7 @@ from .backend import Array, Backend
 from .errors import InputError
 from .inputs import inputs_of, velocities_up_to
 from .network import DAFNET, CouplingNet, Part, System, load_network, unusable
-from .progress import drained, within
+from .progress import run_to_end, within
 from .series import smoothstep
 from .skeleton import POSE_SIZE, model_order, smpl_order
 from .threads import one_thread
@@ -160,7 +160,7 @@ class Sampler:
 
     def start(self, conditions: Conditions, takes: int = 1) -> None:
         """``start_steps``, run to its end."""
-        drained(self.start_steps(conditions, takes))
+        run_to_end(self.start_steps(conditions, takes))
 
     def start_steps(self, conditions: Conditions, takes: int = 1) -> Generator[float, None, None]:
         """Bring in the conditions of a whole shot and forget all memory; the past is the mean pose.

@@ -14,7 +14,7 @@ def smoothstep(x: np.ndarray) -> np.ndarray:
     return x * x * (3.0 - 2.0 * x)
 
 
-def runs(flags: np.ndarray, at_least: int = 1, gap: int = 0) -> list[tuple[int, int]]:
+def runs(flags: np.ndarray, at_least: float = 1, gap: float = 0) -> list[tuple[int, int]]:
     """The (start, stop) of runs of at least ``at_least`` frames in which the flags (T,) are set;
     stop is exclusive. Runs with no more than ``gap`` frames between them are one.
     """

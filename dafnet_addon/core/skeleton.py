@@ -30,6 +30,19 @@ __all__ = [
     "TOE_HEIGHT",
     "STATURE",
     "SEAT_TO_PELVIS",
+    "PELVIS",
+    "SPINE",
+    "NECK",
+    "HEAD",
+    "HIPS",
+    "KNEES",
+    "ANKLES",
+    "FEET",
+    "COLLARS",
+    "SHOULDERS",
+    "ELBOWS",
+    "WRISTS",
+    "LIMBS",
     "joint",
 ]
 
@@ -58,6 +71,37 @@ JOINTS = (
     "right_wrist",
 )
 PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19)
+_INDEX = {name: i for i, name in enumerate(JOINTS)}
+
+
+def joint(name: str) -> int:
+    """Index of a joint by its name in ``JOINTS``."""
+    return _INDEX[name]
+
+
+PELVIS = joint("pelvis")
+SPINE = [joint("spine1"), joint("spine2"), joint("spine3")]
+NECK = joint("neck")
+HEAD = joint("head")
+
+# Each the left one, then the right one; lists, which NumPy takes as an index.
+HIPS = [joint("left_hip"), joint("right_hip")]
+KNEES = [joint("left_knee"), joint("right_knee")]
+ANKLES = [joint("left_ankle"), joint("right_ankle")]
+FEET = [joint("left_foot"), joint("right_foot")]
+COLLARS = [joint("left_collar"), joint("right_collar")]
+SHOULDERS = [joint("left_shoulder"), joint("right_shoulder")]
+ELBOWS = [joint("left_elbow"), joint("right_elbow")]
+WRISTS = [joint("left_wrist"), joint("right_wrist")]
+
+LIMBS = {
+    "left_arm": (SHOULDERS[0], ELBOWS[0], WRISTS[0]),
+    "right_arm": (SHOULDERS[1], ELBOWS[1], WRISTS[1]),
+    "left_leg": (HIPS[0], KNEES[0], ANKLES[0]),
+    "right_leg": (HIPS[1], KNEES[1], ANKLES[1]),
+}
+"""First, middle and end joint of the limbs."""
+
 UPPER = (0, 3, 6, 9, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21)
 LOWER = (1, 2, 4, 5, 7, 8, 10, 11)
 MODEL_ORDER = UPPER + LOWER
@@ -93,14 +137,7 @@ def smpl_order(poses: np.ndarray) -> np.ndarray:
     return poses[..., _TO_SMPL_ORDER]
 
 
-END_EFFECTORS = {"head": 15, "hand_left": 20, "hand_right": 21}
-
-_INDEX = {name: i for i, name in enumerate(JOINTS)}
-
-
-def joint(name: str) -> int:
-    """Index of a joint by its name in ``JOINTS``."""
-    return _INDEX[name]
+END_EFFECTORS = {"head": HEAD, "hand_left": WRISTS[0], "hand_right": WRISTS[1]}
 
 
 def _swap(name: str) -> str:
@@ -132,7 +169,7 @@ _HALF = {  # parent to joint, left side written once; the rest pose is a T-pose
 
 
 def _offsets() -> np.ndarray:
-    table = np.zeros((22, 3))
+    table = np.zeros((len(JOINTS), 3))
     for name, offset in _HALF.items():
         table[joint(name)] = offset
         table[joint(_swap(name))] = (
@@ -155,9 +192,9 @@ SEAT_TO_PELVIS = 0.12
 
 
 def _rest() -> np.ndarray:
-    rest = np.zeros((22, 3))
-    rest[0] = (0, 0, STANDING_PELVIS)
-    for j in range(1, 22):
+    rest = np.zeros((len(JOINTS), 3))
+    rest[PELVIS] = (0, 0, STANDING_PELVIS)
+    for j in range(1, len(JOINTS)):
         rest[j] = rest[PARENTS[j]] + OFFSETS[j]
     return rest
 

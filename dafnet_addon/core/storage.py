@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from .checks import FARTHEST, MOST_FRAMES, inside, number, shaped, whole
+from .checks import FARTHEST, MAX_FRAMES, inside, number, shaped, whole
 from .conditions import PREROLL
 from .errors import InputError
 from .network import MAX_ACTIONS
@@ -31,7 +31,7 @@ __all__ = ["packed", "unpacked"]
 
 _VERSION = 1
 """Of the packing. What was packed before there were versions is packed so, too."""
-_MOST_WORDS, _MOST = 1 << 20, 1e30  # bytes of all that is no array; figures
+_MAX_WORDS, _MAX_FIGURE = 1 << 20, 1e30  # bytes of all that is not an array; figures
 _ROWS: dict[str, tuple[int, ...]] = {
     "controls.root": (4, 4),
     "controls.upper_body": (len(UPPER), 3),
@@ -46,7 +46,7 @@ _ROWS: dict[str, tuple[int, ...]] = {
 _FREE = {name for name in _ROWS if name.startswith("controls.") and name != "controls.root"}
 _LATER = {"take.unchanged"}
 """What takes that were packed before it was needed lack."""
-_MOST_HEADER = 256  # bytes
+_MAX_HEADER = 256  # bytes
 _HEADER = re.compile(
     rb"\x93NUMPY\x01\0..\{'descr': '([^']{1,20})', 'fortran_order': (True|False), 'shape': "
     rb"\(([\d, ]{0,80})\), \} *\n",
@@ -96,8 +96,8 @@ def _sayable(value: Any) -> Any:
 
 
 def unpacked(data: bytes) -> tuple[Take, Controls]:
-    """Inverse of ``packed``. Raises InputError, which names the field, where the bytes are no take
-    that can be used.
+    """Inverse of ``packed``. Raises InputError, which names the field, where the bytes are not a
+    take that can be used.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as file:
@@ -118,8 +118,8 @@ def unpacked(data: bytes) -> tuple[Take, Controls]:
 
 
 def _words(file: zipfile.ZipFile) -> dict[str, Any]:
-    """All that is no array."""
-    text = _array(file, "plain", "|u1", _MOST_WORDS).tobytes()
+    """All that is not an array."""
+    text = _array(file, "plain", "|u1", _MAX_WORDS).tobytes()
     try:
         said = read_json(text.decode())
     except ValueError as error:
@@ -132,9 +132,9 @@ def _words(file: zipfile.ZipFile) -> dict[str, Any]:
     return said
 
 
-def _array(file: zipfile.ZipFile, name: str, dtype: str, most: int) -> np.ndarray:
-    """An array of this type, of not more than ``most`` numbers: what claims to be larger is not
-    unpacked.
+def _array(file: zipfile.ZipFile, name: str, dtype: str, upper_bound: int) -> np.ndarray:
+    """An array of this type, of not more than ``upper_bound`` numbers: what claims to be larger is
+    not unpacked.
     """
     try:
         info = file.getinfo(f"{name}.npy")
@@ -143,12 +143,12 @@ def _array(file: zipfile.ZipFile, name: str, dtype: str, most: int) -> np.ndarra
     # others may claim gigabytes to begin with
     if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise InputError(f"'{name}' is compressed in another way")
-    if info.file_size > most * np.dtype(dtype).itemsize + _MOST_HEADER:
+    if info.file_size > upper_bound * np.dtype(dtype).itemsize + _MAX_HEADER:
         raise InputError(f"'{name}' is larger than the take's frames ask for")
     data = file.read(info)
     found = _HEADER.match(data)
     if found is None:
-        raise InputError(f"'{name}' is no array")
+        raise InputError(f"'{name}' is not an array")
     kind, first_fastest, sizes = (each.decode("latin-1") for each in found.groups())
     if kind != dtype:
         raise InputError(f"'{name}' holds {printable(kind, 20)}, not {dtype}")
@@ -163,10 +163,10 @@ def _arrays(file: zipfile.ZipFile, fps: float) -> dict[str, np.ndarray]:
     """All arrays by name, finite, each of the shape that the number of frames, ``fps`` a second,
     asks for.
     """
-    root, there = _array(file, "controls.root", "<f4", 16 * MOST_FRAMES), set(file.namelist())
-    frames = whole(root.size // 16, "the number of frames in 'controls.root'", 1, MOST_FRAMES)
+    root, there = _array(file, "controls.root", "<f4", 16 * MAX_FRAMES), set(file.namelist())
+    frames = whole(root.size // 16, "the number of frames in 'controls.root'", 1, MAX_FRAMES)
     made = whole(
-        covering_frames(frames, fps), "the number of frames in 'take.poses'", 1, MOST_FRAMES
+        covering_frames(frames, fps), "the number of frames in 'take.poses'", 1, MAX_FRAMES
     )
     wanted: dict[str, tuple[int, ...]] = {name: (frames, *row) for name, row in _ROWS.items()} | {
         "take.action": (frames, -1),
@@ -179,8 +179,8 @@ def _arrays(file: zipfile.ZipFile, fps: float) -> dict[str, np.ndarray]:
     arrays = {}
     for name, shape in wanted.items():
         if name not in _FREE | _LATER or f"{name}.npy" in there:
-            most = math.prod(longest[name] if size == -1 else size for size in shape)
-            found = shaped(_array(file, name, "<f4", most), f"'{name}'", shape)
+            upper_bound = math.prod(longest[name] if size == -1 else size for size in shape)
+            found = shaped(_array(file, name, "<f4", upper_bound), f"'{name}'", shape)
             arrays[name] = inside(found, f"'{name}'", FARTHEST, free=name in _FREE).astype(float)
     return arrays
 
@@ -197,7 +197,7 @@ def _take(said: dict[str, Any], arrays: dict[str, np.ndarray], fps: float) -> Ta
         if not isinstance(found, dict):
             raise InputError(f"'{name}' is {printable(found, 40)}")
         return {
-            key: None if value is None else number(value, f"'{name}'", -_MOST, _MOST)
+            key: None if value is None else number(value, f"'{name}'", -_MAX_FIGURE, _MAX_FIGURE)
             for key, value in found.items()
         }
 
@@ -220,7 +220,7 @@ def _take(said: dict[str, Any], arrays: dict[str, np.ndarray], fps: float) -> Ta
         unchanged=arrays.get("take.unchanged", np.zeros((0, 66))),
         log_likelihood=math.nan
         if likelihood is None
-        else number(likelihood, "'take.log_likelihood'", -_MOST, _MOST),
+        else number(likelihood, "'take.log_likelihood'", -_MAX_FIGURE, _MAX_FIGURE),
         raw_metrics=figures("take.raw_metrics"),
         metrics=figures("take.metrics"),
         seconds=seconds,

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from .checks import FARTHEST, MOST_FRAMES, inside, number, rotations, shaped
+from .checks import FARTHEST, MAX_FRAMES, inside, number, rotations, shaped
 from .errors import InputError
 from .resampling import covering_frames
 from .root import RootPath
@@ -40,7 +40,7 @@ class Controls:
 
     Lists will do for arrays. Raises InputError, which names the field, for what cannot be used:
     another shape, what is not a number, a rotation that is none, a mode that is unknown, more than
-    ``MOST_FRAMES`` frames.
+    ``MAX_FRAMES`` frames.
     """
 
     fps: float
@@ -67,7 +67,7 @@ class Controls:
         hold("blend", number(self.blend, "The blend", 0.0, _LONGEST_BLEND, "seconds"))
         hold("root", _checked_root(self.root))
         frames = len(self)
-        if max(frames, covering_frames(frames, self.fps)) > MOST_FRAMES:
+        if max(frames, covering_frames(frames, self.fps)) > MAX_FRAMES:
             raise InputError(
                 f"The root has {frames} frames at {self.fps:g} a second, more than a shot may "
                 "have; split it."

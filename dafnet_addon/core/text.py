@@ -14,16 +14,16 @@ _DEEPEST = 32  # lists and objects within each other
 _LONGEST = 18  # digits of a whole number
 
 
-def printable(words: object, most: int = 200) -> str:
-    """Text, a number or None on one line: at most ``most`` characters, and "…" for what is cut off;
-    of all else, its type.
+def printable(words: object, max_length: int = 200) -> str:
+    """Text, a number or None on one line: at most ``max_length`` characters, and "…" for what is
+    cut off; of all else, its type.
 
     What a terminal would obey instead of showing it (control characters, line ends, marks that turn
     the direction of writing, halves of characters) becomes its escape, such as ``\\x1b``.
     """
     text = words if isinstance(words, str) else _brief(words)
-    if len(text) > most:
-        text = text[:most] + "…"
+    if len(text) > max_length:
+        text = text[:max_length] + "…"
     return "".join(
         each if _is_shown(each) else each.encode("unicode_escape").decode("ascii") for each in text
     )
@@ -45,9 +45,9 @@ def _is_shown(character: str) -> bool:
 def read_json(text: str) -> Any:
     """What a JSON text says.
 
-    Raises ValueError, whose words go on from the text's name ("is not JSON"), for what is no JSON,
-    NaN and infinity, whole numbers of more than 18 digits, a name that comes twice in an object,
-    halves of characters, and what is nested over 32 deep.
+    Raises ValueError, whose words go on from the text's name ("is not JSON"), for what is not
+    JSON, for NaN and infinity, whole numbers of more than 18 digits, a name that comes twice in an
+    object, halves of characters, and what is nested over 32 deep.
     """
     try:
         found = json.loads(text, object_pairs_hook=_once, parse_int=_whole)

@@ -10,7 +10,8 @@ import numpy as np
 
 from .errors import InputError
 from .paths import AFTER_SEAT, Rest, Route, Stop, facing, walked_along
-from .root import RootPath, gaussian
+from .root import RootPath, forward_of, gaussian, yaw_of
+from .series import MODEL_FPS, runs, smoothstep
 
 __all__ = ["FASTEST", "SHORTEST", "SLOWEST", "followed", "trail"]
 
@@ -42,7 +43,7 @@ def trail(
     start: Stop | None = None,
     *,
     speed: float = 1.1,
-    fps: float = 30.0,
+    fps: float = MODEL_FPS,
     floor: float = 0.0,
     yaw: float | None = None,
     seconds: float = 1.0,
@@ -67,7 +68,7 @@ def trail(
         )
     if start is not None:
         origin = np.array(start.position)
-        ahead = origin + AFTER_SEAT * np.array([-np.sin(start.yaw), np.cos(start.yaw)])
+        ahead = origin + AFTER_SEAT * forward_of(start.yaw)
         points = np.concatenate([[origin, ahead] if start.seated else [origin], points])
     # Twice: the smoothing shortens corners, so its samples are no more evenly apart.
     curve, length = _even(points)
@@ -86,18 +87,10 @@ def trail(
     heading = np.concatenate(
         [np.full(before, begin.yaw), leg.yaw + turns, np.full(after, leg.yaw[-1] + turns)]
     )
-    last = len(heading) - 1
+    frames = len(heading)
     return Route(
-        RootPath(position, heading), (Rest(begin, 0, before - 1), Rest(end, last - after + 1, last))
+        RootPath(position, heading), (Rest(begin, 0, before), Rest(end, frames - after, frames))
     )
-
-
-def _runs(flags: np.ndarray, least: int) -> list[tuple[int, int]]:
-    """Ranges (first, end exclusive) of at least ``least`` frames in which the flags (T,) are
-    set.
-    """
-    edges = np.flatnonzero(np.diff(flags, prepend=False, append=False)).reshape(-1, 2)
-    return [(int(a), int(b)) for a, b in edges if b - a >= least]
 
 
 def _headings(
@@ -113,7 +106,7 @@ def _headings(
     if not moving.any():
         return np.full(frames, yaw)
     told = np.flatnonzero(moving & (np.linalg.norm(velocity, axis=1) > 1e-6))
-    heading = np.unwrap(np.arctan2(-velocity[told, 0], velocity[told, 1]))
+    heading = np.unwrap(yaw_of(velocity[told]))
     out = np.interp(np.arange(frames), told, heading)
     for a, b in stands:
         before = (
@@ -123,8 +116,8 @@ def _headings(
         )
         after = out[b] if b < frames else before
         needed = (0.6 + (_TURN_SECONDS - 0.6) * abs(after - before) / np.pi) * fps
-        u = np.clip((np.arange(a, b) - max(a, b - needed)) / max(min(needed, b - a), 1.0), 0.0, 1.0)
-        out[a:b] = before + u * u * (3.0 - 2.0 * u) * (after - before)
+        u = (np.arange(a, b) - max(a, b - needed)) / max(min(needed, b - a), 1.0)
+        out[a:b] = before + smoothstep(u) * (after - before)
     return out
 
 
@@ -145,7 +138,7 @@ def followed(positions: np.ndarray, fps: float, yaw: float = 0.0, floor: float =
         raise InputError("The object to follow hardly moves over the floor; choose one that does.")
     smooth = gaussian(positions, _SHAKE * fps)
     velocity = np.gradient(smooth, axis=0) * fps
-    stands = _runs(np.linalg.norm(velocity, axis=1) < _MOVES, max(2, round(_STANDS * fps)))
+    stands = runs(np.linalg.norm(velocity, axis=1) < _MOVES, max(2, round(_STANDS * fps)))
     for a, b in stands:
         # What is left there of the movement would be a creeping root under feet that stand.
         way = np.linspace(0.0, 1.0, b - a)[:, None] if a > 0 and b < len(smooth) else 0.0
@@ -160,9 +153,11 @@ def followed(positions: np.ndarray, fps: float, yaw: float = 0.0, floor: float =
     path = RootPath(np.c_[smooth, np.full(len(smooth), floor)], heading)
     rests = [
         Rest(
-            Stop((float(smooth[a, 0]), float(smooth[a, 1])), float(heading[a]), (b - a) / fps),
-            a,
-            b - 1,
+            place=Stop(
+                (float(smooth[a, 0]), float(smooth[a, 1])), float(heading[a]), (b - a) / fps
+            ),
+            start=a,
+            stop=b,
         )
         for a, b in stands
     ]

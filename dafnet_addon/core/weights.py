@@ -32,7 +32,7 @@ FORMAT = "dafnet-1"
 """Value of the metadata key ``format``; another one means other tensors."""
 
 # bytes; the paper's model in single precision is a quarter of that
-_MOST_HEADER, _MOST_FILE = 1 << 20, 1 << 29
+_MAX_HEADER, _MAX_FILE = 1 << 20, 1 << 29
 _SHOWN = 60  # characters of a name in a sentence
 _DTYPES = {
     "F64": "<f8",
@@ -110,13 +110,13 @@ def _parts(path: Path) -> tuple[bytes, bytes]:
     try:
         with path.open("rb") as file:
             size = file.seek(0, 2)
-            if size > _MOST_FILE:
+            if size > _MAX_FILE:
                 raise WeightsError(
                     f"The weights file '{path.name}' is larger than 512 MiB; choose another file."
                 )
             file.seek(0)
             length = int.from_bytes(file.read(8), "little")
-            if not 2 <= length <= min(size - 8, _MOST_HEADER):
+            if not 2 <= length <= min(size - 8, _MAX_HEADER):
                 raise _damaged(path, "its header's length is impossible")
             header, data = file.read(length), file.read(size - 8 - length)
     except OSError as error:
@@ -142,7 +142,7 @@ def _check_entry(path: Path, name: str, entry: object) -> None:
     if (
         not _are_counts(shape)
         or len(shape) > 8
-        or math.prod(size or 1 for size in shape) > _MOST_FILE
+        or math.prod(size or 1 for size in shape) > _MAX_FILE
     ):
         raise _damaged(path, f"'{name}' has an impossible shape")
     if not _are_counts(offsets) or len(offsets) != 2:
@@ -156,7 +156,7 @@ def _are_counts(values: Any) -> bool:
     not to us).
     """
     return isinstance(values, list) and all(
-        type(value) is int and 0 <= value <= _MOST_FILE for value in values
+        type(value) is int and 0 <= value <= _MAX_FILE for value in values
     )
 
 

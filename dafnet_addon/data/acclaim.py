@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from .recording import (
-    MOST_JOINTS,
+    MAX_JOINTS,
     Recording,
     check_size,
     posed,
@@ -94,8 +94,8 @@ def read_asf(file: Path) -> Skeleton:
     """The skeleton in an .asf file. Raises InputError where it is not whole."""
     text = text_of(file)
     try:
-        if len(text) > MOST_JOINTS * _PER_BONE:
-            raise ValueError("its skeleton is no body's")
+        if len(text) > MAX_JOINTS * _PER_BONE:
+            raise ValueError("its skeleton is not a body's")
         return _skeleton(_sections(text))
     except (KeyError, IndexError, ValueError) as error:
         raise InputError(

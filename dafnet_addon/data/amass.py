@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.rotations import matrix_from_vector
-from ..core.skeleton import JOINTS, PARENTS, REST
+from ..core.skeleton import JOINTS, PARENTS, PELVIS, REST
 from .archive import names_in, read_arrays
 from .recording import Recording, posed_in_blocks, sound
 
@@ -24,7 +24,7 @@ AMASS = {"poses", "trans"}
 _SIZES = {72: "SMPL", 156: "SMPL-H", 165: "SMPL-X"}
 _RATES = ("mocap_framerate", "mocap_frame_rate")
 # SMPL at rest: x to the body's left, y up, z forward
-_REST = REST[:, [0, 2, 1]] * (-1, 1, 1) - (0, REST[0, 2], 0)
+_REST = REST[:, [0, 2, 1]] * (-1, 1, 1) - (0, REST[PELVIS, 2], 0)
 
 
 def read_amass(file: Path) -> Recording:

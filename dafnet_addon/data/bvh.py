@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from .recording import (
-    MOST_JOINTS,
+    MAX_JOINTS,
     Recording,
     check_size,
     numbers_in,
@@ -98,8 +98,8 @@ def _parts(text: str) -> tuple[list[_Joint], int, float, np.ndarray]:
     times = _TIMES.match(text[motion.end() : motion.end() + _TIMES_WITHIN]) if motion else None
     if motion is None or times is None:
         raise ValueError("it has no MOTION with Frames and Frame Time")
-    if motion.start() > MOST_JOINTS * _PER_JOINT:
-        raise ValueError("its skeleton is no body's")
+    if motion.start() > MAX_JOINTS * _PER_JOINT:
+        raise ValueError("its skeleton is not a body's")
     announced, (step,) = int(times[1]), numbers_in(times[2])
     return (
         _hierarchy(text[: motion.start()]),

@@ -14,7 +14,7 @@ from ..core.errors import InputError
 from ..core.kinematics import two_bone
 from ..core.root import root_from_joints
 from ..core.rotations import frame_from, normalised, rotate, rotation_between, transpose
-from ..core.skeleton import OFFSETS, TOE_HEIGHT, joint
+from ..core.skeleton import OFFSETS, PELVIS, TOE_HEIGHT, joint
 from .mocap import Clip
 
 __all__ = ["Calibration", "calibrate", "canonical", "pose_legs", "LEG"]
@@ -82,7 +82,7 @@ def calibrate(clips: list[Clip]) -> Calibration:
     """
     pelvis, chest, head, pitch, ankles, legs = [], [], [], [], [], []
     collars: dict[str, list[np.ndarray]] = {"left_": [], "right_": []}
-    tallest = max(float(np.percentile(c.joints[:, 0, 2], 98)) for c in clips)
+    tallest = max(float(np.percentile(c.joints[:, PELVIS, 2], 98)) for c in clips)
     for clip in clips:
         j = clip.joints
         trunk = normalised(j[:, joint("neck")] - j[:, 0])

@@ -13,7 +13,8 @@ import numpy as np
 from ..core.kinematics import two_bone
 from ..core.root import root_from_joints, to_root
 from ..core.rotations import normalised, rotate, yaw_matrix
-from ..core.skeleton import SEAT_TO_PELVIS, joint
+from ..core.series import runs
+from ..core.skeleton import PELVIS, SEAT_TO_PELVIS, joint
 from .courses import AT_DESKS, course_through, drawing, lettering, wandering
 from .joins import (
     FEET,
@@ -43,7 +44,6 @@ from .pieces import (
     upper_bodies,
     ways_of,
 )
-from .uses import runs
 from .windows import Motion, mirrored
 
 __all__ = ["LEANS", "at_board", "at_top", "composed", "seated_work"]
@@ -78,7 +78,7 @@ def _to_and_from_seats(
     for sit in sits:
         each = 1 if sit.borrowed else 2
         path = root_from_joints(sit.joints)
-        seat = rotate(path.rotation[0].T, sit.joints[-1, 0] - path.position[0])[:2]
+        seat = rotate(path.rotation[0].T, sit.joints[-1, PELVIS] - path.position[0])[:2]
         down, up = sit.joints, sit.joints[::-1]
         for walk in ways_of(to, features_of(down)[0], seat, each):
             whole = joined(walk, down)
@@ -245,8 +245,8 @@ def _lying_down(motions: list[Motion]) -> list[np.ndarray]:
     found = []
     for m in (m for m in motions if m.category == "lying"):
         for joints in (m.joints, m.joints[::-1]):
-            trunk = normalised(joints[:, joint("neck")] - joints[:, 0])[:, 2]
-            low, face = joints[:, 0, 2] < 0.2, frames_of(joints)[1][:, 2, 1]
+            trunk = normalised(joints[:, joint("neck")] - joints[:, PELVIS])[:, 2]
+            low, face = joints[:, PELVIS, 2] < 0.2, frames_of(joints)[1][:, 2, 1]
             sits = np.flatnonzero(low & (trunk > 0.85))
             for start, _ in runs(low & (np.abs(trunk) < 0.35) & (face > 0.5), 30):
                 before = sits[(sits < start) & (sits > start - 60)]
@@ -302,7 +302,7 @@ def _lying(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed]:
     rng = np.random.default_rng(14)
     pieces = _lying_down(motions)
     for sit in (s for s in sits if pieces and not s.borrowed):
-        top = sit.joints[-1, 0, 2] - SEAT_TO_PELVIS
+        top = sit.joints[-1, PELVIS, 2] - SEAT_TO_PELVIS
         if top > _HIGHEST_BED:
             continue
         piece = pieces[rng.integers(len(pieces))]

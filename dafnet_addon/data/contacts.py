@@ -4,8 +4,8 @@ speed and duration.
 
 import numpy as np
 
-from ..core.skeleton import TOE_HEIGHT, joint
-from .uses import runs
+from ..core.series import MODEL_FPS, runs
+from ..core.skeleton import ANKLES, TOE_HEIGHT, joint
 
 __all__ = ["CONTACTS", "contacts"]
 
@@ -48,7 +48,7 @@ def contacts(joints: np.ndarray) -> np.ndarray:
     if len(joints) < 2:
         return out
     height = _median(joints[..., 2])
-    speed = _median(np.linalg.norm(np.gradient(joints, axis=0), axis=-1) * 30.0)
+    speed = _median(np.linalg.norm(np.gradient(joints, axis=0), axis=-1) * MODEL_FPS)
     for column, side in enumerate(("left_", "right_")):
         toe, ankle, elbow, wrist = (
             joint(side + part) for part in ("foot", "ankle", "elbow", "wrist")
@@ -60,7 +60,7 @@ def contacts(joints: np.ndarray) -> np.ndarray:
         hangs = drop > 0.85 * np.linalg.norm(joints[:, elbow] - joints[:, wrist], axis=-1)
         there = (height[:, wrist] > _AT_WORK[0]) & (height[:, wrist] < _AT_WORK[1])
         out[:, 2 + column] = _lasting((speed[:, wrist] < _HAND_SLOW) & there & ~hangs, _HAND_FRAMES)
-    pelvis, ankles = joint("pelvis"), [joint("left_ankle"), joint("right_ankle")]
+    pelvis, ankles = joint("pelvis"), ANKLES
     to_feet = joints[:, ankles].mean(1) - joints[:, pelvis]
     carried = (np.linalg.norm(to_feet[:, :2], axis=-1) > 0.15) | (to_feet[:, 2] > -0.2)
     low = (height[:, pelvis] < _PELVIS_LOW) & (speed[:, pelvis] < _PELVIS_SLOW)

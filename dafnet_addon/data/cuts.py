@@ -1,4 +1,4 @@
-"""Finds frames of captured motion that are no motion: T-poses, frozen or lost joints, flips,
+"""Finds frames of captured motion that are not motion: T-poses, frozen or lost joints, flips,
 impossible speeds.
 
 What is found is cut, never mended, and said with its reason.
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.rotations import normalised
+from ..core.series import MODEL_FPS, runs
 from ..core.skeleton import PARENTS, UPPER, joint
 
 __all__ = ["REASONS", "Cut", "bad_frames", "cuts"]
@@ -19,7 +20,6 @@ stand still for some frames and then jump, or leave their bone; a body turned by
 a frame; a joint faster than a body can.
 """
 
-_FPS = 30.0
 # metres a second: sprinting; a thrown hand or a kicking foot seen from the pelvis
 _FASTEST_ROOT, _FASTEST_LIMB = 9.0, 13.0
 _JUMP = 0.05  # metres in a frame, after joints stood still to the tenth of a millimetre
@@ -34,11 +34,6 @@ class Cut:
     start: int
     end: int
     reason: str
-
-
-def _runs(flags: np.ndarray) -> np.ndarray:
-    """(N, 2) start and end (exclusive) of the runs of True."""
-    return np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]]))).reshape(-1, 2)
 
 
 def _t_pose(joints: np.ndarray, limbs: np.ndarray) -> np.ndarray:
@@ -61,9 +56,11 @@ def _t_pose(joints: np.ndarray, limbs: np.ndarray) -> np.ndarray:
         ).sum(-1) > 0.85
         straight &= direction(side + "hip", side + "ankle")[:, 2] < -0.96
     level = (left[:, 2] > -0.6) & (right[:, 2] > -0.6) & (np.abs(left[:, 2] - right[:, 2]) < 0.25)
-    held = straight & level & (apart < -0.6) & (np.concatenate([limbs, limbs[-1:]]) * _FPS < 0.7)
+    held = (
+        straight & level & (apart < -0.6) & (np.concatenate([limbs, limbs[-1:]]) * MODEL_FPS < 0.7)
+    )
     out = np.zeros(len(joints), dtype=bool)
-    for start, end in _runs(straight & (apart < 0.0)):
+    for start, end in runs(straight & (apart < 0.0)):
         out[start:end] = held[start:end].sum() >= _T_POSE
     return out
 
@@ -74,7 +71,7 @@ def _dropout(joints: np.ndarray, step: np.ndarray) -> np.ndarray:
     # simply have rested. Planted feet stand quite still in cleaned motion, and leave the floor
     # fast.
     for j in UPPER:
-        for start, end in _runs(step[:, j] < 1e-4):
+        for start, end in runs(step[:, j] < 1e-4):
             jumps = max(
                 step[start - 1, j] if start else 0.0, step[end, j] if end < len(step) else 0.0
             )
@@ -105,7 +102,7 @@ def bad_frames(joints: np.ndarray) -> dict[str, np.ndarray]:
         return {reason: np.zeros(len(joints), dtype=bool) for reason in REASONS}
     step = np.linalg.norm(np.diff(joints, axis=0), axis=-1)
     limbs = np.linalg.norm(np.diff(joints - joints[:, :1], axis=0), axis=-1).max(1)
-    fast = (step[:, 0] * _FPS > _FASTEST_ROOT) | (limbs * _FPS > _FASTEST_LIMB)
+    fast = (step[:, 0] * MODEL_FPS > _FASTEST_ROOT) | (limbs * MODEL_FPS > _FASTEST_LIMB)
     flips = _flip(joints)
     return {
         "T-pose": _t_pose(joints, limbs),
@@ -122,6 +119,6 @@ def cuts(joints: np.ndarray) -> list[Cut]:
     found = [
         Cut(int(a), int(b), reason)
         for reason, bad in bad_frames(joints).items()
-        for a, b in _runs(bad)
+        for a, b in runs(bad)
     ]
     return sorted(found, key=lambda cut: (cut.start, cut.end))

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.root import RootPath
-from ..core.skeleton import joint
+from ..core.root import RootPath, forward_of
+from ..core.series import MODEL_FPS
+from ..core.skeleton import PELVIS, joint
 from .boxes import NO_BOXES, box, placed
 from .flesh import (
     FAR,
@@ -512,7 +513,7 @@ def _spare_desk(rng: np.random.Generator, rest: Rest, points: np.ndarray) -> np.
     ]
     desk = np.array(rows)
     desk[:, 0] += rng.uniform(-0.5, 0.5) * x
-    forward = np.array([-np.sin(rest.yaw), np.cos(rest.yaw)])
+    forward = forward_of(rest.yaw)
     gap = rng.uniform(0.01, 0.08)
     for distance in np.arange(0.2, 1.0, 0.08):
         candidate = placed(desk, rest.position[:2] + distance * forward, rest.yaw)
@@ -525,7 +526,7 @@ def _standing_place(path: RootPath) -> Rest | None:
     """Where a body is slowest, if it is slow there."""
     if len(path) < 2:
         return None
-    speed = np.linalg.norm(np.gradient(path.position, axis=0), axis=-1) * 30.0
+    speed = np.linalg.norm(np.gradient(path.position, axis=0), axis=-1) * MODEL_FPS
     slowest = int(np.argmin(speed))
     if speed[slowest] > _STANDS_BEFORE:
         return None
@@ -605,10 +606,12 @@ def _cut_off(joints: np.ndarray, beds: list[Use], rests: list[Rest]) -> bool:
     for end in (0, -1):
         ankles = (joints[end, joint("left_ankle")] + joints[end, joint("right_ankle")]) / 2
         low = (
-            _ON_THE_FLOOR < joints[end, 0, 2] < _HALF_DOWN
-            and np.linalg.norm((ankles - joints[end, 0])[:2]) > 0.15
+            _ON_THE_FLOOR < joints[end, PELVIS, 2] < _HALF_DOWN
+            and np.linalg.norm((ankles - joints[end, PELVIS])[:2]) > 0.15
         )
-        if low and all(np.linalg.norm((joints[end, 0] - place)[:2]) > _NEAR_BY for place in places):
+        if low and all(
+            np.linalg.norm((joints[end, PELVIS] - place)[:2]) > _NEAR_BY for place in places
+        ):
             return True
     return False
 

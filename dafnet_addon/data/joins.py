@@ -9,7 +9,8 @@ import numpy as np
 from ..core.kinematics import two_bone
 from ..core.root import root_from_joints
 from ..core.rotations import frame_from, normalised, rotate, transpose, yaw_matrix
-from ..core.skeleton import OFFSETS, PARENTS, REST, joint
+from ..core.series import MODEL_FPS
+from ..core.skeleton import COLLARS, HIPS, KNEES, NECK, OFFSETS, PARENTS, REST, SPINE, joint
 from .canonical import FOOT, pose_legs
 
 __all__ = [
@@ -38,10 +39,12 @@ LENGTHS = np.linalg.norm(OFFSETS, axis=1)
 
 def frames_of(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Frames (T, 3, 3) of pelvis and chest; the identity in the rest pose."""
+    left_hip, right_hip = (joints[:, j] for j in HIPS)
     pelvis = frame_from(
-        joints[:, 2] - joints[:, 1], joints[:, 3] - (joints[:, 1] + joints[:, 2]) / 2, "xz"
+        right_hip - left_hip, joints[:, SPINE[0]] - (left_hip + right_hip) / 2, "xz"
     )
-    chest = frame_from(joints[:, 14] - joints[:, 13], joints[:, 12] - joints[:, 9], "xz")
+    left_collar, right_collar = (joints[:, j] for j in COLLARS)
+    chest = frame_from(right_collar - left_collar, joints[:, NECK] - joints[:, SPINE[-1]], "xz")
     return pelvis, chest
 
 
@@ -116,7 +119,7 @@ def joined(first: np.ndarray, then: np.ndarray) -> np.ndarray:
         step = np.linalg.norm(
             np.diff(after[:, foot, :2], axis=0, prepend=after[:1, foot, :2]), axis=-1
         )
-        swing = np.cumsum(np.where(step * 30 > _SWINGS, step, 0.0))
+        swing = np.cumsum(np.where(step * MODEL_FPS > _SWINGS, step, 0.0))
         left = ease(swing / max(0.2, 2.5 * float(np.linalg.norm(offset[foot, :2]))))[:, None]
         for j in (ankle, foot):
             out[:, j, :2] = after[:, j, :2] + offset[j, :2] * left
@@ -138,13 +141,13 @@ def swayed(joints: np.ndarray, lean: np.ndarray, turn: np.ndarray) -> np.ndarray
     """
     yaw = root_from_joints(joints).yaw
     about = yaw_matrix(yaw + turn) @ _about_x(lean) @ yaw_matrix(-yaw)
-    middle = (joints[:, 1] + joints[:, 2]) / 2
+    middle = (joints[:, HIPS[0]] + joints[:, HIPS[1]]) / 2
     out = joints.copy()
     above = [j for j in range(22) if j not in _LEGS]
     out[:, above] = middle[:, None] + np.einsum(
         "tij,tbj->tbi", about, joints[:, above] - middle[:, None]
     )
-    knees = [joint("left_knee"), joint("right_knee")]
+    knees = KNEES
     out[:, knees] = middle[:, None] + np.einsum(
         "tij,tbj->tbi", yaw_matrix(turn / 2), joints[:, knees] - middle[:, None]
     )

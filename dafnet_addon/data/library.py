@@ -228,7 +228,7 @@ def _of_catalogue(
         turn = np.array(row.get("modelRotation", "1 0 0 0 1 0 0 0 1").split(), float).reshape(3, 3)
         model = row["model"].lstrip("/")
         if not model.lower().endswith(".obj"):
-            return f"'{title}' of '{file.name}' is no OBJ model"
+            return f"'{title}' of '{file.name}' is not an OBJ model"
         if archive.getinfo(model).file_size > _LARGEST:
             return f"'{title}' of '{file.name}' is larger than {_LARGEST >> 20} MB"
         vertices, triangles = _mesh_of(io.BytesIO(archive.read(model)), ".obj")

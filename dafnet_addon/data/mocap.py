@@ -107,7 +107,7 @@ def read_clips(folder: Path, left_out: list[str] | None = None) -> Iterator[Clip
                 raw[file.parent].append(file)
             elif left_out is not None and arrays & AMASS:
                 left_out.append(
-                    f"The archive '{file}' is no motion, since it lacks "
+                    f"The archive '{file}' is not a motion, since it lacks "
                     f"{', '.join(sorted(AMASS - arrays))}."
                 )
     for own in raw.values():
@@ -165,7 +165,7 @@ def _compact(file: Path, left_out: list[str] | None) -> Iterator[Clip]:
             name = str(info.get("clip", f"{file.stem} {i}"))
             if unit_of(joints, 1.0, file / name) != 1.0:
                 raise InputError(
-                    f"The body in '{file / name}' is no grown person's in metres; scale it."
+                    f"The body in '{file / name}' is not a grown person's in metres; scale it."
                 )
             yield _clip(name, file.stem, file.stem, {"split": "", **info}, joints)
 

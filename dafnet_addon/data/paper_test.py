@@ -36,7 +36,7 @@ from ..core.errors import InputError
 from ..core.metrics import body_points
 from ..core.root import RootPath, raw_root_from_joints, root_from_joints, velocities
 from ..core.rotations import normalised, rotate, yaw_matrix
-from ..core.skeleton import REST, SEAT_TO_PELVIS, joint
+from ..core.skeleton import ANKLES, FEET, PELVIS, REST, SEAT_TO_PELVIS, WRISTS, joint
 from .boxes import distances
 from .compose import LEANS, at_board, at_top, seated_work
 from .contacts import contacts
@@ -140,9 +140,7 @@ _ONE_SEAT = 0.25  # metres
 # metres of toes over the floor at least, and of bones in furniture at most
 _UNDER, _CUTS = -0.01, 0.01
 _SLIDES = 0.02  # metres that a standing foot moves in a frame at most
-_WRISTS = [joint("left_wrist"), joint("right_wrist")]
-_TOES = [joint("left_foot"), joint("right_foot")]
-_FEET = [*_TOES, joint("left_ankle"), joint("right_ankle")]
+_FEET = [*FEET, *ANKLES]
 _SEATED = {"seated_chair", "seated_table"}
 _GESTURES = _SEATED | {
     "standing_gesture",
@@ -320,7 +318,7 @@ def _candidates(
             place, directions = _BOARD, _TO_BOARDS
             if about.seat:
                 place, directions = (
-                    rotate(path.rotation[0].T, joints[-1, 0] - path.position[0])[:2],
+                    rotate(path.rotation[0].T, joints[-1, PELVIS] - path.position[0])[:2],
                     range(DIRECTIONS),
                 )
             for clip, at in matches_of(pool, features_of(joints)[0], place, _EACH, directions):
@@ -337,7 +335,7 @@ def _candidates(
                 if about.seat is None:
                     yield recipe | {"mirrored": bool(rng.random() < 0.5)}
                     continue
-                (low, high), source = about.seat, float(joints[-1, 0, 2]) - SEAT_TO_PELVIS
+                (low, high), source = about.seat, float(joints[-1, PELVIS, 2]) - SEAT_TO_PELVIS
                 if source < low - _RAISED:
                     break
                 seat = rng.uniform(low, max(low, min(high, source)))
@@ -389,10 +387,10 @@ def _desk_of(
     """A desk under the hands that work from frame ``works`` on, apart from the chair; None where
     none can be had.
     """
-    over = joints[works:, _WRISTS, 2] - top
+    over = joints[works:, WRISTS, 2] - top
     mostly = np.median(over, axis=0)
     hands = [
-        joints[works:, _WRISTS[i]] for i in range(2) if mostly[i] < _OVER and over[:, i].min() > 0.0
+        joints[works:, WRISTS[i]] for i in range(2) if mostly[i] < _OVER and over[:, i].min() > 0.0
     ]
     if not hands or ((mostly >= _OVER) & (mostly < _HOVERS)).any():
         return None
@@ -439,13 +437,13 @@ def _sound(joints: np.ndarray, boxes: np.ndarray) -> bool:
     stay out of the furniture.
     """
     stands = contacts(joints)[:, :2]
-    steps = np.linalg.norm(np.diff(joints[:, _TOES, :2], axis=0), axis=-1) * (
+    steps = np.linalg.norm(np.diff(joints[:, FEET, :2], axis=0), axis=-1) * (
         stands[1:] & stands[:-1]
     )
     inside = -distances(boxes, body_points(joints).reshape(-1, 3)).min()
     smooth = fluent(joints)[2:].all()  # the first frames have no speed before them
     return bool(
-        smooth and joints[:, _TOES, 2].min() > _UNDER and steps.max() < _SLIDES and inside < _CUTS
+        smooth and joints[:, FEET, 2].min() > _UNDER and steps.max() < _SLIDES and inside < _CUTS
     )
 
 

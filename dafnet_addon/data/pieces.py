@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..core.root import root_from_joints, to_root
+from ..core.root import root_from_joints, to_root, yaw_of
 from ..core.rotations import normalised, rotate, transpose
-from ..core.skeleton import joint
+from ..core.series import MODEL_FPS
+from ..core.skeleton import PELVIS, joint
 from .windows import COMPOSED, Motion, mirrored, motion_of
 
 __all__ = [
@@ -90,7 +91,7 @@ def fluent(joints: np.ndarray) -> np.ndarray:
     """
     step = np.diff(joints, axis=0, prepend=joints[:1])
     change = np.diff(step, axis=0, prepend=step[:1])
-    return (np.linalg.norm(step, axis=-1).max(1) * 30 < _FASTEST) & (
+    return (np.linalg.norm(step, axis=-1).max(1) * MODEL_FPS < _FASTEST) & (
         np.linalg.norm(change, axis=-1).max(1) * 900 < _HARDEST
     )
 
@@ -115,8 +116,8 @@ def entrance(joints: np.ndarray, rest_start: int) -> int | None:
     """The last frame before a rest in which the body stands still and upright; None where there is
     none.
     """
-    speed = np.linalg.norm(np.diff(joints, axis=0, prepend=joints[:1]), axis=-1).max(1) * 30
-    stands = np.flatnonzero((joints[:rest_start, 0, 2] > 0.9) & (speed[:rest_start] < 0.35))
+    speed = np.linalg.norm(np.diff(joints, axis=0, prepend=joints[:1]), axis=-1).max(1) * MODEL_FPS
+    stands = np.flatnonzero((joints[:rest_start, PELVIS, 2] > 0.9) & (speed[:rest_start] < 0.35))
     return int(stands[-1]) if len(stands) else None
 
 
@@ -182,7 +183,7 @@ def features_of(joints: np.ndarray) -> np.ndarray:
     places = to_root(path, joints)[:, _MATCHED]
     velocity = (
         rotate(transpose(path.rotation)[:, None], np.gradient(joints[:, _MATCHED], axis=0))
-        * 30
+        * MODEL_FPS
         * _SECONDS
     )
     return np.concatenate([places * _WEIGHTS, velocity * _WEIGHTS], axis=1).reshape(len(joints), -1)
@@ -221,7 +222,7 @@ def pool_of(
         for joints, mirror in ((m.joints, False), (mirrored(m.joints), True)):
             path = root_from_joints(joints)
             frames = np.arange(kept[0], len(joints) - kept[1], 2)
-            slow = np.linalg.norm(np.gradient(path.position, axis=0), axis=-1) * 30 < _SLOW
+            slow = np.linalg.norm(np.gradient(path.position, axis=0), axis=-1) * MODEL_FPS < _SLOW
             far = (
                 np.linalg.norm(path.position[frames + offsets[0]] - path.position[frames], axis=-1)
                 > _FAR
@@ -272,10 +273,7 @@ def matches_of(
     way = pool.tracks[like] - place
     clear = np.linalg.norm(way[:, :-2], axis=-1).min(1) > _CLEAR
     like, way = like[clear], way[clear]
-    sector = (
-        np.round(np.arctan2(-way[:, 0, 0], way[:, 0, 1]) / (2 * np.pi / DIRECTIONS)).astype(int)
-        % DIRECTIONS
-    )
+    sector = np.round(yaw_of(way[:, 0]) / (2 * np.pi / DIRECTIONS)).astype(int) % DIRECTIONS
     for direction in directions:
         used: set[int] = set()
         for clip, at in pool.rows[like[sector == direction]]:

@@ -20,7 +20,8 @@ import numpy as np
 from ..core.errors import InputError
 from ..core.files import save_text
 from ..core.rotations import frame_from, normalised
-from ..core.skeleton import OFFSETS, PARENTS
+from ..core.series import MODEL_FPS
+from ..core.skeleton import COLLARS, ELBOWS, NECK, OFFSETS, PARENTS, PELVIS, SPINE, WRISTS
 from .archive import read_arrays
 from .canonical import Calibration, calibrate, canonical
 from .compose import composed
@@ -97,7 +98,7 @@ _ONE_RIG = {"cmu_daz", "cmu_expmap", "cmu_fbx", "gazebo_actors", "snu_tiling", "
 _ARMS_RAISED = {"ui_prmd"}
 # of a sit-down: the one stands with borrowed arms, the other walks up to it
 _WEIGHT = {"ui_prmd": 0.35, "snu_tiling": 3.0}
-_ARMS = [18, 20, 19, 21]  # elbow and wrist, left then right
+_ARMS = [ELBOWS[0], WRISTS[0], ELBOWS[1], WRISTS[1]]  # elbow and wrist, left then right
 _SHARD, _SHARDS = 1000, 10_000  # seeds of shards are seed * _SHARDS + i
 _DRAWS = 2000  # in a row, of which none gives a window
 _FIT_TRIES = 60  # moments of each kind that are furnished for the report
@@ -142,7 +143,9 @@ def _unused(clips: Iterable[Clip]) -> list[str]:
 
 def _arm_directions(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Chest frames (T, 3, 3) and, in them, unit directions (T, 4, 3) of upper arms and forearms."""
-    chest = frame_from(joints[:, 12] - joints[:, 9], joints[:, 14] - joints[:, 13], "zx")
+    chest = frame_from(
+        joints[:, NECK] - joints[:, SPINE[-1]], joints[:, COLLARS[1]] - joints[:, COLLARS[0]], "zx"
+    )
     bones = normalised(joints[:, _ARMS] - joints[:, [PARENTS[j] for j in _ARMS]])
     return chest, np.einsum("tji,tbj->tbi", chest, bones)
 
@@ -151,7 +154,7 @@ def _with_arms(joints: np.ndarray, standing: np.ndarray, seated: np.ndarray) -> 
     """The motion with its arms hung as in one standing and one seated pose (22, 3), blended as the
     pelvis goes down.
     """
-    height = joints[:, 0, 2]
+    height = joints[:, PELVIS, 2]
     share = np.clip((height.max() - height) / max(float(np.ptp(height)), 0.05), 0.0, 1.0)[
         :, None, None
     ]
@@ -229,8 +232,8 @@ def _captured(motions: list[Motion]) -> dict[str, list[tuple[int, int, float]]]:
     found: dict[str, list[tuple[int, int, float]]] = defaultdict(list)
     for i, m in enumerate(motions):
         if m.category in _SIT:
-            height = m.joints[:, 0, 2]
-            moving = np.abs(np.gradient(height)) * 30 > 0.12
+            height = m.joints[:, PELVIS, 2]
+            moving = np.abs(np.gradient(height)) * MODEL_FPS > 0.12
             for rest in m.rests:
                 near = np.arange(max(0, rest.start - 75), min(len(height), rest.end + 75))
                 down = near[moving[near]]

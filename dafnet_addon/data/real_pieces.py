@@ -8,7 +8,7 @@ turned and shifted until the body's swept volume leaves it free.
 
 import numpy as np
 
-from ..core.root import RootPath
+from ..core.root import RootPath, forward_of
 from ..core.skeleton import SEAT_TO_PELVIS
 from .flesh import GIVES, LIES_SUNK, Furnishing, clearance, nearest_box, pressed, sunk
 from .rests import Rest
@@ -101,7 +101,7 @@ def seat_shape_for(
         seats = _drawn(rng, pieces)
         for place in range(_PLACES):
             number, seat = seats[rng.integers(len(seats))]
-            forward = np.array([-np.sin(seat.yaw), np.cos(seat.yaw)])
+            forward = forward_of(seat.yaw)
             right = np.array([forward[1], -forward[0]])
             room = max(0.0, seat.edge - _LEAST_BEFORE)
             ahead = min(rng.uniform(*_FROM_USUAL) + room * place / (_PLACES - 1), room)
@@ -168,7 +168,7 @@ def desk_shape_for(
     """A real desk or table, 2 to 5 cm under the lowest wrist that works on it, or None."""
     origin = use.points[:, :2].mean(0)
     _, ahead = across(use, origin)
-    away = np.array([-np.sin(use.yaw), np.cos(use.yaw)])
+    away = forward_of(use.yaw)
     top = float(use.points[:, 2].min()) - rng.uniform(*_UNDER_WRIST)
     # As one may sit on a table's edge from any side, one may work there.
     pieces: dict[str, list[tuple[int, Seat]]] = {}
@@ -180,7 +180,7 @@ def desk_shape_for(
         edges = pieces[sorted(pieces)[rng.integers(len(pieces))]]
         for place in range(_PLACES):
             number, edge = edges[rng.integers(len(edges))]
-            out = np.array([-np.sin(edge.yaw), np.cos(edge.yaw)])
+            out = forward_of(edge.yaw)
             aside = rng.uniform(-edge.aside, edge.aside)
             front = edge.position + edge.edge * out + aside * np.array([out[1], -out[0]])
             row = np.array([[number, *(-front), 0.0, top / edge.height]])

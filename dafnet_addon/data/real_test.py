@@ -22,6 +22,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.root import RootPath, raw_root_from_joints
+from ..core.skeleton import PELVIS
 from .flesh import Furnishing, probes
 from .held_out import HeldClip, fingerprint, frozen_text, held_out, is_frozen, test_motions
 from .library import Piece, read_library
@@ -126,7 +127,7 @@ def _on_piece(
     """One episode on one piece, or None where the body would cut it."""
     shape = bank.shapes[number]
     seat = shape.seats[0]
-    was = float(np.median(motion.joints[rest.start : rest.end, 0, 2]))
+    was = float(np.median(motion.joints[rest.start : rest.end, PELVIS, 2]))
     if abs(seat.pelvis - was) > _MOVED:
         return None
     joints = at_seat_height(motion.joints[first:end], was, seat.pelvis)
@@ -204,7 +205,9 @@ def _frozen_lying(
                         "raised": round(raised, 4),
                         "frames": len(joints),
                         "activity": "lie",
-                        "pelvis": round(float(np.median(joints[use.start : use.end, 0, 2])), 4),
+                        "pelvis": round(
+                            float(np.median(joints[use.start : use.end, PELVIS, 2])), 4
+                        ),
                         "rest": [use.start, use.end],
                         "fingerprint": fingerprint(joints),
                         "role": role,

@@ -15,7 +15,7 @@ from ..core.errors import InputError
 from ..core.rotations import rotate
 
 __all__ = [
-    "MOST_JOINTS",
+    "MAX_JOINTS",
     "Recording",
     "check_size",
     "numbers_in",
@@ -27,7 +27,7 @@ __all__ = [
     "text_of",
 ]
 
-MOST_JOINTS = 4096
+MAX_JOINTS = 4096
 """Of a skeleton that is read: faces, fingers and cloth have hundreds."""
 
 _LARGEST = 1e9  # of a number in a file; no way in millimetres is as long
@@ -107,11 +107,11 @@ def check_size(file: Path, frames: int, joints: int, numbers: int) -> None:
     """Raises InputError where so many joints and frames would take far more memory than the numbers
     that move them.
     """
-    if joints > MOST_JOINTS or frames * joints * 24 > _SPARE + 16 * numbers:
+    if joints > MAX_JOINTS or frames * joints * 24 > _SPARE + 16 * numbers:
         raise InputError(
             f"The file '{file}' has a skeleton of {joints} joints in {frames} frames, but only "
             f"{numbers} numbers that move it, "
-            "which is no body's; export the body's skeleton alone."
+            "which is not a body's; export the body's skeleton alone."
         )
 
 

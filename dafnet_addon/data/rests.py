@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.root import RootPath
-from ..core.skeleton import joint
-from .uses import runs
+from ..core.series import MODEL_FPS, runs
+from ..core.skeleton import PELVIS, joint
 
 __all__ = ["Rest", "rest_of", "resting"]
 
@@ -31,7 +31,10 @@ class Rest:
 def rest_of(joints: np.ndarray, path: RootPath, start: int, end: int) -> Rest:
     """The seated episode of a clip (T, 22, 3) in these frames."""
     return Rest(
-        start, end, np.median(joints[start:end, 0], axis=0), float(np.median(path.yaw[start:end]))
+        start,
+        end,
+        np.median(joints[start:end, PELVIS], axis=0),
+        float(np.median(path.yaw[start:end])),
     )
 
 
@@ -39,9 +42,9 @@ def resting(joints: np.ndarray, path: RootPath) -> list[Rest]:
     """Seated episodes of a clip (T, 22, 3): the pelvis low and still, the trunk upright, for a
     quarter of a second or more.
     """
-    pelvis = joints[:, 0]
+    pelvis = joints[:, PELVIS]
     speed = (
-        np.linalg.norm(np.gradient(pelvis, axis=0), axis=-1) * 30.0
+        np.linalg.norm(np.gradient(pelvis, axis=0), axis=-1) * MODEL_FPS
         if len(pelvis) > 2
         else np.zeros(len(pelvis))
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.kinematics import two_bone
 from ..core.rotations import normalised
-from ..core.skeleton import OFFSETS, REST, SEAT_TO_PELVIS, joint
+from ..core.skeleton import OFFSETS, PELVIS, REST, SEAT_TO_PELVIS, joint
 from .canonical import FOOT, LEG, SHIN, THIGH
 
 __all__ = ["at_seat_height"]
@@ -189,7 +189,7 @@ def at_seat_height(joints: np.ndarray, resting_pelvis: float, wanted: float) -> 
     to a higher one less, and as long as the seat does not carry it the upper body keeps its centre
     of mass over the feet as it was. Hands go with what they are near to. Bones keep their lengths.
     """
-    height = joints[:, 0, 2]
+    height = joints[:, PELVIS, 2]
     standing = max(_STANDING, resting_pelvis + 0.08)
     down = (standing - height) / (standing - resting_pelvis)
     share = _ramp(down)[:, None]
@@ -200,7 +200,7 @@ def at_seat_height(joints: np.ndarray, resting_pelvis: float, wanted: float) -> 
     heading = np.stack([right, np.cross(_UP, right), np.broadcast_to(_UP, right.shape)], axis=1)
     forward = heading[:, 1]
 
-    trunk = joints[:, _NECK] - joints[:, 0]
+    trunk = joints[:, _NECK] - joints[:, PELVIS]
     lean = np.arctan2((trunk * forward).sum(-1), trunk[:, 2])
     on_the_way = np.minimum(2.0 * _smoothed(((down > 0.1) & (down < 0.85)).astype(float)), 1.0)
     gain = np.clip(1.0 + _LEAN * (resting_pelvis - wanted), *_GAIN) - 1.0

@@ -71,7 +71,7 @@ _SEAT_NUMBERS = 8
 _STEP = (FARTHEST - DEEPEST) / 255.0
 _FLOOR = np.array([0.0, 0.0, 1.0, 0.0])
 _SIDES_TO_COME_FROM = np.array([(0.0, -3.0), (3.0, 0.0), (0.0, 3.0), (-3.0, 0.0)])
-_NARROWEST = 0.3  # metres across: a table fan is no table
+_NARROWEST = 0.3  # metres across: a table fan is not a table
 _SAME_WAY = np.cos(np.radians(20.0))
 # what carries the hips: half sizes of a patch, how near a surface is under it, and how much of it
 _PATCH, _UNDER_IT, _CARRIED = (0.1, 0.08), 0.03, 0.5

@@ -15,7 +15,8 @@ import numpy as np
 from ..core.files import whole_file
 from ..core.root import root_from_joints
 from ..core.rotations import normalised, rotate, yaw_matrix
-from ..core.skeleton import PARENTS, joint
+from ..core.series import MODEL_FPS
+from ..core.skeleton import PARENTS, PELVIS, joint
 from .flesh import Furnishing
 from .picture import picture
 
@@ -156,7 +157,7 @@ def _plan(
     """The pelvis' path from above, with hips, shoulders and facing at the frames shown, and a bar
     of one metre.
     """
-    path = joints[:, 0, :2]
+    path = joints[:, PELVIS, :2]
     middle = (path.min(0) + path.max(0)) / 2
     reach = max(float(np.ptp(path, axis=0).max()) / 2 + 0.55, 0.8)
     scale = min(cell[2], cell[3] - _BELOW) / (2 * reach)
@@ -238,7 +239,7 @@ def sheet(
             ax.text(
                 (c + 0.5) * _WIDTH,
                 bottom + 0.04,
-                f"{frame / 30:.1f} s",
+                f"{frame / MODEL_FPS:.1f} s",
                 ha="center",
                 va="bottom",
                 fontsize=6,

@@ -50,7 +50,7 @@ def _pattern(name: str) -> re.Pattern[str]:
 
 
 def _csv_rows(text: str) -> list[tuple[str, dict[str, Any]]]:
-    """Raises ValueError or csv.Error where the text is no table with a column 'file'."""
+    """Raises ValueError or csv.Error where the text is not a table with a column 'file'."""
     heading = text.split("\n", 1)[0]
     table = csv.DictReader(StringIO(text, newline=""), delimiter=max(",;\t", key=heading.count))
     table.fieldnames = [name.strip().lower() for name in table.fieldnames or ()]

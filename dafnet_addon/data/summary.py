@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from ..core.series import MODEL_FPS
 from .cuts import REASONS, bad_frames
 from .mocap import UNSTATED, Clip
 
@@ -14,7 +15,7 @@ __all__ = ["summary"]
 
 _Key = tuple[str, str, str, str, str]  # source, subject, activity, split, licence
 
-_MINUTE = 30 * 60
+_MINUTE = round(60 * MODEL_FPS)
 
 
 def summary(clips: Iterable[Clip], left_out: Sequence[str] = ()) -> str:

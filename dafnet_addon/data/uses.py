@@ -8,21 +8,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.root import RootPath, to_root
+from ..core.root import RootPath, forward_of, to_root
 from ..core.rotations import normalised
-from ..core.skeleton import joint
+from ..core.series import MODEL_FPS, runs
+from ..core.skeleton import ANKLES, ELBOWS, KNEES, SHOULDERS, WRISTS, joint
 
-__all__ = ["Use", "across", "lying", "working", "stroking", "reaching", "runs"]
+__all__ = ["Use", "across", "lying", "working", "stroking", "reaching"]
 
 _PELVIS, _CHEST, _NECK = joint("pelvis"), joint("spine3"), joint("neck")
-_SHOULDERS = [joint("left_shoulder"), joint("right_shoulder")]
-_ELBOWS = [joint("left_elbow"), joint("right_elbow")]
-_WRISTS = [joint("left_wrist"), joint("right_wrist")]
 _KNEES, _ANKLES = (
-    [joint("left_knee"), joint("right_knee")],
-    [joint("left_ankle"), joint("right_ankle")],
+    KNEES,
+    ANKLES,
 )
-_SECOND = 30
+_SECOND = round(MODEL_FPS)
 _SHORT = 8
 _OFF_THE_FLOOR = 0.25
 _ONE_TOP = 0.08  # hands at heights that differ by less may share a table
@@ -52,21 +50,11 @@ def across(use: Use, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return offset @ (c, s), offset @ (-s, c)
 
 
-def runs(flags: np.ndarray, shortest: int = 1) -> list[tuple[int, int]]:
-    """Start and end (exclusive) of every run of true frames that lasts ``shortest`` frames or
-    more.
-    """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [
-        (int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= shortest
-    ]
-
-
 def _speed(points: np.ndarray) -> np.ndarray:
     """Metres per second of points (T, …, 3)."""
     if len(points) < 2:
         return np.zeros(points.shape[:-1])
-    return np.linalg.norm(np.gradient(points, axis=0), axis=-1) * 30.0
+    return np.linalg.norm(np.gradient(points, axis=0), axis=-1) * MODEL_FPS
 
 
 def _over_a_second(values: np.ndarray) -> np.ndarray:
@@ -129,9 +117,9 @@ def working(joints: np.ndarray, path: RootPath) -> list[Use]:
     frames = len(joints)
     if frames < _SECOND:
         return []
-    local = to_root(path, joints[:, _WRISTS])
-    forearm = normalised(joints[:, _WRISTS] - joints[:, _ELBOWS])[..., 2]
-    height = joints[:, _WRISTS, 2]
+    local = to_root(path, joints[:, WRISTS])
+    forearm = normalised(joints[:, WRISTS] - joints[:, ELBOWS])[..., 2]
+    height = joints[:, WRISTS, 2]
     stays = _speed(path.position[:, :2]) < 0.25
     # Arms that hang are steep and beside the body; folded or raised ones rise from the elbow.
     level = (forearm > np.where(local[..., 1] > 0.2, -0.95, -0.75)) & (forearm < 0.45)
@@ -141,7 +129,7 @@ def working(joints: np.ndarray, path: RootPath) -> list[Use]:
     tops: list[list[tuple[int, int, np.ndarray]]] = []
     for hand in (0, 1):
         for a, b in runs(_within(seconds[:, hand], frames)):
-            part = a, b, joints[a:b, _WRISTS[hand]]
+            part = a, b, joints[a:b, WRISTS[hand]]
             for top in tops:
                 _, _, other = top[0]
                 if abs(other[:, 2].min() - part[2][:, 2].min()) < _ONE_TOP and (
@@ -157,9 +145,7 @@ def working(joints: np.ndarray, path: RootPath) -> list[Use]:
         wrists = np.concatenate([w for _, _, w in top])
         away = np.concatenate([w[:, :2] - joints[a:b, _PELVIS, :2] for a, b, w in top])
         # A table stands square to the body, not to the hand that reaches across it.
-        heading = np.concatenate(
-            [np.c_[-np.sin(path.yaw[a:b]), np.cos(path.yaw[a:b])] for a, b, _ in top]
-        )
+        heading = np.concatenate([forward_of(path.yaw[a:b]) for a, b, _ in top])
         found.append(
             Use(
                 "desk",
@@ -179,11 +165,11 @@ def stroking(joints: np.ndarray, path: RootPath) -> list[Use]:
     frames = len(joints)
     if frames < _SECOND:
         return []
-    local = to_root(path, joints[:, _WRISTS])
+    local = to_root(path, joints[:, WRISTS])
     stays = _speed(path.position[:, :2]) < 0.45
-    moves = _speed(joints[:, _WRISTS]) > 0.05
+    moves = _speed(joints[:, WRISTS]) > 0.05
     found = []
-    for hand, wrist in enumerate(_WRISTS):
+    for hand, wrist in enumerate(WRISTS):
         high = (
             (joints[:, wrist, 2] > 0.95)
             & (joints[:, wrist, 2] < 1.9)
@@ -197,7 +183,7 @@ def stroking(joints: np.ndarray, path: RootPath) -> list[Use]:
             forward = np.array([-np.sin(path.yaw[a:b]).mean(), np.cos(path.yaw[a:b]).mean()])
             if normal @ forward < 0:
                 normal = -normal
-            reach = float(((points - joints[a:b, _SHOULDERS[hand]])[:, :2] @ normal).mean())
+            reach = float(((points - joints[a:b, SHOULDERS[hand]])[:, :2] @ normal).mean())
             if (
                 thickness < 0.06
                 and extent > max(0.15, 3 * thickness)
@@ -224,7 +210,7 @@ def reaching(joints: np.ndarray, path: RootPath) -> list[Use]:
     """
     if len(joints) < _SHORT:
         return []
-    wrists, shoulders = joints[:, _WRISTS], joints[:, _SHOULDERS]
+    wrists, shoulders = joints[:, WRISTS], joints[:, SHOULDERS]
     arm = wrists - shoulders
     stretched = np.linalg.norm(arm, axis=-1) > 0.42
     out = np.linalg.norm(arm[..., :2], axis=-1) > 0.25
@@ -246,7 +232,7 @@ def reaching(joints: np.ndarray, path: RootPath) -> list[Use]:
             if b - a > 2 * _SECOND or around.max() < 0.5:
                 continue
             points = wrists[a:b, hand]
-            heading = np.c_[-np.sin(path.yaw[a:b]), np.cos(path.yaw[a:b])]
+            heading = forward_of(path.yaw[a:b])
             found.append(
                 Use("shelf", a, b, points, _away(heading + 0.5 * normalised(arm[a:b, hand, :2])))
             )

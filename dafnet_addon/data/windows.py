@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.root import RootPath, ahead, root_from_joints, smoothed, to_root, velocities
-from ..core.skeleton import MIRROR, joint
+from ..core.series import MODEL_FPS
+from ..core.skeleton import MIRROR, PELVIS, joint
 from .boxes import near
 from .cuts import bad_frames
 from .flesh import NO_BANK
@@ -83,7 +84,7 @@ def _usable(joints: np.ndarray) -> np.ndarray:
     airborne = (
         np.minimum(joints[:, joint("left_foot"), 2], joints[:, joint("right_foot"), 2]) > 0.22
     )
-    airborne &= joints[:, joint("neck"), 2] - joints[:, 0, 2] > 0.35
+    airborne &= joints[:, joint("neck"), 2] - joints[:, PELVIS, 2] > 0.35
     return ~np.any([airborne, *bad_frames(joints).values()], axis=0)
 
 
@@ -93,7 +94,7 @@ def _held(joints: np.ndarray, valid: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """
     if len(joints) < 3:
         return joints, valid
-    speed = np.linalg.norm(np.diff(joints, axis=0), axis=-1).max(1) * 30
+    speed = np.linalg.norm(np.diff(joints, axis=0), axis=-1).max(1) * MODEL_FPS
     before = _HOLD * bool(speed[:3].max() < 0.35)
     after = _HOLD * bool(speed[-3:].max() < 0.35)
     frames = np.clip(np.arange(-before, len(joints) + after), 0, len(joints) - 1)

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.resampling import MODEL_FPS, frame_times, resample_positions
-from ..core.skeleton import TOE_HEIGHT, joint
+from ..core.resampling import frame_times, resample_positions
+from ..core.series import MODEL_FPS
+from ..core.skeleton import ANKLES, FEET, PELVIS, TOE_HEIGHT, joint
 
 __all__ = ["unit_of", "uprightness", "z_up", "floor_height", "at_model_rate"]
 
@@ -23,8 +24,6 @@ _UNITS = {  # the third is CMU's and HDM05's
 # hip to ankle of a grown body, metres; what units are told apart by
 _LEG, _SHORTEST, _LONGEST = 0.85, 0.57, 1.25
 _LEGS = [[joint(s + n) for n in ("hip", "knee", "ankle")] for s in ("left_", "right_")]
-_ANKLES = [joint("left_ankle"), joint("right_ankle")]
-_TOES = [joint("left_foot"), joint("right_foot")]
 
 
 def unit_of(joints: np.ndarray, stated: float | None, file: Path) -> float:
@@ -40,7 +39,7 @@ def unit_of(joints: np.ndarray, stated: float | None, file: Path) -> float:
     nearest = min(_UNITS.values(), key=lambda unit: abs(np.log(max(leg, 1e-12) * unit / _LEG)))
     if not _SHORTEST <= leg * nearest <= _LONGEST:
         raise InputError(
-            f"The body in '{file}' has legs of {leg:.4g} units, which is no grown person's in "
+            f"The body in '{file}' has legs of {leg:.4g} units, which is not a grown person's in "
             f"{', '.join(_UNITS)}; "
             "scale the file to metres."
         )
@@ -57,11 +56,11 @@ def uprightness(joints: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """
 
     def standing(pose: np.ndarray) -> np.ndarray:
-        span = pose[:, joint("head")] - pose[:, _ANKLES].mean(1)
+        span = pose[:, joint("head")] - pose[:, ANKLES].mean(1)
         return span[:, 1:] > 0.85 * np.linalg.norm(span, axis=-1, keepdims=True)
 
     leg = float(np.median(np.linalg.norm(np.diff(joints[:, _LEGS], axis=2), axis=-1).sum(-1)))
-    step = np.abs(np.diff(joints[:, 0], axis=0, prepend=joints[:1, 0])) / max(leg, 1e-12)
+    step = np.abs(np.diff(joints[:, PELVIS], axis=0, prepend=joints[:1, PELVIS])) / max(leg, 1e-12)
     travel = np.stack([np.hypot(step[:, 0], step[:, 2]), np.hypot(step[:, 0], step[:, 1])], -1)
     return (standing(joints) * (travel + 5e-4)).sum(0) + standing(rest[None])[0]
 
@@ -79,7 +78,7 @@ def floor_height(joints: np.ndarray) -> float:
     none such: nothing of it is under the floor. (Elsewhere that does not hold: captured hands that
     push off the floor may lie 20 cm in it.)
     """
-    toes = joints[:, _TOES]
+    toes = joints[:, FEET]
     speed = (
         np.linalg.norm(np.gradient(toes, axis=0), axis=-1) * MODEL_FPS
         if len(joints) > 1

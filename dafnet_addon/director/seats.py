@@ -7,13 +7,14 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.nearby import extent
+from ..core.paths import facing
 from ..core.solids import Box, Mesh
 from .surfaces import HeightField, height_field, surface_points
 
 __all__ = ["SeatPlace", "on_a_seat", "seat_of"]
 
 _CELL = 0.03
-# metres over the floor: of seats; what is higher is no part of one
+# metres over the floor: of seats; what is higher is not part of one
 _LOWEST, _HIGHEST, _OVERHEAD = 0.22, 0.85, 1.5
 _FLAT, _BACK = 0.05, 0.15  # metres over the seat: of what still is seat; of a back or an arm
 _LEAST = 0.035  # square metres
@@ -96,7 +97,7 @@ def _shrunk(mask: np.ndarray, reach: int) -> np.ndarray:
 
 def _roomy(mask: np.ndarray, reach: int) -> np.ndarray:
     """The cells (X, Y) of squares that fit into the mask; slits of one or two cells in it, as
-    between slats, are no gap.
+    between slats, do not count as gaps.
     """
     closed = ~_shrunk(~np.pad(mask, 1), 1)[1:-1, 1:-1] if mask.any() else mask
     return ~_shrunk(~_shrunk(closed, reach), reach) & mask
@@ -238,5 +239,5 @@ def seat_of(
     else:
         at = max(0.5 * (low + high), high - _FROM_EDGE)
     position = at * forward + aside * np.array([forward[1], -forward[0]])
-    yaw = float(np.arctan2(-forward[0], forward[1]))
+    yaw = facing(forward)
     return SeatPlace(position, yaw, floor + level, back, room, high - at)

@@ -13,7 +13,7 @@ from ..core.solids import Box, Mesh
 
 __all__ = ["HeightField", "height_field", "surface_points"]
 
-_MOST = 4_000_000  # points; larger furniture is sampled more coarsely
+_MAX_POINTS = 4_000_000  # points; larger furniture is sampled more coarsely
 _CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _FACES = np.array(
     [
@@ -81,7 +81,7 @@ def surface_points(
         return np.zeros((0, 3))
     longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(1)
     parts = np.maximum(1, np.ceil(longest / spacing)).astype(int)
-    coarser = np.sqrt(max(1.0, float((parts.astype(float) ** 2 / 2).sum()) / _MOST))
+    coarser = np.sqrt(max(1.0, float((parts.astype(float) ** 2 / 2).sum()) / _MAX_POINTS))
     parts = np.maximum(1, np.ceil(parts / coarser)).astype(int)
     found = []
     for n in np.unique(parts):

@@ -10,6 +10,8 @@ import numpy as np
 from ..core.errors import InputError
 from ..core.nearby import extent
 from ..core.paths import AFTER_SEAT, BEFORE_SEAT, Route, Stop, route
+from ..core.root import forward_of
+from ..core.series import MODEL_FPS
 from ..core.solids import Box, Mesh
 from .surfaces import HeightField, height_field, surface_points
 
@@ -63,7 +65,7 @@ def _search(
     wall = bytes(closed)
     first, last = ((cell[0] + 1) * width + cell[1] + 1 for cell in (start, goal))
     steps = [(i * width + j, i * width, j, float(np.hypot(i, j))) for i, j in _NEIGHBOURS]
-    if not _joined(walls, first, last):
+    if not _connected(walls, first, last):
         return None
     cost: dict[int, float] = {first: 0.0}
     came: dict[int, int] = {}
@@ -90,7 +92,7 @@ def _search(
     return None
 
 
-def _joined(walls: np.ndarray, first: int, last: int) -> bool:
+def _connected(walls: np.ndarray, first: int, last: int) -> bool:
     """Whether there is a way at all: a wave over the free cells finds out in no time, where the
     search would try them all.
     """
@@ -170,7 +172,7 @@ def walk_to(
     start: Stop,
     goal: Stop,
     speed: float = 1.1,
-    fps: float = 30.0,
+    fps: float = MODEL_FPS,
     floor: float = 0.0,
     size: float = 1.0,
 ) -> Route:
@@ -205,5 +207,4 @@ def around(places: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 def _ahead(stop: Stop, metres: float) -> np.ndarray:
     """Where (2,) one is on the way to or from a stop: before a seat, else at the stop itself."""
-    forward = np.array([-np.sin(stop.yaw), np.cos(stop.yaw)])
-    return np.array(stop.position) + (metres if stop.seated else 0.0) * forward
+    return np.array(stop.position) + (metres if stop.seated else 0.0) * forward_of(stop.yaw)

@@ -104,7 +104,8 @@ class Checkpoint:
                 words = file.metadata() or {}
                 if words.get("format") != _FORMAT:
                     raise InputError(
-                        f"'{path}' is no checkpoint of this version; train anew in another folder."
+                        f"'{path}' is not a checkpoint of this version; "
+                        "train anew in another folder."
                     )
                 tensors = {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
         except (OSError, SafetensorError) as error:
@@ -114,7 +115,7 @@ class Checkpoint:
         except ValueError as error:
             raise _refused(path, f"its state {error}") from None
         if not isinstance(state, dict):
-            raise _refused(path, "its state is no object")
+            raise _refused(path, "its state is not an object")
         return Checkpoint(path, tensors, state)
 
     def refused(self, what: str) -> InputError:

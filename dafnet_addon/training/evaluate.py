@@ -32,10 +32,11 @@ from ..core.metrics import (
     skate,
 )
 from ..core.occupancy import distance
-from ..core.progress import drained
-from ..core.root import to_world
+from ..core.progress import run_to_end
+from ..core.root import forward_of, to_world
 from ..core.sampler import Sampler
-from ..core.skeleton import END_EFFECTORS, LOWER, POSE_SIZE, STATURE, UPPER, joint
+from ..core.series import MODEL_FPS
+from ..core.skeleton import END_EFFECTORS, FEET, LOWER, PELVIS, POSE_SIZE, STATURE, UPPER
 from ..core.solids import Scene
 from ..core.take import MODES, Controls
 from ..core.threads import one_thread
@@ -115,7 +116,7 @@ def shot_of(clip: HeldClip, mode: str, scene: Scene | None = None) -> Shot:
     """
     targets = {effector: clip.joints[:, j] for effector, j in END_EFFECTORS.items()}
     controls = Controls(
-        fps=30.0,
+        fps=MODEL_FPS,
         root=clip.path.matrices(),
         mode=mode,
         head=targets["head"],
@@ -123,14 +124,14 @@ def shot_of(clip: HeldClip, mode: str, scene: Scene | None = None) -> Shot:
         hand_right=targets["hand_right"],
         upper_body=clip.joints[:, list(UPPER)],
     )
-    return drained(shot_steps(clip.scene if scene is None else scene, controls))
+    return run_to_end(shot_steps(clip.scene if scene is None else scene, controls))
 
 
 def made(sampler: Sampler, shot: Shot, noise: np.ndarray) -> np.ndarray:
     """Takes (S, T, 22, 3) of noise (T, S, 66), or (S, 66) where it is held: world joints on
     constant bones, as the model gives them.
     """
-    poses = drained(sampler.run(shot.conditions, noise)).poses
+    poses = run_to_end(sampler.run(shot.conditions, noise)).poses
     takes = []
     for s in range(poses.shape[1]):
         takes.append(on_bones(to_world(shot.path, poses[PREROLL:, s].reshape(-1, 22, 3))))
@@ -150,22 +151,25 @@ def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
     flat = takes.reshape(-1, 22, 3)
     reach = partial(distance, clip.scene, floor=0.0)
     targets = {name: np.tile(clip.joints[:, j], (count, 1)) for name, j in END_EFFECTORS.items()}
-    toes = flat[:, [joint("left_foot"), joint("right_foot")], 2]
+    toes = flat[:, FEET, 2]
     points = reach(body_points(flat))
     upper = np.linalg.norm(takes[:, :, UPPER] - clip.joints[:, UPPER], axis=-1)
-    standing = clip.joints[:, 0, 2] > _STANDING
+    standing = clip.joints[:, PELVIS, 2] > _STANDING
     weight = float(count * frames)
 
     def each(measure: Callable[[np.ndarray], float]) -> float:
         return float(sum(measure(take) for take in takes)) * frames
 
     sums = {
-        "foot_sliding_per_frame": (each(lambda j: float(foot_sliding(j, 30.0).mean())), weight),
-        "foot_sliding_4mm_s": (
-            each(lambda j: float(foot_sliding(j, 30.0, per_frame=False).mean())),
+        "foot_sliding_per_frame": (
+            each(lambda j: float(foot_sliding(j, MODEL_FPS).mean())),
             weight,
         ),
-        "skate_cm": (each(lambda j: skate(j, 30.0)), weight),
+        "foot_sliding_4mm_s": (
+            each(lambda j: float(foot_sliding(j, MODEL_FPS, per_frame=False).mean())),
+            weight,
+        ),
+        "skate_cm": (each(lambda j: skate(j, MODEL_FPS)), weight),
         "bad_collisions_per_frame": (
             float(bad_collisions(reach(flat[:, list(BAD_COLLISION_JOINTS)])).sum()),
             weight,
@@ -174,7 +178,7 @@ def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
         "penetrates": (float((points < -_DEEP).any(1).sum()), weight),
         "penetration_deepest": (float(np.maximum(-points.min(1), 0.0).sum()), weight),
         "end_effector_error": (end_effector_distance(flat, targets) * weight, weight),
-        "jerk": (each(lambda j: jerk(j, 30.0)), weight),
+        "jerk": (each(lambda j: jerk(j, MODEL_FPS)), weight),
         "stands_when_it_should": (
             float((takes[:, standing, 0, 2] > _STANDS_ABOVE).sum()),
             float(count * standing.sum()),
@@ -190,7 +194,8 @@ def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
         sums["apd_legs"] = (diversity(takes[:, :, list(LOWER)]) * frames, float(frames))
     seats = [
         float(
-            np.median(take[r.start : r.end, 0, 2]) - np.median(clip.joints[r.start : r.end, 0, 2])
+            np.median(take[r.start : r.end, 0, 2])
+            - np.median(clip.joints[r.start : r.end, PELVIS, 2])
         )
         for take in takes
         for r in clip.rests
@@ -208,18 +213,18 @@ def _life(clip: HeldClip, takes: np.ndarray) -> Sums:
     episodes that show it.
     """
     found: dict[str, list[float]] = defaultdict(list)
-    forward = np.stack([-np.sin(clip.path.yaw), np.cos(clip.path.yaw)], axis=-1)
+    forward = forward_of(clip.path.yaw)
     for take in takes:
         for name, joints in liveliness.LIVELY.items():
-            found[f"speed_{name}"].append(liveliness.speed(take, 30.0, joints))
+            found[f"speed_{name}"].append(liveliness.speed(take, MODEL_FPS, joints))
         for band, value in liveliness.band_speeds(
-            take, 30.0, liveliness.LIVELY["wrists"] + liveliness.LIVELY["head"]
+            take, MODEL_FPS, liveliness.LIVELY["wrists"] + liveliness.LIVELY["head"]
         ).items():
             found[f"speed_{band}"].append(value)
-        found["sway"].append(liveliness.sway(take, 30.0))
+        found["sway"].append(liveliness.sway(take, MODEL_FPS))
         leans = np.degrees(liveliness.lean(take, forward))
         for rest in clip.rests:
-            found["descent_seconds"].append(liveliness.descent(take, 30.0, rest.start))
+            found["descent_seconds"].append(liveliness.descent(take, MODEL_FPS, rest.start))
             found["lean_degrees"].append(float(np.median(leans[rest.start : rest.end])))
     known = {
         name: [value for value in values if np.isfinite(value)] for name, values in found.items()
@@ -259,7 +264,7 @@ def beside(
     for mode in set(modes) - {"EE"}:
         other = shot_of(clip, mode, Scene())
         conditions = replace(other.conditions, occupancy=known.occupancy)
-        shots[mode] = replace(shots["EE"], conditions=conditions, told=other.told)
+        shots[mode] = replace(shots["EE"], conditions=conditions, request=other.request)
     runs = {"ground_truth": figures(clip, clip.joints[None])}
     for mode in modes:
         noise, takes_of = _noise(sampler, len(known), seed, seeds, mode)

@@ -12,6 +12,7 @@ import torch
 
 from ..core.errors import WeightsError
 from ..core.files import whole_file
+from ..core.series import MODEL_FPS
 from ..core.skeleton import JOINTS, OFFSETS
 from ..core.weights import FORMAT, Weights, quantised, read_safetensors, write_safetensors
 from ..model.config import VELOCITY_SIZE, ModelConfig
@@ -151,7 +152,7 @@ def export(
     config: ModelConfig = flow.config
     description = {
         "model": config.as_dict(),
-        "fps": 30,
+        "fps": round(MODEL_FPS),
         "joints": list(JOINTS),
         "offsets": OFFSETS.tolist(),
         "noise_metres": NOISE,

@@ -11,13 +11,13 @@ seconds.
 import torch
 from torch import Tensor
 
+from ..core.series import MODEL_FPS
 from ..core.skeleton import LOWER, OFFSETS, PARENTS, TOE_HEIGHT, UPPER
 
 __all__ = ["upper_loss", "lower_loss", "sliding"]
 
 # nats for each metre, or metre a second
 _POSE, _GIVEN, _HEIGHT, _BONE, _SPEED, _SLIDE = 100.0, 200.0, 150.0, 100.0, 3.0, 40.0
-_FPS = 30.0
 _PLANTED = 0.15  # metres a second
 _LOW = 0.03  # metres over where a planted toe base is
 
@@ -47,7 +47,7 @@ def _followed(made: Tensor, true: Tensor, calm: Tensor) -> Tensor:
     """How far calm motion (B, T, J, 3) is from the captured one, in place and in speed."""
     share = calm.float().mean().clamp_min(1e-6)
     place = (made - true).norm(dim=-1).mean((1, 2))
-    speed = _FPS * (made.diff(dim=1) - true.diff(dim=1)).norm(dim=-1).mean((1, 2))
+    speed = MODEL_FPS * (made.diff(dim=1) - true.diff(dim=1)).norm(dim=-1).mean((1, 2))
     return ((_POSE * place + _SPEED * speed) * calm).mean() / share
 
 
@@ -77,7 +77,7 @@ def sliding(feet: Tensor, step: Tensor) -> Tensor:
         [c * before[..., 0] + s * before[..., 1], c * before[..., 1] - s * before[..., 0]], dim=-1
     )
     # A square root of nothing has no gradient.
-    return _FPS * ((feet[:, 1:, :, :2] - moved).square().sum(-1) + 1e-8).sqrt()
+    return MODEL_FPS * ((feet[:, 1:, :, :2] - moved).square().sum(-1) + 1e-8).sqrt()
 
 
 def lower_loss(made: Tensor, true: Tensor, calm: Tensor, pelvis: Tensor, step: Tensor) -> Tensor:

@@ -31,9 +31,10 @@ from ..core.metrics import (
 )
 from ..core.occupancy import distance
 from ..core.paths import Point, Route, Stop, facing, route
-from ..core.progress import drained
+from ..core.progress import run_to_end
 from ..core.root import to_root
 from ..core.sampler import Sampler
+from ..core.series import MODEL_FPS
 from ..core.skeleton import POSE_SIZE, SEAT_TO_PELVIS
 from ..core.take import Controls
 from ..core.weights import Weights
@@ -130,9 +131,9 @@ def long_rooms() -> list[Room]:
     ):
         # A round is to last 600 frames: what it lacks is shared out among its three rests.
         brief = _round_walk(mirror, 1.0)
-        walked = _round_walk(mirror, 1.0 + (_MINUTE / _LOOPS - brief.rests[3].first) / 90.0)
+        walked = _round_walk(mirror, 1.0 + (_MINUTE / _LOOPS - brief.rests[3].start) / 90.0)
         seats = [
-            _seat(walked.rests[k].stop, height, back)
+            _seat(walked.rests[k].place, height, back)
             for k, height, back in ((1, chair, True), (2, stool, False))
         ]
         rooms.append(
@@ -163,8 +164,8 @@ def seat_rooms() -> list[Room]:
 
 def _walk(sampler: Sampler, room: Room, seeds: int) -> np.ndarray:
     """Takes (1 + seeds, T, 22, 3) in a room: temperature 0 first, then 1."""
-    controls = Controls(fps=30.0, root=room.walked.path.matrices())
-    shot = drained(shot_steps(Furnishing(room.boxes).scene(), controls))
+    controls = Controls(fps=MODEL_FPS, root=room.walked.path.matrices())
+    shot = run_to_end(shot_steps(Furnishing(room.boxes).scene(), controls))
     frames = len(shot.conditions)
     noise = [np.zeros((frames, 1, POSE_SIZE)), *(sampler.noise(frames, s) for s in range(seeds))]
     return made(sampler, shot, np.concatenate(noise, axis=1))
@@ -178,19 +179,19 @@ def _round(room: Room, takes: np.ndarray, first: int, last: int) -> Figures:
     cut = takes[:, first:last]
     flat, weight = cut.reshape(-1, 22, 3), float(cut.shape[0] * cut.shape[1])
     reach = partial(distance, scene, floor=0.0)
-    places = np.array([rest.stop.position for rest in walked.rests if rest.stop.seated])
+    places = np.array([rest.place.position for rest in walked.rests if rest.place.seated])
     away = (
         np.linalg.norm(walked.path.position[first:last, None, :2] - places, axis=-1).min(1) > _AWAY
     )
     seats = [
-        float(
-            np.median(take[r.first : r.last + 1, 0, 2]) - room.heights[r.stop.name] - SEAT_TO_PELVIS
-        )
+        float(np.median(take[r.start : r.stop, 0, 2]) - room.heights[r.place.name] - SEAT_TO_PELVIS)
         for take in takes
         for r in walked.rests
-        if r.stop.seated and first <= r.first < last
+        if r.place.seated and first <= r.start < last
     ]
-    each = [(foot_sliding(j, 30.0).mean(), skate(j, 30.0), jerk(j, 30.0)) for j in cut]
+    each = [
+        (foot_sliding(j, MODEL_FPS).mean(), skate(j, MODEL_FPS), jerk(j, MODEL_FPS)) for j in cut
+    ]
     sliding, skating, jerking = (np.array(each).mean(0) * weight).tolist()
     return Figures(
         {
@@ -218,7 +219,7 @@ def _round(room: Room, takes: np.ndarray, first: int, last: int) -> Figures:
 def _rounds(sampler: Sampler, room: Room) -> dict[str, Figures]:
     """Figures of the first and the last round of a long walk."""
     takes = _walk(sampler, room, seeds=3)
-    starts = [rest.first for rest in room.walked.rests[::3]]
+    starts = [rest.start for rest in room.walked.rests[::3]]
     rounds = {"first": (starts[0], starts[1]), "last": (starts[_LOOPS - 1], starts[_LOOPS])}
     out = {}
     for name, (first, last) in rounds.items():
@@ -231,7 +232,8 @@ def _heights(sampler: Sampler, room: Room) -> list[float]:
     """Height of the pelvis of every take while the root rests on the seat."""
     seat = Seat("seat", np.array([0.0, 0.0, room.heights["seat"]]))
     reports = [
-        seat_report(take, room.walked.path, 30.0, [seat])[0] for take in _walk(sampler, room, SEEDS)
+        seat_report(take, room.walked.path, MODEL_FPS, [seat])[0]
+        for take in _walk(sampler, room, SEEDS)
     ]
     return [float(report["pelvis_height"] or np.nan) for report in reports]
 

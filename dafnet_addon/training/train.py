@@ -68,7 +68,7 @@ __all__ = [
     "trained",
 ]
 
-_MOST_NUMBERS = 1 << 28
+_MAX_NUMBERS = 1 << 28
 _HELD = "-held"  # behind the name of a part: its checkpoint from before its rate fell
 """Of the networks that a checkpoint's settings describe: a GB; the paper's sizes are a seventh of
 it.
@@ -313,7 +313,7 @@ class Run:
             gmvae, flow = GMVAE(model), BodyFlow(model)
             if (
                 sum(p.numel() for network in (gmvae, flow) for p in network.parameters())
-                > _MOST_NUMBERS
+                > _MAX_NUMBERS
             ):
                 raise kept.refused("its model is too large")
             kept.fits(gmvae if part == "predictor" else flow.parts()[part])
@@ -596,7 +596,7 @@ def train_part(
             mean = ranks.mean(float(torch.stack(recent).mean()), run.device)
             if not math.isfinite(mean):
                 raise InputError(
-                    f"The loss of '{part}' is no number by step {run.step}; resume with a lower "
+                    f"The loss of '{part}' is not a number by step {run.step}; resume with a lower "
                     "peak rate."
                 )
             with run.with_average():

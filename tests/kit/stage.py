@@ -129,7 +129,7 @@ class Stage:
         return self.box(name, (-0.25, -0.25, 0.0), (0.25, 0.25, 0.45), collection, **properties)
 
     def empty(self, name: str, location: Point = (0.0, 0.0, 0.0), **properties: Any) -> Any:
-        """An empty, which is no furniture."""
+        """An empty, which is not furniture."""
         made = bpy.data.objects.new(name, None)
         self.put(made, self.scene.collection, location=location, **properties)
         bpy.context.view_layer.update()

@@ -1,0 +1,65 @@
+"""Names and turns of phrase that are not to come back; the vocabulary is in CONTRIBUTING.md."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).absolute().parents[1]
+SOURCES = sorted(
+    file
+    for folder in ("dafnet_addon", "operators", "panels", "benchmarks", "tests")
+    for file in (ROOT / folder).rglob("*.py")
+    if file != Path(__file__).absolute()
+)
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+
+NAMES = {
+    "drained": "run_to_end",
+    "Landed": "RetargetedMotion",
+    "Told": "Request",
+    "own_told": "own_request",
+    "MOST_FRAMES": "MAX_FRAMES",
+    "MOST_SEED": "MAX_SEED",
+    "absorb": "encode",
+    "Made": "Samples",
+}
+"""Names that said nothing alone, or two things, and what stands in their place."""
+
+PHRASES = (
+    r"(?<!there )(?<!there\n)\b(?:is|are) no "
+    r"(?!longer|more|lower|better|nearer|reason|match|place|way|room|such)\w+",
+    r"as one sees them who",
+    r"\bleaves who\b",
+    r"\bcame of a\b",
+    r"\bgoes? again\b",
+    r"the first was so before",
+)
+"""What is not English, or not clear: "is no armature" is "is not an armature"."""
+
+
+@pytest.mark.parametrize("file", SOURCES, ids=lambda file: file.relative_to(ROOT).as_posix())
+def test_names_that_say_nothing_stay_away(file: Path) -> None:
+    used = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            used.add(node.name)
+        elif isinstance(node, ast.Name):
+            used.add(node.id)
+        elif isinstance(node, ast.Attribute):
+            used.add(node.attr)
+        elif isinstance(node, ast.arg):
+            used.add(node.arg)
+        elif isinstance(node, ast.alias):
+            used.add(node.name)
+    assert not {name: NAMES[name] for name in used & NAMES.keys()}
+
+
+@pytest.mark.parametrize(
+    "file", [*SOURCES, *PAGES], ids=lambda file: file.relative_to(ROOT).as_posix()
+)
+def test_sentences_are_english(file: Path) -> None:
+    text = re.sub(r"\s+#?\s*", " ", file.read_text(encoding="utf-8"))
+    found = [match.group() for each in PHRASES for match in re.finditer(each, text, re.I)]
+    assert not found
