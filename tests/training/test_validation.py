@@ -27,8 +27,9 @@ from dafnet_addon.training.evaluate import Measured, figures  # noqa: E402
 from dafnet_addon.training.real_report import real_report  # noqa: E402
 from dafnet_addon.training.train import Run, TrainingConfig, train_part  # noqa: E402
 from dafnet_addon.training.validation import likelihoods, recorded, score, validations  # noqa: E402
+from kit.places import ROOT  # noqa: E402
 
-BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
+BENCHMARKS = ROOT / "benchmarks"
 TINY = ModelConfig(
     predictor_code=8,
     predictor_width=16,
