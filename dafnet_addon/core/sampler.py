@@ -379,7 +379,7 @@ class Sampler:
             poses=self._checked(self._stacked([frame.pose for frame in frames])),
             actions=self._stacked([frame.inputs[:, : self.actions] for frame in frames]),
             log_likelihood=self._stacked(densities),
-            unchanged=self._checked(self._stacked(aside) if aside else np.zeros((0, *z.shape))),
+            unchanged=self._checked(self._stacked(aside) if aside else nothing),
         )
 
     def _as_before(
