@@ -622,13 +622,16 @@ def fitted(
     path: RootPath,
     points: np.ndarray,
     bank: ShapeBank = NO_BANK,
+    seen: slice = slice(None),
 ) -> tuple[list[tuple[str, Furnishing | None]], str]:
     """What a motion uses, one word each, with the furniture fitted to it or None where none could
     be had; and what is missing.
 
-    Where a ``bank`` of real pieces is given, most of what carries a body is one of them. Hands may
-    as well work in the air: now and then theirs is not tried, and not in the list. A "spare desk"
-    stands before some who sit or stand, and nobody uses it: a desk alone is no reason to sit down.
+    A desk that is worked at leaves the body room in the frames that are ``seen``: before and after
+    that a chair is drawn up to it or pushed back, which nobody's motion shows. Where a ``bank`` of
+    real pieces is given, most of what carries a body is one of them. Hands may as well work in the
+    air: now and then theirs is not tried, and not in the list. A "spare desk" stands before some
+    who sit or stand, and nobody uses it: a desk alone is no reason to sit down.
     """
     beds, rests = lying(joints), resting(joints, path)
     if _cut_off(joints, beds, rests):
@@ -650,8 +653,11 @@ def fitted(
             reaches[i] for i in rng.permutation(len(reaches))
         ]:
             kind = use.kind
+            first, end, _ = seen.indices(len(joints))
+            drawn_up = kind == "desk" and use.start < end and use.end > first
             if rng.random() < _LIKELY[kind]:
-                pieces.append((kind, _worked_at(rng, bank, use, points)))
+                room = probes(joints[seen]) if drawn_up else points
+                pieces.append((kind, _worked_at(rng, bank, use, room)))
                 if pieces[-1][1] is not None:
                     break
         place = places[0] if places else _standing_place(path)
@@ -694,17 +700,21 @@ def _worked_at(
 
 
 def furnished(
-    rng: np.random.Generator, joints: np.ndarray, path: RootPath, bank: ShapeBank = NO_BANK
+    rng: np.random.Generator,
+    joints: np.ndarray,
+    path: RootPath,
+    bank: ShapeBank = NO_BANK,
+    seen: slice = slice(None),
 ) -> tuple[Furnishing | None, str]:
     """A room for one motion (T, 22, 3) with its root path: what the body uses and random pieces,
     and "".
 
     Or None and one word for why not: "seat" or "bed", that could not be had, or "cut", where the
     motion begins or ends half-way down to one. A desk, board or shelf that does not fit is left
-    out. Paper, section 5.2.
+    out. ``seen``: see ``fitted``. Paper, section 5.2.
     """
     points = probes(joints)
-    pieces, missing = fitted(rng, joints, path, points, bank)
+    pieces, missing = fitted(rng, joints, path, points, bank, seen)
     if missing:
         return None, missing
     count = int(rng.integers(1, 5)) if rng.random() < 0.8 else 0

@@ -1,5 +1,5 @@
-"""Moves captured sitting to seats of other heights: contacts are kept, and the body leans and bends
-as the new height asks.
+"""Moves captured sitting to seats, and hands at work to tops, of other heights: contacts are kept,
+and the body leans and bends as the new height asks.
 
 Paper, section 5.2, after Tonneau et al. (2016): a key joint near the source's furniture keeps its
 place relative to sampled points of it when these move. Here the points are the seat, which goes up
@@ -14,8 +14,10 @@ from ..core.kinematics import two_bone
 from ..core.rotations import normalised
 from ..core.skeleton import OFFSETS, PELVIS, REST, SEAT_TO_PELVIS, joint
 from .canonical import FOOT, LEG, SHIN, THIGH
+from .joins import presence
+from .uses import Use
 
-__all__ = ["at_seat_height"]
+__all__ = ["at_seat_height", "at_top_height"]
 
 _HIPS, _KNEES, _ANKLES, _TOES, _SHOULDERS, _ELBOWS, _WRISTS = (
     [joint("left_" + n), joint("right_" + n)]
@@ -57,6 +59,10 @@ _HANGS = (0.06, 0.18)
 _PERCH = (0.75, 0.6)
 # metres from the wrist to thigh bone or seat: the hand rests there; it has nothing to do with it
 _TOUCH = (0.12, 0.30)
+_REACHES = 0.96  # of an arm's length
+_COMES = 30  # frames in which a hand comes to a top, and goes
+_PLACES, _AT_IT = 40, 0.04  # points of a top; metres from them, of a wrist that works there
+_WORKS = 0.3  # of the time that a top is worked at: a hand that is there for less has its own place
 _SEAT = np.array([(x, y, -SEAT_TO_PELVIS) for x in (-0.25, 0.25) for y in (-0.15, 0.05)])
 _THIGH = np.array([0.1, 0.35, 0.6, 0.85])
 
@@ -223,4 +229,42 @@ def at_seat_height(joints: np.ndarray, resting_pelvis: float, wanted: float) -> 
     ankles, out[:, _TOES] = _feet(joints, out[:, _HIPS], rise)
     out[:, _KNEES], out[:, _ANKLES] = _knees(joints, out[:, _HIPS], ankles, forward), ankles
     out[:, _ELBOWS], out[:, _WRISTS] = _arms(joints, out, rise * _UP, heading)
+    return out
+
+
+def at_top_height(joints: np.ndarray, use: Use, rise: float) -> np.ndarray:
+    """The motion (T, 22, 3) of the canonical body with the top that its hands work on (``uses``)
+    ``rise`` metres higher.
+
+    The points of the top are where wrists were. A hand that works there keeps its place to them
+    while it is within 12 cm, is its own again from 30 cm on or a second before and after, and goes
+    over in between; the arms follow, all else stays. Where arms are too short for that, the top
+    moves by less.
+    """
+    wrist, shoulders = joints[:, _WRISTS], joints[:, _SHOULDERS]
+    places = use.points[:: max(1, len(use.points) // _PLACES)]
+    gap = _length(wrist[:, :, None] - places)[..., 0].min(-1)
+    works = (gap[use.start : use.end] < _AT_IT).mean(0) > _WORKS
+    near = _ramp((_TOUCH[1] - gap) / (_TOUCH[1] - _TOUCH[0]))
+    # Earlier and later the body may walk, hands beside it, where the top will be.
+    there = presence(len(joints), use.start - _COMES, use.end + _COMES, _COMES)
+    share = (near * works * there[:, None])[..., None]
+    own = np.maximum(_length(wrist - shoulders), _REACHES * (_UPPER_ARM + _FOREARM))
+    for part in np.linspace(1.0, 0.0, 9):
+        target = wrist + part * rise * share * _UP
+        if (_length(target - shoulders) <= own + 1e-9).all():
+            break
+    right = normalised(
+        (joints[:, _HIPS[1]] - joints[:, _HIPS[0]]) * (1, 1, 0), fallback=np.array([1.0, 0.0, 0.0])
+    )
+    backward = np.broadcast_to(-np.cross(_UP, right)[:, None], wrist.shape)
+    out = joints.copy()
+    out[:, _ELBOWS], out[:, _WRISTS] = two_bone(
+        shoulders,
+        target,
+        joints[:, _ELBOWS],
+        _UPPER_ARM,
+        _FOREARM,
+        fallback=backward,
+    )
     return out

@@ -17,8 +17,9 @@ from .cuts import bad_frames
 from .flesh import NO_BANK
 from .furniture import furnished
 from .rests import Rest, resting
-from .retarget import at_seat_height
+from .retarget import at_seat_height, at_top_height
 from .shapes import ABSENT_SHAPE, SHAPES, ShapeBank
+from .uses import working
 
 __all__ = [
     "COMPOSED",
@@ -28,6 +29,7 @@ __all__ = [
     "LOWEST",
     "Motion",
     "Window",
+    "at_another_desk",
     "draw",
     "lowest_pelvis",
     "mirrored",
@@ -44,6 +46,10 @@ _HOLD = 45
 LOWEST, HIGHEST = 0.36, 0.95
 """Metres over the floor at which a pelvis may rest: from a step of 0.22 to a bar stool of 0.81."""
 _USUAL = 0.38, 0.66  # metres: the pelvis on sofas and chairs
+_TOPS = 0.62, 0.82  # metres over the floor, of the desks that people sit at
+# metres that a top moves, down more than up (paper, section 5.2), and that its wrists are over a
+# pelvis at least: thighs are between; how often it moves at all
+_TOP_MOVES, _OVER_PELVIS, _MOVES_TOP = (-0.14, 0.08), 0.10, 0.6
 _LOWERED = 0.3  # metres; from a high stool further down, every wave of the pelvis would grow
 
 
@@ -160,6 +166,20 @@ def _seat_height(rng: np.random.Generator, height: float) -> float:
     return float(np.clip(wanted, lowest_pelvis(height), HIGHEST))
 
 
+def at_another_desk(rng: np.random.Generator, joints: np.ndarray) -> np.ndarray:
+    """The motion (T, 22, 3) of one that sits with the top that it works at moved, now and then, to
+    a height of its own: chairs and desks are of any combination (paper, figure 9).
+    """
+    uses = working(joints, root_from_joints(joints))
+    if not uses or rng.random() > _MOVES_TOP:
+        return joints
+    use = uses[0]
+    wrists = float(use.points[:, 2].min())
+    pelvis = float(np.median(joints[use.start : use.end, 0, 2]))
+    wanted = max(rng.uniform(*_TOPS), pelvis + _OVER_PELVIS)
+    return at_top_height(joints, use, float(np.clip(wanted - wrists, *_TOP_MOVES)))
+
+
 def _near_shapes(placed: np.ndarray, path: RootPath) -> np.ndarray:
     """The placed shapes nearest to a path, filled up or cut to (SHAPES, 5)."""
     gap = np.linalg.norm(path.position[None, :, :2] - placed[:, None, 1:3], axis=-1).min(
@@ -196,6 +216,7 @@ def draw(
     if rests:
         height = float(rests[0].position[2])
         joints = at_seat_height(joints, height, _seat_height(rng, height))
+        joints = at_another_desk(rng, joints)
     if speed != 1.0:
         joints = _retimed(joints, speed)
     first = min(round((start - low) / speed), len(joints) - _FRAMES)
@@ -205,7 +226,8 @@ def draw(
     if rng.random() < 0.5:
         joints = mirrored(joints)
     path = root_from_joints(joints)
-    room, _ = furnished(rng, joints, path, bank)
+    seen = slice(max(0, first - _MARGIN), first + _FRAMES + _MARGIN)
+    room, _ = furnished(rng, joints, path, bank, seen)
     if room is None:
         return None
     if rng.random() < 0.5:

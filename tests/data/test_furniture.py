@@ -18,7 +18,7 @@ from dafnet_addon.data.real_pieces import LIES_OVER
 from dafnet_addon.data.rests import resting
 from dafnet_addon.data.shapes import PELVIS_OVER
 from dafnet_addon.data.uses import lying, reaching, stroking, working
-from dafnet_addon.data.windows import motion_of
+from dafnet_addon.data.windows import at_another_desk, motion_of
 
 FEET = [joint(side + part) for side in ("left_", "right_") for part in ("ankle", "foot")]
 TORSO = [
@@ -171,6 +171,37 @@ def test_seats_are_at_the_right_height(pelvis):
     known = np.array(sorted(set(PELVIS_OVER.values())))
     assert np.abs(np.array(gaps)[:, None] - known).min(1).max() <= 0.0201
     assert len({round(g, 4) for g in gaps}) > 40, "every draw is another seat"
+
+
+def test_chairs_and_desks_are_of_any_combination():
+    """Hands that work at one height over every seat work at many, of which desks have."""
+    heights = []
+    for seed in range(60):
+        joints = at_another_desk(np.random.default_rng(seed), _at_desk())
+        (use,) = working(joints, root_from_joints(joints))
+        heights.append(use.points[:, 2].min())
+        assert heights[-1] - joints[use.start, 0, 2] > 0.09, "thighs are between"
+    assert np.ptp(heights) > 0.1 and len({round(h, 3) for h in heights}) > 20
+    standing = _standing()
+    assert at_another_desk(np.random.default_rng(0), standing) is standing
+
+
+def test_who_works_at_a_desk_has_drawn_the_chair_up_to_it():
+    """The way to a seat leads through where its desk is; no motion shows the chair being moved."""
+    joints = _at_desk()
+    way = np.concatenate([np.linspace(1.2, 0.0, 60), np.zeros(len(joints))])
+    walked = np.concatenate([_standing(60), joints])
+    walked = walked + way[:, None, None] * np.array([0.0, 1.0, 0.0])
+    path, worked = root_from_joints(walked), slice(70, len(walked))
+    seen = {"all": slice(None), "work": worked}
+    found = {}
+    for name, frames in seen.items():
+        rooms = [
+            fitted(np.random.default_rng(s), walked, path, probes(walked), seen=frames)[0]
+            for s in range(12)
+        ]
+        found[name] = sum(any(k == "desk" and f is not None for k, f in room) for room in rooms)
+    assert found["all"] == 0 and found["work"] >= 8
 
 
 def test_desk_top_lies_under_the_wrists_and_beside_the_seat():

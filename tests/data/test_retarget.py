@@ -10,7 +10,8 @@ from dafnet_addon.core.metrics import foot_sliding, jerk
 from dafnet_addon.core.skeleton import MIRROR, OFFSETS, PARENTS, REST, TOE_HEIGHT, joint
 from dafnet_addon.data.canonical import calibrate, canonical, pose_legs
 from dafnet_addon.data.mocap import read_clips
-from dafnet_addon.data.retarget import at_seat_height
+from dafnet_addon.data.retarget import at_seat_height, at_top_height
+from dafnet_addon.data.uses import Use
 from kit.places import MOCAP
 
 BONES = np.linalg.norm(OFFSETS[1:], axis=1)
@@ -171,6 +172,30 @@ def test_hands_go_with_what_they_are_near_to(wanted):
         np.abs(raised - (joints[:, joint("left_wrist")] - joints[:, joint("left_shoulder")])).max()
         < 1e-6
     )
+
+
+@pytest.mark.parametrize("rise", [-0.12, -0.05, 0.08])
+def test_hands_go_with_the_top_that_they_work_on_and_come_to_it_smoothly(rise):
+    joints = _sit_down(200)
+    place = joints[-1, SHOULDERS[1]] + np.array([0.0, 0.28, -0.24])
+    x = np.clip((np.arange(200) - 100) / 40, 0, 1)
+    wrists = joints[:, WRISTS].copy()
+    share = (x**3 * (10 - 15 * x + 6 * x * x))[:, None]
+    wrists[:, 1] += share * (place - wrists[:, 1])
+    joints[:, ELBOWS], joints[:, WRISTS] = two_bone(
+        joints[:, SHOULDERS], wrists, joints[:, ELBOWS], 0.26, 0.25
+    )
+    use = Use("desk", 145, 200, joints[145:, WRISTS[1]], 0.0)
+    moved = at_top_height(joints, use, rise)
+    up = moved[:, WRISTS[1], 2] - joints[:, WRISTS[1], 2]
+    assert np.abs(up[145:] - rise).max() < 1e-6 and np.abs(up[:115]).max() < 1e-6
+    assert np.abs(np.diff(up)).max() < 0.02 and np.abs(_lengths(moved) - BONES).max() < 1e-6
+    others = [j for j in range(22) if j not in (ELBOWS[1], WRISTS[1])]
+    assert np.abs(moved[:, others] - joints[:, others]).max() < 1e-6, "the other hand hangs"
+    assert np.abs(at_top_height(joints, use, 0.0) - joints).max() < 1e-6
+    far = at_top_height(joints, use, -0.6)
+    arm = np.linalg.norm(far[:, WRISTS[1]] - far[:, SHOULDERS[1]], axis=-1)
+    assert arm[145:].max() < 0.49 + 1e-6, "an arm is never stretched for it"
 
 
 def test_hanging_feet_come_down_with_the_seat_to_the_floor():
