@@ -424,22 +424,22 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     before = occupied[:1] if over_a_seat(occupied[0]) else np.zeros_like(occupied[:1])
     whole = RootPath(rolled(path.position), rolled(path.yaw))
     conditions = Conditions(
-        velocities(whole),
-        ahead(whole),
-        np.concatenate([np.repeat(before, PREROLL, axis=0), occupied]),
-        rolled(request.observation),
-        rolled(request.share > 0.0).astype(float),
+        velocity=velocities(whole),
+        ahead=ahead(whole),
+        occupancy=np.concatenate([np.repeat(before, PREROLL, axis=0), occupied]),
+        observation=rolled(request.observation),
+        given=rolled(request.share > 0.0).astype(float),
     )
     own_path = resample_path(path, MODEL_FPS, controls.fps, len(controls))
     return Shot(
-        conditions,
-        path,
-        request,
-        scene,
-        own_path,
-        _request(controls, own_path, controls.fps, []),
-        _with_grids(own_scene, scene),
-        tuple(warnings),
+        conditions=conditions,
+        path=path,
+        request=request,
+        scene=scene,
+        own_path=own_path,
+        own_request=_request(controls, own_path, controls.fps, []),
+        own_scene=_with_grids(own_scene, scene),
+        warnings=tuple(warnings),
     )
 
 

@@ -13,7 +13,7 @@ open (a single-sided board, a sheet) is a thin shell, whose distance has no sign
 
 import hashlib
 from collections import OrderedDict
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -35,17 +35,21 @@ __all__ = [
 FLOOR = 0.05
 """What lies within this height of the root's plane is floor (metres)."""
 
-_FINEST = 0.02
-_COARSE = 0.06
-_VAST = 200.0
-_MAX_NODES = 6_000_000
-_MAX_BAND_NODES = 2_000_000
-_MAX_SEEDS = 2_000_000
-_ROOM = (1.4, 1.9)
-_FLAT = np.cos(np.radians(15.0))
-_CHUNK = 8192
-_SEEDS, _STREWN = 1 << 15, 1 << 17
-_CACHED_BYTES = 1 << 29
+_FINEST = 0.02  # metres between nodes, where that makes no more of them than the two limits
+_COARSE = 0.06  # metres between nodes, above which the user is told that furniture is hardly seen
+_VAST = 200.0  # metres across, above which the unit is doubted
+_MAX_NODES = 6_000_000  # of a grid
+_MAX_BAND_NODES = 2_000_000  # of a grid, within ``BAND`` of a surface
+_MAX_SEEDS = 2_000_000  # points strewn over the triangles of a grid
+_ROOM = (1.4, 1.9)  # metres: shortest and longest side of what could hold a standing person
+_FLAT = np.cos(np.radians(15.0))  # angle to the floor, under which a triangle may be part of it
+
+# How much is measured between two reports of progress: Esc is heard soon, and memory is spared.
+_CHUNK = 8192  # pairs of node and triangle
+_SEEDS = 1 << 15  # pairs offered
+_STREWN = 1 << 17  # points strewn
+
+_CACHED_BYTES = 1 << 29  # of grids kept in memory
 
 
 def rigid_split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -150,65 +154,81 @@ def _unsigned(
     exact one to a triangle; that it is the nearest is missed at few nodes, by millimetres, where
     triangles are smaller than the spacing.
     """
-    _, ny, nz = shape
+    _, size_y, size_z = shape
     table = _triangle_table(corners)
     distance = np.full(int(np.prod(shape)), BAND, np.float32)
     nearest = np.full(len(distance), -1, np.int32)
 
-    def offer(nodes: np.ndarray, named: np.ndarray) -> np.ndarray:
+    def offer(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
         """Measure pairs of node and triangle; returns the nodes that now know a nearer triangle."""
         found = np.empty(len(nodes), np.float32)
-        for k in range(0, len(nodes), _CHUNK):
-            part = nodes[k : k + _CHUNK]
-            xy, z = np.divmod(part, nz)
-            x, y = np.divmod(xy, ny)
+        for begin in range(0, len(nodes), _CHUNK):
+            chunk = slice(begin, begin + _CHUNK)
+            row, z = np.divmod(nodes[chunk], size_z)
+            x, y = np.divmod(row, size_y)
             points = origin + spacing * np.stack([x, y, z], axis=1)
-            found[k : k + _CHUNK] = _triangle_distance(points, table[named[k : k + _CHUNK]])
+            found[chunk] = _triangle_distance(points, table[triangles[chunk]])
+
         better = found < distance[nodes]
-        nodes, named, found = nodes[better], named[better], found[better]
+        nodes, triangles, found = nodes[better], triangles[better], found[better]
         np.minimum.at(distance, nodes, found)
         wins = found == distance[nodes]
-        nearest[nodes[wins]] = named[wins]
-        fresh = np.zeros(len(distance), bool)
-        fresh[nodes] = True
-        return np.flatnonzero(fresh)
+        nearest[nodes[wins]] = triangles[wins]
 
-    # rows run from the corner opposite the shortest side, so that slivers need few points
+        changed = np.zeros(len(distance), bool)
+        changed[nodes] = True
+        return np.flatnonzero(changed)
+
+    pairs = []
+    for triangle, points in _strewn(corners, spacing):
+        x, y, z = np.floor((points - origin) / spacing).astype(np.int64).T
+        node = (x * size_y + y) * size_z + z
+        pairs.append(np.unique(triangle * len(distance) + node))
+        yield 0.0
+
+    # Each point names its triangle to the eight nodes of its cell.
+    triangle, node = np.divmod(np.unique(np.concatenate(pairs)), len(distance))
+    cell = np.array([(x * size_y + y) * size_z + z for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    for begin in range(0, len(node), _SEEDS // 8):
+        chunk = slice(begin, begin + _SEEDS // 8)
+        offer((node[chunk, None] + cell).reshape(-1), np.repeat(triangle[chunk], 8))
+        yield 0.5 * begin / len(node)
+
+    # Then each node that knows a nearer one names it to its six neighbours.
+    neighbours = np.array([size_y * size_z, -size_y * size_z, size_z, -size_z, 1, -1])
+    active = np.flatnonzero(nearest >= 0)
+    while len(active):
+        changed = []
+        for begin in range(0, len(active), _SEEDS // 6):
+            wave = active[begin : begin + _SEEDS // 6]
+            nodes, named = (wave[:, None] + neighbours).reshape(-1), np.repeat(nearest[wave], 6)
+            unknown = nearest[nodes] != named
+            changed.append(offer(nodes[unknown], named[unknown]))
+            yield 0.5
+        active = np.unique(np.concatenate(changed))
+    return distance.reshape(shape)
+
+
+def _strewn(corners: np.ndarray, spacing: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Points (N, 3) all over triangles (F, 3, 3), no farther apart than ``spacing``, and which
+    triangle (N,) each lies on; ``_STREWN`` at a time.
+    """
+    # Rows run from the corner opposite the shortest side, so that slivers need few points.
     sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
     turn = (np.argmin(sides, axis=1)[:, None] + np.array([2, 0, 1])) % 3
-    apex, b, c = np.moveaxis(np.take_along_axis(corners, turn[..., None], axis=1), 1, 0)
-    rows, columns = _rows_and_columns(corners, spacing)
-    ends = np.cumsum(rows * columns)
-    pairs = []
-    for k in range(0, int(ends[-1]), _STREWN):
-        item = np.arange(k, min(k + _STREWN, ends[-1]))
-        triangle = np.searchsorted(ends, item, side="right")
-        i, j = np.divmod(item - (ends - rows * columns)[triangle], columns[triangle])
-        s = (i / np.maximum(rows - 1, 1)[triangle])[:, None]
-        t = (j / np.maximum(columns - 1, 1)[triangle])[:, None]
-        points = apex[triangle] * (1 - s) + s * (b[triangle] * (1 - t) + t * c[triangle])
-        x, y, z = np.floor((points - origin) / spacing).astype(np.int64).T
-        pairs.append(np.unique((triangle * len(distance)) + (x * ny + y) * nz + z))
-        yield 0.0
-    triangle, node = np.divmod(np.unique(np.concatenate(pairs)), len(distance))
-    corner = np.array([(dx * ny + dy) * nz + dz for dx in (0, 1) for dy in (0, 1) for dz in (0, 1)])
-    for k in range(0, len(node), _SEEDS // 8):
-        part = slice(k, k + _SEEDS // 8)
-        offer((node[part, None] + corner).reshape(-1), np.repeat(triangle[part], 8))
-        yield 0.5 * k / len(node)
+    apex, left, right = np.moveaxis(np.take_along_axis(corners, turn[..., None], axis=1), 1, 0)
 
-    active = np.flatnonzero(nearest >= 0)
-    steps = np.array([ny * nz, -ny * nz, nz, -nz, 1, -1])
-    while len(active):
-        better = []
-        for k in range(0, len(active), _SEEDS // 6):
-            wave = active[k : k + _SEEDS // 6]
-            nodes, named = (wave[:, None] + steps).reshape(-1), np.repeat(nearest[wave], 6)
-            news = nearest[nodes] != named
-            better.append(offer(nodes[news], named[news]))
-            yield 0.5
-        active = np.unique(np.concatenate(better))
-    return distance.reshape(shape)
+    rows, columns = _rows_and_columns(corners, spacing)
+    stops = np.cumsum(rows * columns)
+    for begin in range(0, int(stops[-1]), _STREWN):
+        item = np.arange(begin, min(begin + _STREWN, stops[-1]))
+        triangle = np.searchsorted(stops, item, side="right")
+        row, column = np.divmod(item - (stops - rows * columns)[triangle], columns[triangle])
+
+        down = (row / np.maximum(rows - 1, 1)[triangle])[:, None]
+        across = (column / np.maximum(columns - 1, 1)[triangle])[:, None]
+        base = left[triangle] * (1 - across) + across * right[triangle]
+        yield triangle, apex[triangle] * (1 - down) + down * base
 
 
 def _rows_and_columns(corners: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:
@@ -237,51 +257,74 @@ def _inside(
     votes = np.zeros(shape, np.int8)
     local = (corners - origin) / spacing
     for axis in range(3):
-        u, v = (axis + 1) % 3, (axis + 2) % 3
-        points = local[:, :, [u, v, axis]]
-        first = np.ceil(points[:, :, 0].min(axis=1)).astype(int)
-        triangle, i = _ragged(np.ceil(points[:, :, 0].max(axis=1)).astype(int) - first)
-        row = i + first[triangle]
-        # (v, depth) at the two edges of the triangle that cross the row
-        ends = np.empty((len(triangle), 2, 2))
-        entered = np.zeros(len(triangle), int)
-        for a, b in ((0, 1), (1, 2), (2, 0)):
-            lower, upper = points[triangle, a], points[triangle, b]
-            # the same order, and so the same crossing, for both neighbours
-            swap = (lower[:, 0] > upper[:, 0])[:, None]
-            lower, upper = np.where(swap, upper, lower), np.where(swap, lower, upper)
-            k = np.flatnonzero((lower[:, 0] <= row) & (row < upper[:, 0]))
-            lower, upper = lower[k], upper[k]
-            share = (row[k] - lower[:, 0]) / (upper[:, 0] - lower[:, 0])
-            ends[k, entered[k]] = lower[:, 1:] + share[:, None] * (upper - lower)[:, 1:]
-            entered[k] += 1
-        ends = np.take_along_axis(ends, np.argsort(ends[:, :, :1], axis=1), axis=1)
-        first = np.ceil(ends[:, 0, 0]).astype(int)
-        span, j = _ragged(np.ceil(ends[:, 1, 0]).astype(int) - first)
-        column = j + first[span]
-        start, stop = ends[span, 0], ends[span, 1]
-        depth = start[:, 1] + (column - start[:, 0]) / (stop[:, 0] - start[:, 0]) * (
-            stop[:, 1] - start[:, 1]
-        )
-        line, part = row[span] * shape[v] + column, parts[triangle[span]]
-
-        order = np.lexsort((depth, part, line))
-        line, part, depth = line[order], part[order], depth[order]
-        group = (
-            np.concatenate([[0], np.cumsum((np.diff(line) != 0) | (np.diff(part) != 0))])
-            if len(line)
-            else line
-        )
-        count = np.bincount(group)
-        place = np.arange(len(group)) - (np.cumsum(count) - count)[group]
-        even = count[group] % 2 == 0
-        layers = np.zeros((shape[axis] + 1) * shape[u] * shape[v], np.int16)
-        node = np.ceil(depth).astype(int) * (shape[u] * shape[v]) + line
-        np.add.at(layers, node[even], np.where(place[even] % 2 == 0, 1, -1).astype(np.int16))
-        found = np.cumsum(layers.reshape(-1, shape[u], shape[v])[:-1], axis=0, dtype=np.int16) > 0
-        votes += np.moveaxis(found, (0, 1, 2), (axis, u, v))
+        across, along = (axis + 1) % 3, (axis + 2) % 3
+        size = shape[across], shape[along], shape[axis]
+        triangle, row, column, depth = _crossings(local[:, :, [across, along, axis]])
+        line = row * size[1] + column
+        inside = _between_crossings(line, depth, parts[triangle], size)
+        votes += np.moveaxis(inside, (0, 1, 2), (axis, across, along))
         yield 0.5 + axis / 6
     return votes >= 2
+
+
+def _crossings(
+    points: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Where grid lines along the last axis cross triangles (F, 3, 3), in units of the grid: the
+    triangle, the line's row and column, and the depth on it, (N,) each.
+    """
+    first = np.ceil(points[:, :, 0].min(axis=1)).astype(int)
+    triangle, step = _ragged(np.ceil(points[:, :, 0].max(axis=1)).astype(int) - first)
+    row = step + first[triangle]
+
+    # (column, depth) at the two edges of the triangle that cross the row
+    ends = np.empty((len(triangle), 2, 2))
+    entered = np.zeros(len(triangle), int)
+    for begin, end in ((0, 1), (1, 2), (2, 0)):
+        lower, upper = points[triangle, begin], points[triangle, end]
+        # the same order, and so the same crossing, for both neighbours
+        swap = (lower[:, 0] > upper[:, 0])[:, None]
+        lower, upper = np.where(swap, upper, lower), np.where(swap, lower, upper)
+        crossed = np.flatnonzero((lower[:, 0] <= row) & (row < upper[:, 0]))
+        lower, upper = lower[crossed], upper[crossed]
+        share = (row[crossed] - lower[:, 0]) / (upper[:, 0] - lower[:, 0])
+        ends[crossed, entered[crossed]] = lower[:, 1:] + share[:, None] * (upper - lower)[:, 1:]
+        entered[crossed] += 1
+    ends = np.take_along_axis(ends, np.argsort(ends[:, :, :1], axis=1), axis=1)
+
+    first = np.ceil(ends[:, 0, 0]).astype(int)
+    span, step = _ragged(np.ceil(ends[:, 1, 0]).astype(int) - first)
+    column = step + first[span]
+    start, stop = ends[span, 0], ends[span, 1]
+    depth = start[:, 1] + (column - start[:, 0]) / (stop[:, 0] - start[:, 0]) * (
+        stop[:, 1] - start[:, 1]
+    )
+    return triangle[span], row[span], column, depth
+
+
+def _between_crossings(
+    line: np.ndarray, depth: np.ndarray, part: np.ndarray, size: tuple[int, int, int]
+) -> np.ndarray:
+    """Nodes (depth, row, column) between the first and second, third and fourth, … crossing of a
+    grid line with a part, where these are even in number; ``size``: rows, columns, depths.
+    """
+    order = np.lexsort((depth, part, line))
+    line, part, depth = line[order], part[order], depth[order]
+    group = (
+        np.concatenate([[0], np.cumsum((np.diff(line) != 0) | (np.diff(part) != 0))])
+        if len(line)
+        else line
+    )
+    count = np.bincount(group)
+    place = np.arange(len(group)) - (np.cumsum(count) - count)[group]
+    even = count[group] % 2 == 0
+
+    rows, columns, depths = size
+    changes = np.zeros((depths + 1) * rows * columns, np.int16)
+    node = np.ceil(depth).astype(int) * (rows * columns) + line
+    np.add.at(changes, node[even], np.where(place[even] % 2 == 0, 1, -1).astype(np.int16))
+    changes = changes.reshape(-1, rows, columns)[:-1]
+    return np.asarray(np.cumsum(changes, axis=0, dtype=np.int16) > 0)
 
 
 def _furniture(

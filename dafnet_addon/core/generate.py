@@ -233,20 +233,20 @@ def _finished_steps(
         )
     root = RootPath(shot.own_path.position * controls.scale, shot.own_path.yaw)
     return Take(
-        controls.fps,
-        _joints(own) * controls.scale,
-        own.local,
-        root.matrices(),
-        action,
-        controls.scale,
-        poses,
-        shot.path,
-        unchanged,
-        log_likelihood,
-        raw,
-        metrics,
-        {"fitting": perf_counter() - started},
-        shot.warnings,
+        fps=controls.fps,
+        joints=_joints(own) * controls.scale,
+        rotations=own.local,
+        root=root.matrices(),
+        action=action,
+        scale=controls.scale,
+        poses=poses,
+        path=shot.path,
+        unchanged=unchanged,
+        log_likelihood=log_likelihood,
+        raw_metrics=raw,
+        metrics=metrics,
+        seconds={"fitting": perf_counter() - started},
+        warnings=shot.warnings,
     )
 
 
