@@ -1,19 +1,15 @@
-"""Paths for all tests, and a real Blender with the extension enabled for those that ask for it.
+"""Paths for all tests, and what is skipped where something is missing.
 
-Core tests need NumPy alone. Tests of the Blender side use the fixture ``blender``, which enables
-this working tree as an extension in a fresh user profile, and an empty scene for each test; they
-are skipped where no ``bpy`` module is installed.
+Folders mirror the packages. Tests of the core need NumPy alone; those of the Blender side are in
+``blender``, whose own conftest starts it.
 """
 
-import importlib
 import importlib.util
 import os
 import signal
 import sys
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
@@ -22,7 +18,8 @@ for folder in (TESTS.parent, TESTS):  # the package, and what tests share
     if str(folder) not in sys.path:
         sys.path.insert(0, str(folder))
 
-from kit.places import EXTENSION, ROOT  # noqa: E402 - found only now
+from kit.datasets import small_dataset  # noqa: E402 - found only now
+from kit.places import FURNITURE, LIBRARY, MOCAP  # noqa: E402
 
 if "bpy" not in sys.modules:
     os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="dafnet_tests_")
@@ -47,42 +44,11 @@ if importlib.util.find_spec("hypothesis"):
     settings.register_profile("full", settings.get_profile("tenth"), max_examples=1000)
     settings.load_profile("tenth")
 
-_state = {"enabled": False, "status": 0}
-
-
-def enable_extension() -> None:
-    """Enable this working tree as an extension, in the profile made above."""
-    import bpy
-
-    addon_utils = importlib.import_module("addon_utils")  # which is found once bpy is loaded
-    link = Path(bpy.utils.user_resource("EXTENSIONS", path="user_default", create=True), "dafnet")
-    if not link.exists():
-        link.symlink_to(ROOT, target_is_directory=True)
-    addon_utils.extensions_refresh(ensure_wheels=True)
-    assert bpy.ops.preferences.addon_enable(module=EXTENSION) == {"FINISHED"}
-    _state["enabled"] = True
-
-
-if importlib.util.find_spec("bpy"):
-    # Before any test is collected, so that tests import the very modules that Blender has loaded.
-    enable_extension()
-
-
-@pytest.fixture
-def blender() -> ModuleType:
-    """The module ``bpy`` with an empty scene and the extension enabled."""
-    bpy = pytest.importorskip("bpy")
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    return bpy
-
-
-@pytest.fixture
-def addon() -> Callable[[str], ModuleType]:
-    """A module that Blender has loaded, by its path in the repository; new tests import it by its
-    name.
-    """
-    pytest.importorskip("bpy")
-    return lambda name: importlib.import_module(f"{EXTENSION}.{name}")
+_NEEDS = {
+    "torch": (bool(importlib.util.find_spec("torch")), "torch"),
+    "mocap": (any(MOCAP.glob("*.npz")), f"the motion capture in {MOCAP}"),
+    "furniture": (LIBRARY.is_dir(), f"the pieces of furniture in {FURNITURE}"),
+}
 
 
 @pytest.fixture
@@ -90,23 +56,12 @@ def dataset(tmp_path: Path) -> Path:
     """A small training set of swaying bodies, each window at a height of its own that the sensor
     shows.
     """
-    from kit.datasets import small_dataset
-
     return small_dataset(tmp_path / "dataset")
 
 
-def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
-    if _state["enabled"]:
-        importlib.import_module("addon_utils").disable(EXTENSION)
-    _state["status"] = int(exitstatus)
-
-
-@pytest.hookimpl(trylast=True)
-def pytest_unconfigure(config: pytest.Config) -> None:
-    """Blender may crash or hang when Python ends with its module loaded: leave at once, with
-    pytest's own status.
-    """
-    if "bpy" in sys.modules and _state["enabled"]:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(_state["status"])
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip what needs something that is not here."""
+    for marker, (there, what) in _NEEDS.items():
+        if not there and item.get_closest_marker(marker):
+            pytest.skip(f"needs {what}")

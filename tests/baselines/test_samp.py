@@ -31,6 +31,8 @@ from dafnet_addon.training import precision  # noqa: E402
 from dafnet_addon.training.batches import Pool  # noqa: E402
 from dafnet_addon.training.evaluate import shot_of  # noqa: E402
 
+pytestmark = pytest.mark.torch
+
 TINY = SampConfig(width=24, code=16, experts=3, latent=8)
 STEP = 0.04  # metres a frame
 

@@ -24,6 +24,8 @@ from dafnet_addon.data.rests import Rest  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training.train import Run, TrainingConfig  # noqa: E402
 
+pytestmark = pytest.mark.torch
+
 BENCHMARKS = ROOT / "benchmarks"
 TINY = ModelConfig(
     predictor_code=8,

@@ -16,8 +16,8 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import create_char
 from bl_ext.user_default.dafnet.dafnet_addon.blender.preview import render_film
 
 from dafnet_addon.cli import main
+from kit.messages import without_blenders
 from kit.places import ROOT
-from kit.processes import without_blenders
 
 _RUN = "import sys; sys.argv[0] = 'dafnet'; from dafnet_addon.cli import run; run()"
 

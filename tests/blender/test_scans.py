@@ -67,7 +67,7 @@ os._exit(0)  # see cli.run
 """
 
 
-@pytest.mark.skipif(not FURNITURE.is_dir(), reason=f"needs the scanned furniture at {FURNITURE}")
+@pytest.mark.furniture
 def test_scanned_furniture_is_sat_on(tmp_path: Path) -> None:
     bpy = pytest.importorskip("bpy")
     if bpy.app.binary_path:

@@ -182,9 +182,8 @@ def test_a_seat_that_rides_along_is_sat_on() -> None:
     assert [each.name for each in met] == ["Stool"]
 
 
+@pytest.mark.furniture
 def test_real_seats_are_sat_on_without_a_word() -> None:
-    if not LIBRARY.is_dir():
-        pytest.skip(f"needs the furniture library {LIBRARY}")
     index = json.loads((LIBRARY / "index.json").read_text(encoding="utf-8"))
     met: set[str] = set()
     tried = 0

@@ -81,14 +81,12 @@ def test_refuses_paths_that_cannot_be_walked() -> None:
         route(FROM_SIDE, SEAT, speed=0.0)
 
 
+@pytest.mark.mocap
 def test_a_captured_sit_down_moves_alike() -> None:
     """Distance to the seat over the last second, against a captured person who comes from the side
     (held-out clip).
     """
-    folder = MOCAP
-    if not (folder / "snu_tiling.npz").exists():
-        pytest.skip("the motion capture is not beside the repository")
-    data = np.load(folder / "snu_tiling.npz")
+    data = np.load(MOCAP / "snu_tiling.npz")
     info = json.loads(str(data["clips"]))
     index = next(i for i, clip in enumerate(info) if clip["clip"] == "1/chair_2")
     start = int((data["frames"][:index] - 1).sum())

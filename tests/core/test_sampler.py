@@ -32,8 +32,10 @@ def test_orders_are_inverse():
     ).all()
 
 
+@pytest.mark.torch
 def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
-    torch = pytest.importorskip("torch")
+    import torch
+
     from dafnet_addon.core.weights import FORMAT, Weights
     from dafnet_addon.model.config import ModelConfig
     from dafnet_addon.model.flow import BodyFlow
@@ -110,9 +112,11 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
     )
 
 
+@pytest.mark.torch
 @pytest.mark.parametrize("system", ["ap-p", "moglow", "lower-first"])
 def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: Path):
-    torch = pytest.importorskip("torch")
+    import torch
+
     from dafnet_addon.core.weights import FORMAT, Weights
     from dafnet_addon.model.config import ModelConfig
     from dafnet_addon.model.flow import BodyFlow
@@ -196,8 +200,8 @@ def weights():
     return load_weights()
 
 
+@pytest.mark.torch
 def test_numpy_and_torch_agree_over_300_frames(weights):
-    pytest.importorskip("torch")
     z = 0.7 * np.random.default_rng(1).normal(size=(1, 66))
     ours = run_to_end(Sampler(weights).run(_conditions(300), z)).poses
     theirs = run_to_end(Sampler(weights, device="cpu").run(_conditions(300), z)).poses

@@ -125,8 +125,6 @@ def test_nothing_is_composed_of_nothing():
 
 @pytest.fixture(scope="module")
 def captured(tmp_path_factory) -> list[Motion]:
-    if not MOCAP.is_dir():
-        pytest.skip(f"needs the motion capture at {MOCAP}")
     from dafnet_addon.data.prepare import load_motions
 
     folder = tmp_path_factory.mktemp("mocap")
@@ -137,6 +135,7 @@ def captured(tmp_path_factory) -> list[Motion]:
     return [m for m in motions if not any(m is s for s in sits[1:-1])]
 
 
+@pytest.mark.mocap
 def test_composed_capture_is_whole_fluent_and_the_same_again(captured, monkeypatch):
     monkeypatch.setattr(compose, "_IDLES", 4)
     made = composed(captured)

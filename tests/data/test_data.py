@@ -138,11 +138,10 @@ def test_a_folder_without_motion_is_refused(tmp_path):
 
 @pytest.fixture(scope="module")
 def real_clips():
-    if not MOCAP.is_dir():
-        pytest.skip(f"needs the motion capture at {MOCAP}")
     return [c for c in read_clips(MOCAP) if c.source in ("rocketbox", "ui_prmd")]
 
 
+@pytest.mark.mocap
 def test_real_sit_downs_become_canonical(real_clips):
     clips = [c for c in real_clips if c.source == "rocketbox" and c.subject == "male"]
     body = calibrate(clips)
@@ -154,6 +153,7 @@ def test_real_sit_downs_become_canonical(real_clips):
         assert rest.end - rest.start >= 8
 
 
+@pytest.mark.mocap
 def test_real_windows_are_in_the_roots_frame(real_clips):
     clips = [c for c in real_clips if c.source == "rocketbox" and c.subject == "male"]
     body = calibrate(clips)
@@ -190,13 +190,12 @@ def test_a_seat_that_is_used_later_is_there_before():
 @pytest.fixture(scope="module")
 def real_motions():
     """All motions that are used, by split."""
-    if not MOCAP.is_dir():
-        pytest.skip(f"needs the motion capture at {MOCAP}")
     from dafnet_addon.data.prepare import load_motions
 
     return {"train": load_motions(MOCAP, "train"), "test": load_motions(MOCAP, "choose", "tell")}
 
 
+@pytest.mark.mocap
 def test_the_split_is_by_body(real_motions):
     from dafnet_addon.data.splits import TRAINED_ON_PARTLY
 
@@ -211,9 +210,8 @@ def test_the_split_is_by_body(real_motions):
     assert not both and not any(body.startswith("hdm05") for body in train)
 
 
+@pytest.mark.mocap
 def test_a_dataset_is_made_and_gone_on_with(tmp_path):
-    if not MOCAP.is_dir():
-        pytest.skip(f"needs the motion capture at {MOCAP}")
     pytest.importorskip("matplotlib", reason="previews are drawn with it")
     from dafnet_addon.data.prepare import load_pool, prepare
 
@@ -241,10 +239,9 @@ def test_a_dataset_is_made_and_gone_on_with(tmp_path):
     assert (out / "pool-0000.npz").stat().st_mtime_ns == stamp, "finished shards are kept"
 
 
+@pytest.mark.mocap
 def test_a_dataset_of_raw_files_needs_a_licence_and_a_held_out_body(tmp_path):
     raw = MOCAP / "raw_samples"
-    if not raw.is_dir():
-        pytest.skip(f"needs the motion capture at {raw}")
     pytest.importorskip("matplotlib", reason="previews are drawn with it")
     from dafnet_addon.data.prepare import prepare
 
@@ -272,6 +269,7 @@ def test_a_dataset_of_raw_files_needs_a_licence_and_a_held_out_body(tmp_path):
     assert json.loads((out / "dataset.json").read_text(encoding="utf-8"))["held_out"] == ["mocap/a"]
 
 
+@pytest.mark.mocap
 def test_the_pelvis_is_over_the_hips_alike_in_every_source(real_motions):
     """Sources put it from 3 cm under to 10 cm over the hips' middle; a seat's height is read off
     it.

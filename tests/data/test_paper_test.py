@@ -24,9 +24,7 @@ from dafnet_addon.data.mocap import read_clips
 from dafnet_addon.data.windows import Motion
 from kit.places import MOCAP
 
-pytestmark = pytest.mark.skipif(
-    not any(MOCAP.glob("*.npz")), reason="the motion files are not here"
-)
+pytestmark = pytest.mark.mocap
 TOES = [joint("left_foot"), joint("right_foot")]
 FEET = [*TOES, joint("left_ankle"), joint("right_ankle")]
 WRISTS = [joint("left_wrist"), joint("right_wrist")]

@@ -262,8 +262,10 @@ def test_the_sensor_sees_placed_shapes_as_the_core_sees_their_meshes(bank: Shape
     )
 
 
+@pytest.mark.torch
 def test_other_devices_see_the_same(bank: ShapeBank) -> None:
-    torch = pytest.importorskip("torch")
+    import torch
+
     from dafnet_addon.data.shapes import ABSENT_SHAPE
     from dafnet_addon.training.placed_shapes import DeviceBank
 
@@ -368,9 +370,8 @@ def test_hands_work_on_a_real_desk() -> None:
     assert desk_shape_for(np.random.default_rng(0), desks, too_high, _free(0.0)) is None
 
 
+@pytest.mark.furniture
 def test_one_lies_in_a_real_bed() -> None:
-    if not LIBRARY.is_dir():
-        pytest.skip(f"needs the furniture library at {LIBRARY}")
     pieces, left_out = read_library(LIBRARY)
     assert len(pieces) == 123 and not left_out
     beds = bank_of([p for p in pieces if p.name == "bed_001"], factors=(1.0,))

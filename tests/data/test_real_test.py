@@ -43,10 +43,10 @@ def test_pieces_are_at_their_true_size() -> None:
         )
 
 
+@pytest.mark.furniture
+@pytest.mark.mocap
 @pytest.mark.parametrize("role", ["choose", "tell"])
 def test_frozen_clips_sit_where_their_pieces_carry_them(role: str) -> None:
-    if not (SHARED / "furniture" / "library").is_dir() or not (SHARED / "mocap").is_dir():
-        pytest.skip(f"needs the motion capture and the furniture library in {SHARED}")
     clips = real_test(SHARED / "mocap", SHARED / "furniture" / "library", role)
     assert [clip.piece for clip in clips] == [
         frozen["piece"] for frozen in FROZEN if frozen["role"] == role

@@ -117,13 +117,11 @@ def test_what_nobody_can_sit_on_is_refused():
         seat_of([_box((-0.2, -0.2, -0.1), (0.2, 0.2, 0.0))], np.zeros(2))
 
 
+@pytest.mark.furniture
 @pytest.mark.parametrize(("scan", "height"), [("sofa_03", 0.50), ("painted_wooden_stool", 0.58)])
 def test_seats_of_real_furniture(scan, height):
     trimesh = pytest.importorskip("trimesh")
-    file = FURNITURE / f"{scan}.glb"
-    if not file.exists():
-        pytest.skip(f"needs the scan {file}")
-    mesh = trimesh.load(file, force="mesh")
+    mesh = trimesh.load(FURNITURE / f"{scan}.glb", force="mesh")
     up = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
     found = seat_of([Mesh(mesh.vertices, mesh.faces, up, scan)], np.array([0.0, -3.0]))
     assert abs(found.height - height) < 0.08

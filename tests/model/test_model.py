@@ -17,6 +17,8 @@ from dafnet_addon.model.config import PAPER, SMALL, ModelConfig  # noqa: E402
 from dafnet_addon.model.flow import ActNorm, BodyFlow, Coupling, InvertibleLinear, PartFlow  # noqa: E402
 from dafnet_addon.model.predictor import GMVAE, gumbel_temperature  # noqa: E402
 
+pytestmark = pytest.mark.torch
+
 TINY = ModelConfig(
     predictor_code=8,
     predictor_width=16,

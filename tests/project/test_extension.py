@@ -15,8 +15,8 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 
+from kit.messages import without_blenders
 from kit.places import ROOT
-from kit.processes import without_blenders
 
 SHIPPED = {
     "__init__.py",

@@ -29,6 +29,8 @@ from dafnet_addon.training.batches import Statistics  # noqa: E402
 from dafnet_addon.training.checkpoints import Checkpoint, write_checkpoint  # noqa: E402
 from dafnet_addon.training.train import Run, TrainingConfig, train_part, trained  # noqa: E402
 
+pytestmark = pytest.mark.torch
+
 TINY = ModelConfig(
     system="moglow",
     predictor_code=8,

@@ -24,10 +24,6 @@ from dafnet_addon.data.rests import Rest
 from dafnet_addon.training import evaluate as e
 from kit.places import MOCAP
 
-needs_mocap = pytest.mark.skipif(
-    not any(MOCAP.glob("*.npz")), reason="the motion files are not here"
-)
-
 
 @cache
 def _clips() -> list[h.HeldClip]:
@@ -101,7 +97,7 @@ def test_a_test_clip_that_is_not_the_frozen_one_is_refused(monkeypatch, tmp_path
             read(changed, motions)
 
 
-@needs_mocap
+@pytest.mark.mocap
 def test_no_body_of_the_unseen_test_clips_is_in_training():
     trained = {
         f"{clip.source}/{clip.subject}" for clip in read_clips(MOCAP) if clip.split == "train"
@@ -119,7 +115,7 @@ def test_no_body_of_the_unseen_test_clips_is_in_training():
     assert walkers and trained.isdisjoint(names[walker] for walker in walkers)
 
 
-@needs_mocap
+@pytest.mark.mocap
 def test_the_frozen_furniture_is_under_those_who_sit():
     clips = _clips()
     assert len(clips) == len(json.loads(h.FROZEN.read_text(encoding="utf-8"))["clips"])
@@ -235,8 +231,8 @@ def test_takes_made_together_are_those_that_generate_makes():
         assert np.abs(take - alone.joints).max() < 2e-3
 
 
+@pytest.mark.torch
 def test_beside_measures_all_modes_and_the_likelihood_of_real_poses():
-    pytest.importorskip("torch")
     from dafnet_addon.training.report import _followed
 
     sampler, clip = Sampler(load_weights()), _clip(40, seated=0)
@@ -269,8 +265,8 @@ def test_beside_measures_all_modes_and_the_likelihood_of_real_poses():
     assert _followed(sampler, (bent, None)).nats.mean() > own.nats.mean() + 10.0
 
 
+@pytest.mark.torch
 def test_the_rounds_of_a_long_walk_are_alike():
-    pytest.importorskip("torch")
     from dafnet_addon.training.report import long_rooms, seat_rooms
 
     for room in long_rooms():
@@ -305,8 +301,8 @@ def test_actions_that_tell_frames_apart():
     assert mutual_information(np.zeros(20, int), labels) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.torch
 def test_criteria_know_what_is_at_most_and_what_is_at_least():
-    pytest.importorskip("torch")
     from dafnet_addon.training.report import Criterion
 
     def met(value: float, most: bool) -> str:

@@ -47,6 +47,8 @@ from dafnet_addon.training.export import (  # noqa: E402
 from dafnet_addon.training.noise import noise_along, take_noise  # noqa: E402
 from dafnet_addon.training.train import Run, TrainingConfig, read_config, train_part, trained  # noqa: E402
 
+pytestmark = pytest.mark.torch
+
 TINY = ModelConfig(
     predictor_code=8,
     predictor_width=16,

@@ -29,6 +29,8 @@ from dafnet_addon.training.train import Run, TrainingConfig, train_part  # noqa:
 from dafnet_addon.training.validation import likelihoods, recorded, score, validations  # noqa: E402
 from kit.places import ROOT  # noqa: E402
 
+pytestmark = pytest.mark.torch
+
 BENCHMARKS = ROOT / "benchmarks"
 TINY = ModelConfig(
     predictor_code=8,

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).absolute().parents[1]
+from kit.places import ROOT
+
 SOURCES = sorted(
     file
     for folder in ("dafnet_addon", "operators", "panels", "benchmarks", "tests")

@@ -1,0 +1,257 @@
+"""What a bake does to the rig and to the file, what it refuses, and what it reports."""
+
+from collections.abc import Iterator
+from types import ModuleType
+from typing import Any
+
+import addon_utils
+import bpy
+import numpy as np
+import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender import (
+    compat,
+    onto_rig,
+    rigs,
+)
+from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import create_character
+from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+from bl_ext.user_default.dafnet.dafnet_addon.core.take import Take
+from bl_ext.user_default.dafnet.operators.bake_to_rig import DAFNET_OT_bake_to_rig
+from bl_ext.user_default.dafnet.panels.rig import DAFNET_PT_rig
+
+from kit.rig_stage import RigStage, made_takes
+
+CENTIMETRE = 0.01
+
+
+@pytest.fixture(scope="module")
+def takes() -> dict[str, Take]:
+    return made_takes()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def without_rigify_afterwards() -> Iterator[None]:
+    yield
+    if addon_utils.check("rigify")[1]:
+        addon_utils.disable("rigify")
+
+
+@pytest.fixture
+def stage(blender: ModuleType, takes: dict[str, Take]) -> RigStage:
+    return RigStage(takes)
+
+
+def test_hand_edits_are_baked(stage: RigStage) -> None:
+    stage.play("walk")
+    arm = 'pose.bones["right_shoulder"].rotation_quaternion'
+    for curve in compat.action_curves(stage.ann):
+        if curve.data_path == arm:
+            curve.keyframe_points.foreach_set(
+                "co",
+                np.array(
+                    [
+                        (point.co.x, (0.8, 0.6, 0.0, 0.0)[curve.array_index])
+                        for point in curve.keyframe_points
+                    ],
+                    np.float32,
+                ).ravel(),
+            )
+            curve.update()
+    rig = stage.build("mixamo")
+    stage.bake("mixamo", rig)
+    wrist = stage.heads(stage.ann, ["right_wrist"], 20)
+    assert np.linalg.norm(wrist - stage.take.joints[19, 21]) > 0.2
+    assert np.abs(stage.heads(rig, ["mixamorig:RightHand"], 20) - wrist).max() < CENTIMETRE
+
+
+def test_controls_that_are_turned_by_several_are_found_frame_by_frame(stage: RigStage) -> None:
+    """Rigify's neck that follows the torso by half is rigid on nothing; the head lands and looks
+    ahead all the same.
+    """
+    stage.play("write")
+    rig = stage.build("rigify")
+    stage.bake("rigify", rig)
+    names = ["DEF-spine.004", "DEF-spine.006", "DEF-hand.L"]
+    meant = stage.bones(rig, names)
+    rig.animation_data_clear()
+    rig.pose.bones["torso"]["neck_follow"] = rig.pose.bones["torso"]["head_follow"] = 0.5
+    detected = rigs.detected(rig)
+    follows = {kind: rows for kind, rows in detected.settings.items() if kind != "BOTH"}
+    rig_map = type(detected)(**{**vars(detected), "settings": follows})
+    onto_rig.bake_onto_rig(bpy.context, stage.ann, rig, rig_map)
+    assert np.abs(stage.bones(rig, names) - meant).max() < CENTIMETRE
+
+
+def test_rigify_is_switched_and_old_poses_do_not_leak(stage: RigStage) -> None:
+    """An older action has keyed IK, the chest and a limb's parent; the new one plays right after
+    it, whatever was shown.
+    """
+    stage.play("walk")
+    rig = stage.build("rigify")
+    arm = rig.pose.bones["upper_arm_parent.L"]
+    arm["IK_FK"] = 0.0
+    arm.keyframe_insert('["IK_FK"]', frame=1)
+    for name in ("chest", "hips", "root"):
+        rig.pose.bones[name].location = (0.1, 0.2, 0.0)
+        rig.pose.bones[name].keyframe_insert("location", frame=1)
+    mine = rig.animation_data.action
+    baked = stage.bake("rigify", rig)
+    compat.assign_action(rig, mine)
+    stage.scene.frame_set(3)
+    assert arm["IK_FK"] == 0.0 and rig.pose.bones["chest"].location.y == pytest.approx(0.2)
+    compat.assign_action(rig, baked.action)
+    assert max(distances.mean() for distances in stage.errors("rigify", rig).values()) < CENTIMETRE
+    assert arm["IK_FK"] == 1.0
+    stage.bake("rigify", rig, limbs="IK")
+    assert arm["IK_FK"] == 0.0 and arm["pole_vector"]
+
+
+def test_earlier_actions_stay_as_they_are(stage: RigStage) -> None:
+    stage.play("walk")
+    rig = stage.build("mixamo")
+    bone = rig.pose.bones["mixamorig:LeftArm"]
+    for frame, angle in ((1, 0.0), (30, 0.7)):
+        bone.rotation_quaternion = (np.cos(angle), np.sin(angle), 0.0, 0.0)
+        bone.keyframe_insert("rotation_quaternion", frame=frame)
+    mine = rig.animation_data.action
+    before = [
+        [tuple(point.co) for point in curve.keyframe_points] for curve in compat.action_curves(rig)
+    ]
+    theirs = stage.ann.animation_data.action
+    stage.scene.frame_set(17)
+    first = stage.bake("mixamo", rig).action
+    second = stage.bake("mixamo", rig, root_motion="HIPS").action
+    assert len({mine, first, second}) == 3 and rig.animation_data.action == second
+    assert all(action.use_fake_user for action in (mine, first, second))
+    assert stage.scene.frame_current == 17 and stage.ann.animation_data.action == theirs
+    assert {
+        point.interpolation
+        for curve in compat.action_curves(rig)
+        for point in curve.keyframe_points
+    } == {"LINEAR"}
+    compat.assign_action(rig, mine)
+    assert [
+        [tuple(point.co) for point in curve.keyframe_points] for curve in compat.action_curves(rig)
+    ] == before
+
+
+def test_what_cannot_be_baked_is_refused_and_left_alone(stage: RigStage) -> None:
+    stage.play("walk")
+    rig = stage.build("mixamo")
+    rig.pose.bones["mixamorig:Spine"].location = (1.0, 2.0, 3.0)
+
+    def refused(match: str, rig: Any = rig, rig_map: Any = None, **options: Any) -> None:
+        actions, pose = (
+            set(bpy.data.actions),
+            [bone.matrix_basis.copy() for bone in rig.pose.bones],
+        )
+        with pytest.raises(InputError, match=match) as caught:
+            onto_rig.bake_onto_rig(
+                bpy.context, stage.ann, rig, rig_map or rigs.detected(rig), **options
+            )
+        assert str(caught.value).count(". ") == 0
+        assert set(bpy.data.actions) == actions and rig.animation_data is None
+        assert [bone.matrix_basis for bone in rig.pose.bones] == pose
+
+    detected = rigs.detected(rig)
+    joints = {joint: bone for joint, bone in detected.joints.items() if joint != "left_knee"}
+    refused("no bone for the left knee", rig_map=type(detected)("Mine", joints=joints))
+    refused(
+        "both left_elbow and left_knee",
+        rig_map=type(detected)(
+            "Mine", joints=detected.joints | {"left_knee": detected.joints["left_elbow"]}
+        ),
+    )
+    refused("no known IK controls", limbs="IK")
+    refused("no root bone", root_motion="BONE")
+    rig.scale.x *= 2.0
+    refused("unevenly")
+    rig.scale.x *= 0.5
+    rig.data.pose_position = "REST"
+    refused("rest position")
+    rig.data.pose_position = "POSE"
+    rig.constraints.new("COPY_LOCATION")
+    refused("Hips", root_motion="OBJECT")
+    stage.ann.data.pose_position = "REST"
+    refused("'Ann' shows its rest position", root_motion="HIPS")
+    stage.ann.data.pose_position = "POSE"
+
+
+def test_an_object_that_drivers_move_is_refused(stage: RigStage) -> None:
+    stage.play("walk")
+    rig = stage.build("mixamo")
+    rig.driver_add("location", 0).driver.expression = "0.5"
+    with pytest.raises(InputError, match="drivers"):
+        stage.bake("mixamo", rig)
+
+
+def test_constraints_that_move_keyed_bones_are_named(stage: RigStage) -> None:
+    stage.play("walk")
+    rig = stage.build("mixamo")
+    assert stage.bake("mixamo", rig).overruled == ()
+    constraint = rig.pose.bones["mixamorig:LeftLeg"].constraints.new("IK")
+    constraint.target, constraint.chain_count = stage.ann.dafnet.hand_left, 2
+    rig.pose.bones["mixamorig:RightArm"].driver_add("rotation_quaternion", 1)
+    baked = stage.bake("mixamo", rig)
+    assert set(baked.overruled) == {"mixamorig:LeftLeg", "mixamorig:RightArm"}
+    assert baked.errors["ankles"][0] > 0.05, "and the report is honest"
+    constraint.mute = rig.animation_data.drivers[0].mute = True
+    assert stage.bake("mixamo", rig).errors["ankles"][0] < CENTIMETRE
+
+
+def test_the_panel_and_the_button(stage: RigStage) -> None:
+    """One press bakes and reports; one undo takes it back. The character is the only one, the
+    selected or the chosen one.
+    """
+    stage.play("walk")
+    bpy.context.view_layer.objects.active = stage.ann
+    assert not DAFNET_PT_rig.poll(bpy.context) and not bpy.ops.dafnet.bake_to_rig.poll()
+    rig = stage.build("mixamo")
+    bpy.context.view_layer.objects.active = rig
+    assert DAFNET_PT_rig.poll(bpy.context) and bpy.ops.dafnet.bake_to_rig.poll()
+    bpy.ops.ed.undo_push(message="Before")
+    assert bpy.ops.dafnet.bake_to_rig() == {"FINISHED"}
+    assert max(distances.mean() for distances in stage.errors("mixamo", rig).values()) < CENTIMETRE
+    bpy.ops.ed.undo_push(message="Bake to Rig")
+    bpy.ops.ed.undo()
+    rig = bpy.data.objects["Mixamo"]
+    assert rig.animation_data is None or rig.animation_data.action is None
+    assert "Ann on Mixamo" not in bpy.data.actions
+
+    ann = bpy.data.objects["Ann"]
+    bob = create_character(bpy.context, "Bob")
+    bob.select_set(False)
+    rig = bpy.data.objects["Mixamo"]
+    bpy.context.view_layer.objects.active = rig
+    with pytest.raises(RuntimeError, match="several characters"):
+        bpy.ops.dafnet.bake_to_rig()
+    rig.dafnet_rig.character = ann
+    assert bpy.ops.dafnet.bake_to_rig() == {"FINISHED"}
+    rig.dafnet_rig.character = None
+    ann.select_set(True)
+    assert bpy.ops.dafnet.bake_to_rig() == {"FINISHED"}
+
+
+def test_a_bake_that_is_off_is_warned_about(stage: RigStage) -> None:
+    """Long arms: the hands land, so the elbows are bent, and the report names the arms in
+    degrees.
+    """
+    stage.play("walk")
+    rig = stage.build("mixamo", arms=1.2)
+    bpy.context.view_layer.objects.active = rig
+    messages: list[tuple[set[str], str]] = []
+
+    class Reporter:
+        def report(self, kind: set[str], message: str) -> None:
+            messages.append((kind, message))
+
+    DAFNET_OT_bake_to_rig.run(Reporter(), bpy.context)
+    warned = [message for kind, message in messages if kind == {"WARNING"}]
+    assert len(warned) == 1 and "left arm by" in warned[0] and "degrees" in warned[0]
+    assert "wrists 0.0" in messages[-1][1] and "left arm" in messages[-1][1], (
+        "places and angles are told together"
+    )
+    messages.clear()
+    bpy.context.view_layer.objects.active = stage.build("mixamo")
+    DAFNET_OT_bake_to_rig.run(Reporter(), bpy.context)
+    assert [kind for kind, _ in messages] == [{"INFO"}]
