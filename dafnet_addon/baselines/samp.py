@@ -68,10 +68,10 @@ _TOLD = POSE_SIZE + 22
 _LIKE = ModelConfig(mask=True)
 _PAST = _LIKE.history * POSE_SIZE
 _KL = 0.1
-# shares of the training: until the one, the truth is fed; from the other on, what was made
-_FORCED, _FREE = 0.3, 0.6
-# smallest deviations of states (metres, metres a second, …) and voxels
-_LEAST, _LEAST_SEEN = 2e-3, 0.05
+_FORCED = 0.3  # share of the training until which the truth is fed
+_FREE = 0.6  # share of it from which on what was made is fed
+_LEAST = 2e-3  # smallest deviation of states (metres, metres a second, …)
+_LEAST_SEEN = 0.05  # smallest deviation of voxels
 _MEASURED = 256  # windows whose states are measured for their mean and deviation
 _WIDE = 20.0  # deviations; what is fed back and farther off than that would soon be no number
 _PHASES = 50

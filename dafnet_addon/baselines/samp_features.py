@@ -32,7 +32,10 @@ _SECOND = round(MODEL_FPS)
 # frames between two way points, so that a goal is 1 to 2.7 seconds ahead, as in a training window
 _SEGMENT = 50
 _HORIZON = 80  # frames before a rest in which it is the goal
-_SITS_UNDER, _STILL, _SLOW, _FAST = 0.80, 0.25, 0.3, 2.2  # pelvis, metres; root, metres a second
+_SITS_UNDER = 0.80  # metres over the floor, of the pelvis
+_STILL = 0.25  # metres a second of the root
+_SLOW = 0.3  # metres a second of the root, under which it idles
+_FAST = 2.2  # metres a second of the root, above which it runs
 _SEAT = 0.25, 0.78  # heights of tops that one sits on, metres
 _BLEND = 11  # frames over which one action becomes another
 _PELVIS, _NECK, _TOUCHES = joint("pelvis"), joint("neck"), CONTACTS.index("pelvis")

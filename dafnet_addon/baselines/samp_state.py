@@ -53,10 +53,12 @@ __all__ = [
 ACTIONS = ("idle", "walk", "run", "sit", "lie")
 OFFSETS = torch.arange(-30, 31, 5)
 """Frames at which the trajectory is sampled; the present is the seventh."""
-NOW, LAST = 6, 12
+NOW = 6
+LAST = 12
 _SAMPLES = len(OFFSETS)
 _SIZES = (22 * 12, 22 * 3, _SAMPLES * 9, 5, _SAMPLES * 4, _SAMPLES * 11)
-STATE, SENSOR = sum(_SIZES), 8**3 * 4
+STATE = sum(_SIZES)
+SENSOR = 8**3 * 4
 CELL = 0.175
 """Metres; the voxels are a cube of 1.4 m on the floor."""
 _LATTICE = torch.cartesian_prod(*[torch.arange(8.0)] * 3) + 0.5

@@ -55,22 +55,23 @@ _UPPER_ARM, _FOREARM = (
     float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("elbow", "wrist")
 )
 
-# metres over a planted toe base; metres a second that a foot slides and is still meant to stand
-_LOW, _SLOW = 0.035, 0.45
-_PLANTS, _MENDS = 4, 3  # frames: the shortest stand; the longest gap in one
+_LOW = 0.035  # metres over a planted toe base
+_SLOW = 0.45  # metres a second that a foot slides and is still meant to stand
+_PLANTS = 4  # frames of the shortest stand
+_MENDS = 3  # frames of the longest gap in one
 _SLIPS = 0.12  # metres from its place at which a foot is let go
 _FADE = 1 / 3  # seconds in which what is added dies away
-# metres of a pelvis over a hard seat, at least; the most that it is lifted by
-_SITS_OVER, _SINKS = 0.08, 0.15
+_SITS_OVER = 0.08  # metres of a pelvis over a hard seat, at least
+_SINKS = 0.15  # metres that it is lifted by, at most
 _SMOOTHING = 2.5  # frames; deviation of the Gaussian at full strength
-# metres between a wrist or ankle and the surface that it must not sink into; the most it is moved
-_SKIN, _DEEPEST = 0.03, 0.20
+_SKIN = 0.03  # metres between a wrist or ankle and the surface that it must not sink into
+_DEEPEST = 0.20  # metres that it is moved, at most
 _STEADY = 3.0  # frames; deviation of the Gaussian over what brings a hand or foot out
 _NUDGE = 0.01  # metres; for slopes of the distance
 _STRAIGHT = 0.999  # of a leg's or arm's length, which is how far they reach
 
-# metres that the trunk is bent by for a target, at most
-_FARTHEST_HEAD, _FARTHEST_LEAN = 0.20, 0.25
+_FARTHEST_HEAD = 0.20  # metres that the trunk is bent by for the head's target, at most
+_FARTHEST_LEAN = 0.25  # metres that it is bent by for a hand's
 _SOFT = 0.15  # share of that in which it stops
 _SUPPLE = {
     joint(n): share
@@ -88,7 +89,9 @@ _SUPPLE = {
     )
 }
 """How willingly joints turn for a target."""
-_DAMPING, _ROUNDS, _STEP = 0.03, 15, 0.10  # metres; rounds of least squares; metres in one of them
+_DAMPING = 0.03  # metres
+_ROUNDS = 15  # of least squares
+_STEP = 0.10  # metres in one round, at most
 
 
 @dataclass(frozen=True)

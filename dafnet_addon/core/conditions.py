@@ -51,10 +51,16 @@ settled.
 """
 
 _EFFECTORS = {name: MODEL_ORDER.index(j) for name, j in END_EFFECTORS.items()}
-_TILT, _SPRINT = np.radians(5.0), 10.5  # radians; metres a second
-# a sphere that holds every head and wrist of the training poses
-_REACH_FROM, _REACH = np.array([0.0, 0.0, 1.0]), 1.25
-_STILL, _CROWDED = 0.02, 0.35
+_TILT = np.radians(5.0)  # of a root, above which the user is told that it is flattened
+_SPRINT = 10.5  # metres a second, which nobody runs: a root that is faster jumps
+
+# A sphere that holds every head and wrist of the training poses: its centre over the root, and its
+# radius, metres.
+_REACH_FROM = np.array([0.0, 0.0, 1.0])
+_REACH = 1.25
+
+_STILL = 0.02  # metres or radians in the whole shot, under which a root does not move
+_CROWDED = 0.35  # share of the sensor that furniture fills, above which the user is told
 _AROUND = 6  # spheres of the sensor's innermost ring
 _UNDER = (
     (np.hypot(SPHERES[:, 0], SPHERES[:, 1]) < 0.2) & (SPHERES[:, 2] > 0.2) & (SPHERES[:, 2] < 0.9)

@@ -50,8 +50,8 @@ RAW = CleanUp()
 _HOTTEST = 10.0
 _HAIR = 1e-3  # metres, radians, fractions: what comes back from single precision is the same
 _LEAD = 30  # frames before a change of mode that tell how straight limbs were twisted
-_CONDITIONED, _SAMPLED = 0.15, 0.85
-"""Progress when the conditions are known and when the poses are made."""
+_CONDITIONED = 0.15  # progress when the conditions are known
+_SAMPLED = 0.85  # progress when the poses are made
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,20 @@ from .rotations import (
     transpose,
 )
 from .series import MODEL_FPS
-from .skeleton import END_EFFECTORS, OFFSETS, PARENTS, PELVIS, joint
+from .skeleton import (
+    ANKLES,
+    COLLARS,
+    ELBOWS,
+    END_EFFECTORS,
+    HIPS,
+    KNEES,
+    OFFSETS,
+    PARENTS,
+    PELVIS,
+    SHOULDERS,
+    WRISTS,
+    joint,
+)
 
 __all__ = [
     "Bent",
@@ -38,14 +51,17 @@ __all__ = [
 
 # Limbs in one order: left and right arm, left and right leg. The rest pose is straight along _AXIS,
 # and the middle joint leaves that line along _BEND: elbows go backward, knees forward.
-_PARENT, _FIRST, _MIDDLE, _END = [13, 14, 0, 0], [16, 17, 1, 2], [18, 19, 4, 5], [20, 21, 7, 8]
+_PARENT = [*COLLARS, PELVIS, PELVIS]
+_FIRST = SHOULDERS + HIPS
+_MIDDLE = ELBOWS + KNEES
+_END = WRISTS + ANKLES
 _AXIS = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 0, -1], [0, 0, -1]])
 _BEND = np.array([[0.0, -1, 0], [0, -1, 0], [0, 1, 0], [0, 1, 0]])
 
 # a limb bent by this (radians) shows its plane about as clearly as its neighbours in time tell it
 _CLEAR_BEND = 0.25
-# weights of the neighbouring frames and of the parent's reference, against 1 at a clear bend
-_CARRY, _PULL = 4.0, 0.05
+_CARRY = 4.0  # weight of the neighbouring frames, against 1 at a clear bend
+_PULL = 0.05  # weight of the parent's reference
 
 # columns: x, where the face looks or the fingers point, crown or back of the hand; as they lie in
 # the rest pose

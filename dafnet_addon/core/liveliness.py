@@ -24,7 +24,8 @@ BANDS = {"slow": (0.2, 1.0), "middle": (1.0, 3.0), "quick": (3.0, 8.0)}
 _SMOOTH = 0.5  # seconds: sigma of the path that a body sways about
 _WALKS = (0.7, 1.6)  # metres a second
 _TURNS = 0.35  # radians a second, above which a path is not straight
-_FROM, _TO = 0.1, 0.9  # of the way down
+_FROM = 0.1  # share of the way down at which a descent counts as begun
+_TO = 0.9  # share at which it counts as ended
 _BEFORE = 4.0  # seconds before a seated episode, within which its descent begins
 
 

@@ -23,10 +23,13 @@ from .solids import Box, Scene, box_distance
 __all__ = ["occupancy", "distance", "tops_under"]
 
 _FRAMES_AT_ONCE = 32
-# metres over the floor between which tops are looked for, and how finely
-_LOWEST, _HIGHEST, _APART = 0.15, 0.925, 0.025
-# metres round a place; of the five spots there, how many must have a top
-_FOOTPRINT, _CARRYING = 0.07, 3
+# Tops are looked for between these heights over the floor, in such steps, metres.
+_LOWEST = 0.15
+_HIGHEST = 0.925
+_APART = 0.025
+
+_FOOTPRINT = 0.07  # metres round a place, within which five spots are looked at
+_CARRYING = 3  # of the five spots must have a top
 
 
 @dataclass(frozen=True)

@@ -32,12 +32,12 @@ _PAUSE = 0.5  # seconds between two passages through one piece
 # metres over the floor between which seats and the room over them are looked for
 _COLUMN = np.arange(0.22, 1.125, 0.025)
 _HIGHEST = 0.95
-# metres from the axis; steps of the column that are free over a seat, unlike inside one
-_TOUCHES, _ROOM = 0.03, 5
+_TOUCHES = 0.03  # metres from the axis
+_ROOM = 5  # steps of the column that are free over a seat, unlike inside one
 _STILL = 0.1  # metres a second, over what carries the body
 _OVER_SEAT = 0.12  # metres over a seat's top that belong to it
-# metres from the place on a seat within which a body is on its way, or there
-_COMES, _RESTS = 0.6, 0.15
+_COMES = 0.6  # metres from the place on a seat, within which a body is on its way to it
+_RESTS = 0.15  # metres from it, within which the body is there
 _NAMED = 3  # passages that a sentence names
 
 

@@ -18,20 +18,28 @@ from .series import MODEL_FPS, smoothstep
 
 __all__ = ["AFTER_SEAT", "BEFORE_SEAT", "Rest", "Route", "Stop", "facing", "route", "walked_along"]
 
-BEFORE_SEAT, AFTER_SEAT = 0.55, 0.45
-"""Metres straight in front of a seat that one comes from and goes to, less the rounding."""
+BEFORE_SEAT = 0.55
+"""Metres straight in front of a seat from which one comes to it, less the rounding."""
+AFTER_SEAT = 0.45
+"""Metres straight in front of a seat to which one goes from it, less the rounding."""
 
 Point = tuple[float, float]
 
 _STEP = 0.005  # metres between samples along a leg
-_START, _HALT, _SIT, _RISE = 1.4, 1.2, 0.7, 0.9  # accelerations, m/s²
+
+# Accelerations, metres a second squared, measured on captured motion.
+_START = 1.4  # from standing
+_HALT = 1.2  # to standing
+_SIT = 0.7  # to a seat
+_RISE = 0.9  # from a seat
+
 # turning rate, a second, that slows a walker who looks along the path in a corner
 _CORNER_RATE = np.radians(90.0)
 _SIDEWAYS = 2.0  # acceleration to the side that slows a walker who does not, m/s²
-# metres of a straight that a rounded corner may use; slowest speed in a corner
-_CORNER_CUT, _CORNER_SPEED = 0.45, 0.3
-# metres before a seat where the heading has settled, after it where it lets go
-_SETTLED, _TURN_AWAY = 0.25, 0.20
+_CORNER_CUT = 0.45  # metres of a straight that a rounded corner may use
+_CORNER_SPEED = 0.3  # metres a second, the slowest in a corner
+_SETTLED = 0.25  # metres before a seat, where the heading has settled
+_TURN_AWAY = 0.20  # metres after a seat, where the heading lets go
 
 
 @dataclass(frozen=True)

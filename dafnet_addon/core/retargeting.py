@@ -74,18 +74,26 @@ _FOOT_OF = dict(zip(ANKLES, FEET, strict=True))
 _TRUNK = (*SPINE, NECK)  # the joints that bring the head to its place
 # bodies whose legs differ by less count as of one size, so that hands stay on what they touch
 _SAME_SIZE = 0.03
-# arms, and shoulders over the hips, of the same build, over the body's size
-_SAME_ARMS, _SAME_CHEST = 1.25, 1.2
+# ratios, over the body's size, up to which bodies are of the same build
+_SAME_ARMS = 1.25
+_SAME_CHEST = 1.2  # of the shoulders' height over the hips
 # ankles that are higher by less than this (of the leg's length) do not lift the body
 _SAME_ANKLES = 0.01
 _REACH = 1.0 - 1e-5
 _SINK = 0.3  # of a leg's length: the most by which the pelvis is lowered to let the feet reach
-# the most that trunk and collars turn out of the source's pose to reach, radians
-_TRUNK_TURN, _SHRUG = 0.35, 0.35
+_TRUNK_TURN = 0.35  # radians that the trunk turns out of the source's pose to reach, at most
+_SHRUG = 0.35  # radians that collars do
 _EASE = 0.2  # the most that collars turn to leave elbows as bent as they were, radians
-_ROUNDS, _LEANS, _SHRUGS = 24, 8, 4
-# hip to ankle over the leg's length: bent as in sitting, and as in standing
-_SEATED, _STANDS = 0.75, 0.95
+
+# Rounds of what is solved step by step.
+_ROUNDS = 24
+_LEANS = 8
+_SHRUGS = 4
+
+# hip to ankle, over the leg's length
+_SEATED = 0.75  # bent as in sitting
+_STANDS = 0.95  # straight as in standing
+
 # a limb bent by less than this (of its length) also takes its plane from its first joint's frame
 _STRAIGHT = 0.03
 _UP = np.array([0.0, 0.0, 1.0])

@@ -29,8 +29,12 @@ __all__ = [
     "ahead",
 ]
 
-POSITION_SIGMA, YAW_SIGMA = 3.0, 6.0
-_MAX_TURN = np.radians(15.0)
+POSITION_SIGMA = 3.0
+"""Frames at 30 a second: standard deviation of the Gaussian over a root's position."""
+YAW_SIGMA = 6.0
+"""The same of the one over its yaw."""
+
+_MAX_TURN = np.radians(15.0)  # in a frame
 AHEAD = (5, 10, 15, 20, 25, 30)
 """How far ahead the model is told of the root, in 30-fps frames."""
 

@@ -12,8 +12,10 @@ __all__ = ["RADIUS", "REACH", "HEIGHT", "SPHERES", "occupancy_of_distance"]
 _SPACING = 1.0 / 7.0
 RADIUS = _SPACING / 2.0
 """Radius of one sphere (metres)."""
-REACH, HEIGHT = 1.0, 2.0
-"""Radius and height of the cylinder (metres), to the outermost centres."""
+REACH = 1.0
+"""Radius of the cylinder (metres), to the outermost centres."""
+HEIGHT = 2.0
+"""Height of the cylinder (metres), to the highest centres."""
 
 
 def _spheres() -> np.ndarray:

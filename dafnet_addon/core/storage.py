@@ -31,7 +31,8 @@ __all__ = ["packed", "unpacked"]
 
 _VERSION = 1
 """Of the packing. What was packed before there were versions is packed so, too."""
-_MAX_WORDS, _MAX_FIGURE = 1 << 20, 1e30  # bytes of all that is not an array; figures
+_MAX_WORDS = 1 << 20  # bytes of all that is not an array
+_MAX_FIGURE = 1e30
 _ROWS: dict[str, tuple[int, ...]] = {
     "controls.root": (4, 4),
     "controls.upper_body": (len(UPPER), 3),

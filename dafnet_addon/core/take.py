@@ -19,8 +19,10 @@ __all__ = ["MODES", "Controls", "Take"]
 
 MODES = ("FREE", "EE", "FULL")
 
-_SLOWEST, _FASTEST = 1.0, 1000.0  # frames a second
-_SMALLEST, _LARGEST = 1e-3, 1e3  # sizes over the canonical body
+_SLOWEST = 1.0  # frames a second
+_FASTEST = 1000.0  # frames a second
+_SMALLEST = 1e-3  # size over the canonical body
+_LARGEST = 1e3  # size over the canonical body
 _LONGEST_BLEND = 600.0  # seconds
 
 

@@ -15,18 +15,20 @@ from .series import MODEL_FPS, runs, smoothstep
 
 __all__ = ["FASTEST", "SHORTEST", "SLOWEST", "followed", "trail"]
 
-SLOWEST, FASTEST = 0.4, 3.0
-"""Speeds of people, metres a second."""
+SLOWEST = 0.4
+"""Metres a second that people walk at, at least."""
+FASTEST = 3.0
+"""Metres a second that people walk or run at, at most."""
 SHORTEST = 0.5
 """Length that a line needs to be walked along, metres."""
 
 _STEP = 0.005  # metres between samples along a line
 # metres, the smoothing's standard deviation: a right angle becomes an arc of about 0.3 m
 _ROUNDING = 0.2
-# metres a second under which something stands, where it does so for half a second
-_MOVES, _STANDS = 0.15, 0.5
-# seconds, standard deviations: smoothing of a recorded position, and of its heading
-_SHAKE, _SWAY = 0.15, 0.2
+_MOVES = 0.15  # metres a second, under which something stands
+_STANDS = 0.5  # seconds that it does so, at least
+_SHAKE = 0.15  # seconds: standard deviation of the Gaussian over a recorded position
+_SWAY = 0.2  # seconds: that of the one over its heading
 _TURN_RATE = np.radians(160.0)  # a second: nobody walks and turns faster
 _TURN_SECONDS = 1.7  # of half a turn
 

@@ -31,8 +31,8 @@ __all__ = [
 FORMAT = "dafnet-1"
 """Value of the metadata key ``format``; another one means other tensors."""
 
-# bytes; the paper's model in single precision is a quarter of that
-_MAX_HEADER, _MAX_FILE = 1 << 20, 1 << 29
+_MAX_HEADER = 1 << 20  # bytes
+_MAX_FILE = 1 << 29  # bytes; the paper's model in single precision is a quarter of that
 _SHOWN = 60  # characters of a name in a sentence
 _DTYPES = {
     "F64": "<f8",

@@ -14,9 +14,11 @@ from .surfaces import HeightField, height_field, surface_points
 __all__ = ["SeatPlace", "on_a_seat", "seat_of"]
 
 _CELL = 0.03
-# metres over the floor: of seats; what is higher is not part of one
-_LOWEST, _HIGHEST, _OVERHEAD = 0.22, 0.85, 1.5
-_FLAT, _BACK = 0.05, 0.15  # metres over the seat: of what still is seat; of a back or an arm
+_LOWEST = 0.22  # metres over the floor, of seats
+_HIGHEST = 0.85  # metres over the floor, of seats
+_OVERHEAD = 1.5  # metres over the floor; what is higher is not part of a seat
+_FLAT = 0.05  # metres over the seat, of what still is seat
+_BACK = 0.15  # metres over the seat, of a back or an arm
 _LEAST = 0.035  # square metres
 # metres: side of the square that a seat has room for; arms and the rims of backs have not
 _ROOM = 0.21
@@ -25,12 +27,13 @@ _ROOM = 0.21
 _NEARLY = 0.5
 # metres between the middles of seat and of what stands up around it, where that is a back
 _ONE_SIDED = 0.10
-# metres between the pelvis and the back; and the front edge, where there is no back
-_BEFORE_BACK, _FROM_EDGE = 0.20, 0.22
+_BEFORE_BACK = 0.20  # metres between the pelvis and the back
+_FROM_EDGE = 0.22  # metres between the pelvis and the front edge, where there is no back
 _ON_IT = 0.12  # metres of seat that the pelvis has before it, however shallow the seat is
 _SNAP = np.radians(30.0)
 _UNDER = 0.08  # metres around a root, in which its seat is looked for
-_SMALLEST, _LARGEST = 0.15, 15.0  # metres across, of furniture
+_SMALLEST = 0.15  # metres across, of furniture
+_LARGEST = 15.0  # metres across, of furniture
 _HALF_WIDTH = 0.28  # metres that a body needs to each side
 # metres from a back to the front edge: on what is deeper, as a bed, one sits on an edge
 _DEEPEST = 1.1

@@ -18,12 +18,12 @@ from .surfaces import HeightField, height_field, surface_points
 __all__ = ["around", "way_round", "walk_to"]
 
 _CELL = 0.08
-# metres over the floor: what lies lower is stepped over, what hangs higher is not met
-_KNEE_LOW, _HEAD_HIGH = 0.07, 1.85
+_KNEE_LOW = 0.07  # metres over the floor; what lies lower is stepped over
+_HEAD_HIGH = 1.85  # metres over the floor; what hangs higher is not met
 _RADIUS = 0.30  # metres that the body's middle keeps from furniture
 _AROUND = 2.0  # metres of floor beyond start and goal
-# metres between start and goal: so many cells are searched in seconds; one is there already
-_FARTHEST, _NEAREST = 100.0, 0.3
+_FARTHEST = 100.0  # metres between start and goal; so many cells are searched in seconds
+_NEAREST = 0.3  # metres between start and goal, under which one is there already
 _TINY = 1.0  # metres across: no room is
 _AHEAD = 500  # cells within which a way is cut short
 _NEIGHBOURS = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
