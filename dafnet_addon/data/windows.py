@@ -175,7 +175,7 @@ def at_another_desk(rng: np.random.Generator, joints: np.ndarray) -> np.ndarray:
         return joints
     use = uses[0]
     wrists = float(use.points[:, 2].min())
-    pelvis = float(np.median(joints[use.start : use.end, 0, 2]))
+    pelvis = float(np.median(joints[use.start : use.end, PELVIS, 2]))
     wanted = max(rng.uniform(*_TOPS), pelvis + _OVER_PELVIS)
     return at_top_height(joints, use, float(np.clip(wanted - wrists, *_TOP_MOVES)))
 
