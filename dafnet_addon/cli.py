@@ -35,12 +35,15 @@ if TYPE_CHECKING:
 
 __all__ = ["main", "run"]
 
-_MAX_PROCESSES = 1024
 _Result = tuple[Any, str] | None
 """What a command found, for machines and for people."""
+
+_MAX_PROCESSES = 1024
+"""More than any machine has cores."""
 _PACKAGES = {"PIL": "pillow"}
-"""Names under which modules are installed, where they are others."""
-_SHOWN = 2000  # characters of each thing out of a file that is printed; --json gives all
+"""The packages to install for modules that have other names than their package."""
+_MAX_SHOWN = 2000
+"""Characters of a text from a file that are printed; --json gives all of it."""
 
 
 def main(
@@ -48,20 +51,21 @@ def main(
 ) -> int:
     """Run one command and return its exit code.
 
-    ``in_blender``: the file that Blender has open is the scene. ``loading``: remembers whether to
-    stop was asked before.
+    ``in_blender``: the file that Blender has open is the scene. ``loading``: knows whether a stop
+    was requested while the program was being loaded.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            # a name that the terminal has no letters for is no reason to fail
+            # A name with letters that the terminal does not have is no reason to fail.
             stream.reconfigure(errors="backslashreplace")
+
     try:
         if loading:
             loading.now()
         options = _parser(in_blender).parse_args(argv)
         _require(options)
         with ExitStack() as stack:
-            # A command that runs Blender stops between two steps; another wherever it is.
+            # A command that runs Blender stops between two steps, any other wherever it is.
             now = stack.enter_context(Stop()).now if "bpy" in options.needs(options) else _never
             with _only_our_output(), _Bar(now) as bar:
                 found = options.run(options, bar)
@@ -93,7 +97,7 @@ def run(loading: Stop | None = None) -> None:
         try:
             stream.flush()
         except OSError:
-            _nowhere(stream)
+            _discard(stream)
     if "bpy" in sys.modules:
         # The module of Blender 4.2 crashes at exit once a property with a poll function was
         # registered, unregistered or not.
@@ -102,8 +106,8 @@ def run(loading: Stop | None = None) -> None:
 
 
 def _open_streams() -> None:
-    """Lead standard streams that were closed to nowhere, before a file gets their number and what
-    is printed.
+    """Open standard streams that were closed on the null device, before a file gets their number,
+    and with it what is printed.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
@@ -113,24 +117,24 @@ def _open_streams() -> None:
             setattr(sys, name, open(os.devnull, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115
 
 
-def _nowhere(stream: TextIO) -> None:
-    """Lead a stream that cannot be written to nowhere: what it still holds would fail again at
-    exit.
+def _discard(stream: TextIO) -> None:
+    """Point a stream that cannot be written at the null device: what it still holds would fail
+    again at exit.
     """
     with open(os.devnull, "wb") as nowhere:
         os.dup2(nowhere.fileno(), stream.fileno())
 
 
 def _say(text: str) -> None:
-    """Print on standard output what was asked for; a reader who has read enough, as ``head`` has,
-    is not an error.
+    """Print the result on standard output; a reader that has read enough, such as ``head``, is not
+    an error.
     """
     try:
         if text:
             print(text)
         sys.stdout.flush()
     except OSError as error:
-        _nowhere(sys.stdout)
+        _discard(sys.stdout)
         if not isinstance(error, BrokenPipeError):
             raise InputError(
                 f"The result cannot be written to standard output ({error.strerror})."
@@ -138,13 +142,13 @@ def _say(text: str) -> None:
 
 
 def _complain(text: str, end: str = "\n") -> None:
-    """Print on standard error, if anybody reads it."""
+    """Print on standard error, if anything reads it."""
     with suppress(OSError):
         print(text, end=end, file=sys.stderr, flush=True)
 
 
 def _never() -> None:
-    """A run that is stopped by an exception needs no asking."""
+    """A command that is stopped by an exception need not ask whether to stop."""
 
 
 def _parser(in_blender: bool) -> argparse.ArgumentParser:
@@ -162,8 +166,8 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
         part: str = "",
         needs: Callable[[argparse.Namespace], Sequence[str]] = lambda _: (),
     ) -> argparse.ArgumentParser:
-        """A subcommand that needs a ``part`` of the checkout, and modules besides NumPy that may
-        depend on its options.
+        """A subcommand. ``part``: the folder of the checkout that it needs. ``needs``: the modules
+        that it needs besides NumPy, which may depend on its options.
         """
         added = commands.add_parser(name, help=text, description=text)
         added.set_defaults(run=action, in_blender=in_blender, part=part, needs=needs)
@@ -210,6 +214,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     written = bake.add_mutually_exclusive_group(required=True)
     written.add_argument("-o", "--output", type=Path, metavar="OUT.blend")
     written.add_argument("--in-place", action="store_true", help="overwrite FILE.blend itself")
+
     bake.add_argument(
         "--scene",
         metavar="NAME",
@@ -227,6 +232,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
         metavar="A:B",
         help="first and last frame; write --frames=A:B if A is negative",
     )
+
     share = _number(float, 0.0, 1.0)
     bake.add_argument(
         "--plant-feet",
@@ -258,6 +264,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
         metavar="SHARE",
         help="0 leaves the motion as generated, 1 smooths out abrupt changes",
     )
+
     bake.add_argument(
         "--takes",
         type=_number(int, 1),
@@ -460,7 +467,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
 def _number(
     kind: type[int] | type[float], low: float, high: float = math.inf
 ) -> Callable[[str], float]:
-    """What reads an option: a finite number of this kind, from ``low`` to ``high``."""
+    """A reader of an option that is a finite number of this kind, from ``low`` to ``high``."""
     what = "whole number" if kind is int else "number"
     limits = f"from {low:g} to {high:.10g}" if high < math.inf else f"of at least {low:g}"
 
@@ -528,6 +535,7 @@ def _bake(options: argparse.Namespace, bar: "_Bar") -> _Result:
     }
     if options.frames:
         changes["frame_start"], changes["frame_end"] = options.frames
+
     output, result = bake_takes(
         options.file,
         options.output,
@@ -538,6 +546,7 @@ def _bake(options: argparse.Namespace, bar: "_Bar") -> _Result:
         progress=bar,
         changes={name: value for name, value in changes.items() if value is not None},
     )
+
     report: dict[str, Any] = {
         "output": str(output),
         "takes": [
@@ -555,9 +564,10 @@ def _bake(options: argparse.Namespace, bar: "_Bar") -> _Result:
         "warnings": list(result.warnings),
         "seconds": {stage: round(spent, 4) for stage, spent in result.seconds.items()},
     }
-    lines = [f"Warning: {printable(warning, _SHOWN)}" for warning in report["warnings"]]
+
+    lines = [f"Warning: {printable(warning, _MAX_SHOWN)}" for warning in report["warnings"]]
     for take in report["takes"]:
-        slides = f"{take['metrics']['foot_sliding_per_frame']:.2f} feet slide a frame"
+        slides = f"{take['metrics']['foot_sliding_per_frame']:.2f} sliding feet per frame"
         lines.append(
             f"{printable(take['action'])}: {take['frames']} frames, seed {take['seed']}, {slides}"
         )
@@ -581,7 +591,7 @@ def _info(options: argparse.Namespace, _bar: "_Bar") -> _Result:
     }
     return described, "\n".join(
         f"{printable(key)}: "
-        f"{printable(value if isinstance(value, str) else json.dumps(value), _SHOWN)}"
+        f"{printable(value if isinstance(value, str) else json.dumps(value), _MAX_SHOWN)}"
         for key, value in described.items()
     )
 
@@ -593,19 +603,18 @@ def _prepare(options: argparse.Namespace, bar: "_Bar") -> _Result:
     prepare(
         options.folder,
         options.output,
-        options.windows,
-        options.processes,
-        options.seed,
-        bar,
-        options.furniture,
+        windows=options.windows,
+        processes=options.processes,
+        seed=options.seed,
+        progress=bar,
+        furniture=options.furniture,
     )
-    described, *told = (
+    description, summary, fits = (
         (options.output / name).read_text(encoding="utf-8")
         for name in ("dataset.json", "summary.txt", "fits.txt")
     )
-    return json.loads(described), "".join(
-        told
-    ) + f"Written to {options.output}; look at its preview.png"
+    written = f"Written to {options.output}; look at its preview.png"
+    return json.loads(description), summary + fits + written
 
 
 def _train(options: argparse.Namespace, bar: "_Bar") -> _Result:
@@ -623,7 +632,16 @@ def _train(options: argparse.Namespace, bar: "_Bar") -> _Result:
     require_writable(file)
     if ranks.rank() == 0:
         precision.announce(config.mixed, device)
-    train(options.dataset, options.output, model, config, bar, device, begin_with)
+
+    train(
+        options.dataset,
+        options.output,
+        model,
+        config,
+        progress=bar,
+        device=device,
+        begin_with=begin_with,
+    )
     if ranks.rank():
         return None
     write_weights(options.output, options.dataset, file)
@@ -716,7 +734,7 @@ def _evaluate_among_real(options: argparse.Namespace, bar: "_Bar") -> _Result:
 
 
 def _evaluate_samp(options: argparse.Namespace, clips: "list[HeldClip]", bar: "_Bar") -> _Result:
-    """A checkpoint of SAMP's: the rows alone, of each way that its network runs."""
+    """A checkpoint of SAMP: only the rows, for each way to run its network."""
     from .baselines.samp_evaluate import measured_samp
     from .baselines.train import load_samp
     from .training.evaluate import rows, table
@@ -755,13 +773,13 @@ def _figures(options: argparse.Namespace, bar: "_Bar") -> _Result:
 
 
 def _benchmark(name: str) -> dict[str, Any]:
-    """What a script of the folder of benchmarks defines."""
+    """The names that a script in the folder of benchmarks defines."""
     return runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / f"{name}.py"))
 
 
 def _require(options: argparse.Namespace) -> None:
     """Raise InputError where the command is not part of this installation, or needs modules that
-    are not there.
+    are missing.
     """
     if not (Path(__file__).parent / options.part).is_dir():
         raise InputError(
@@ -813,8 +831,8 @@ class _Bar:
 
 @contextmanager
 def _only_our_output() -> Iterator[None]:
-    """Send what Blender itself prints on standard output to standard error, so that JSON stays
-    JSON.
+    """A block in which what Blender itself prints on standard output goes to standard error, so
+    that JSON stays JSON.
     """
     sys.stdout.flush()
     kept = os.dup(1)

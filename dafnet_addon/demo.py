@@ -71,25 +71,24 @@ def hand_target(rest: Rest, frames: np.ndarray) -> np.ndarray:
     """World positions (N, 3) of the right wrist that draws a wave on the whiteboard during
     ``rest``.
     """
-    u = np.clip((frames - rest.start) / max(rest.stop - 1 - rest.start, 1), 0.0, 1.0)
-    x = rest.place.position[0] + 0.08 + 0.30 * u
-    return np.stack(
-        [x, np.full(len(u), rest.place.position[1] + 0.36), 1.25 + 0.07 * np.sin(4 * np.pi * u)],
-        axis=1,
-    )
+    share = np.clip((frames - rest.start) / max(rest.stop - 1 - rest.start, 1), 0.0, 1.0)
+    along = rest.place.position[0] + 0.08 + 0.30 * share
+    ahead = np.full(len(share), rest.place.position[1] + 0.36)
+    up = 1.25 + 0.07 * np.sin(4 * np.pi * share)
+    return np.stack([along, ahead, up], axis=1)
 
 
 def demo_report(
     take: Take, scene: Scene, controls: Controls, weights: Weights, seconds: dict[str, float]
 ) -> dict[str, Any]:
-    """What ``report.json`` holds: how the character sits, stands and moves, beside real motion, and
-    the time taken.
+    """What ``report.json`` holds: how the character sits, stands and moves, compared with real
+    motion, and the time taken.
     """
     path, _ = root_from_matrices(take.root)
     floor = path.position[:, 2]
-    reaching = np.broadcast_to(np.asarray(controls.mode) == "EE", len(controls))
+    is_ee = np.broadcast_to(np.asarray(controls.mode) == "EE", len(controls))
     targets = {
-        name: np.where(reaching[:, None], target, np.nan)
+        name: np.where(is_ee[:, None], target, np.nan)
         for name in END_EFFECTORS
         if (target := getattr(controls, name)) is not None
     }

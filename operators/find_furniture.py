@@ -31,5 +31,5 @@ class DAFNET_OT_find_furniture(DafnetOperator, bpy.types.Operator):
         found = find_furniture(context, sent(context)[0])
         for warning in found.warnings:
             self.report({"WARNING"}, warning)
-        more = f" and {len(found.taken) - _NAMED} more" if len(found.taken) > _NAMED else ""
-        self.report({"INFO"}, f"Furniture: {', '.join(found.taken[:_NAMED])}{more}.")
+        more = f" and {len(found.names) - _NAMED} more" if len(found.names) > _NAMED else ""
+        self.report({"INFO"}, f"Furniture: {', '.join(found.names[:_NAMED])}{more}.")

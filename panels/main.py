@@ -1,5 +1,5 @@
-"""The head of the one tab in the 3D view's sidebar: the active character, its mode and targets, and
-Generate.
+"""The first panel of the tab in the 3D view's sidebar: the active character, its mode and targets,
+and Generate.
 """
 
 import bpy
@@ -20,7 +20,7 @@ __all__ = ["CharacterPanel", "DAFNET_PT_character"]
 
 
 class CharacterPanel:
-    """Part of the tab that is there for a character, while none is being generated."""
+    """A panel of the tab that is shown for a character, while no job is running."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -57,6 +57,7 @@ class DAFNET_PT_character(bpy.types.Panel):
             )
             layout.operator(DAFNET_OT_cancel.bl_idname, icon="CANCEL")
             return
+
         character = character_of(context)
         if character is None:
             directed, goal = sent(context)
@@ -90,6 +91,7 @@ class DAFNET_PT_character(bpy.types.Panel):
         row.prop(settings, "root", icon="EMPTY_ARROWS")
         if lacks_root(context, character):
             row.operator(DAFNET_OT_add_root.bl_idname, text="", icon="ADD")
+
         if settings.mode == "EE" or animated:
             column = layout.column()
             for role in ("head", "hand_left", "hand_right"):
@@ -100,6 +102,7 @@ class DAFNET_PT_character(bpy.types.Panel):
                 row.prop(settings, f"{role}_influence", text="Influence", slider=True)
             if missing_targets(context, character):
                 column.operator(DAFNET_OT_add_targets.bl_idname, icon="EMPTY_ARROWS")
+
         if settings.mode == "FULL" or animated:
             layout.prop(settings, "upper_body_source", icon="ARMATURE_DATA")
             if settings.upper_body_source is None:
@@ -117,6 +120,7 @@ class DAFNET_PT_character(bpy.types.Panel):
         column.prop(settings, "temperature", slider=True)
         column.prop(settings, "seed")
         column.prop(settings, "take_count")
+
         row = layout.row()
         row.scale_y = 1.5
         row.operator(DAFNET_OT_generate.bl_idname, icon="PLAY").task = "NEW"

@@ -13,7 +13,7 @@ __all__ = ["DAFNET_PT_overlays"]
 
 
 class DAFNET_PT_overlays(CharacterPanel, bpy.types.Panel):
-    """What the network sees, and how the take does"""
+    """What the network sees, and how good the take is"""
 
     bl_label = "Overlays"
     bl_idname = "DAFNET_PT_overlays"

@@ -71,6 +71,7 @@ class DAFNET_PT_rig(bpy.types.Panel):
             layout.template_list(
                 DAFNET_UL_rig.bl_idname, "", own, "rows", own, "active_row", rows=8
             )
+
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()

@@ -22,15 +22,15 @@ __all__ = ["DAFNET_MT_add", "DAFNET_PT_setup", "add_menu"]
 
 
 class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
-    """Let the character go somewhere, and tell it what is there"""
+    """Send the character somewhere, and tell it what is there"""
 
     bl_label = "Set Up"
     bl_idname = "DAFNET_PT_setup"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There is a character to direct: the active one, one that is selected beside its goal, or
-        the only one.
+        """There is a character to direct: the active one, one that is selected together with its
+        goal, or the only one.
         """
         return running_job() is None and sent(context)[0] is not None
 

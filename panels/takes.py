@@ -1,4 +1,4 @@
-"""The character's takes: which there are, how good they are, and what can be made of them."""
+"""The character's takes: which there are, how good they are, and what can be done with them."""
 
 from typing import Any
 
@@ -18,17 +18,20 @@ from .main import CharacterPanel
 __all__ = ["DAFNET_PT_clean_up", "DAFNET_PT_takes", "DAFNET_UL_takes"]
 
 
-_NAME = 0.45
-"""Share of a row that is a take's name, or a figure's."""
+_NAME_WIDTH = 0.45
+"""Share of a row that the name of a figure takes."""
 
 
-def _said(figure: float, times: float = 1.0) -> str:
-    """A figure that is less than 0 where it cannot be said."""
-    return "–" if figure < 0 else f"{times * figure:.2f}"
+def _text(figure: float, factor: float = 1.0) -> str:
+    """A figure in the unit that is ``factor`` times as small; a dash where it is negative, which
+    stands for none.
+    """
+    return "–" if figure < 0 else f"{factor * figure:.2f}"
 
 
-def _tell(layout: bpy.types.UILayout, name: str, *values: str) -> None:
-    split = layout.split(factor=_NAME, align=True)
+def _draw_figure(layout: bpy.types.UILayout, name: str, *values: str) -> None:
+    """Draw a row of the table: a name, and its values."""
+    split = layout.split(factor=_NAME_WIDTH, align=True)
     split.label(text=name)
     row = split.row(align=True)
     for value in values:
@@ -57,12 +60,14 @@ class DAFNET_UL_takes(bpy.types.UIList):
         if action is None:
             layout.label(text="Deleted", icon="ERROR")
             return
+
         animation = data.id_data.animation_data
         plays = animation is not None and animation.action == action
         row = layout.row(align=True)
         row.operator(
             DAFNET_OT_play_take.bl_idname, text="", icon="PAUSE" if plays else "PLAY", emboss=False
         ).index = index
+
         split = row.split(factor=0.55, align=True)
         split.prop(action, "name", text="", emboss=False)
         figures = split.row(align=True)
@@ -70,21 +75,12 @@ class DAFNET_UL_takes(bpy.types.UIList):
         figures.label(
             text="–" if action.dafnet.collisions < 0 else f"{action.dafnet.collisions:.1f}"
         )
+
         own = action.dafnet
-        row.prop(
-            own,
-            "ghost",
-            text="",
-            icon="GHOST_ENABLED" if own.ghost else "GHOST_DISABLED",
-            emboss=False,
-        )
-        row.prop(
-            own,
-            "accepted",
-            text="",
-            icon="CHECKBOX_HLT" if own.accepted else "CHECKBOX_DEHLT",
-            emboss=False,
-        )
+        ghost = "GHOST_ENABLED" if own.ghost else "GHOST_DISABLED"
+        row.prop(own, "ghost", text="", icon=ghost, emboss=False)
+        accepted = "CHECKBOX_HLT" if own.accepted else "CHECKBOX_DEHLT"
+        row.prop(own, "accepted", text="", icon=accepted, emboss=False)
 
 
 class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
@@ -94,7 +90,7 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
     bl_idname = "DAFNET_PT_takes"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the list, the chosen take's figures, and what can be made of it."""
+        """Draw the list, the chosen take's figures, and what can be done with it."""
         layout = self.layout
         character: Any = character_of(context)
         own = character.dafnet
@@ -103,6 +99,7 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
             return
         row = layout.row()
         row.template_list(DAFNET_UL_takes.bl_idname, "", own, "takes", own, "active_take", rows=4)
+
         column = row.column(align=True)
         column.operator(DAFNET_OT_play_take.bl_idname, text="", icon="TRIA_UP").step = "PREVIOUS"
         column.operator(DAFNET_OT_play_take.bl_idname, text="", icon="TRIA_DOWN").step = "NEXT"
@@ -121,12 +118,14 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
             )
         )
         layout.label(text=f"Likelihood {figures.log_likelihood:.0f} nats per frame")
+
         table = layout.column(align=True)
-        _tell(table, "", "Raw", "Cleaned")
-        _tell(table, "Sliding feet", _said(figures.raw_sliding), _said(figures.sliding))
-        _tell(table, "Collisions", _said(figures.raw_collisions), _said(figures.collisions))
-        _tell(table, "Miss, cm", _said(figures.raw_miss, 100), _said(figures.miss, 100))
-        _tell(table, "Jerk, m/s³", _said(figures.raw_jerk), _said(figures.jerk))
+        _draw_figure(table, "", "Raw", "Cleaned")
+        _draw_figure(table, "Sliding feet", _text(figures.raw_sliding), _text(figures.sliding))
+        _draw_figure(table, "Collisions", _text(figures.raw_collisions), _text(figures.collisions))
+        _draw_figure(table, "Miss, cm", _text(figures.raw_miss, 100), _text(figures.miss, 100))
+        _draw_figure(table, "Jerk, m/s³", _text(figures.raw_jerk), _text(figures.jerk))
+
         row = layout.row(align=True)
         row.operator(
             DAFNET_OT_generate.bl_idname, text="Vary the Legs", icon="MOD_DYNAMICPAINT"

@@ -24,7 +24,7 @@ __all__ = [
     "sent",
 ]
 
-_CHAIN = {  # the joint at which each bone's tail lies
+_CHAIN = {
     "pelvis": "spine1",
     "spine1": "spine2",
     "spine2": "spine3",
@@ -37,7 +37,9 @@ _CHAIN = {  # the joint at which each bone's tail lies
     "left_knee": "left_ankle",
     "left_ankle": "left_foot",
 }
+"""The joint at which each bone's tail lies."""
 _LEAVES = {"head": (0, 0, 0.16), "left_wrist": (-0.18, 0, 0), "left_foot": (0, 0.07, 0)}
+"""From a last joint to its bone's tail, canonical metres."""
 
 
 def metres_per_unit(scene: bpy.types.Scene) -> float:
@@ -49,13 +51,14 @@ def metres_per_unit(scene: bpy.types.Scene) -> float:
 
 
 def missing_bones(armature: bpy.types.Object) -> list[str]:
-    """Names of ``JOINTS`` that are not bones of the armature."""
+    """The ``JOINTS`` that the armature has no bones for."""
     return [name for name in JOINTS if name not in armature.data.bones]
 
 
 def is_character(candidate: bpy.types.Object) -> bool:
-    """Whether an object is a character's armature; SMPL-X has bones of the same names in other
-    places, and no root of ours.
+    """Whether an object is a character's armature.
+
+    SMPL-X has bones of the same names, but in other places, and no root of ours.
     """
     if candidate.type != "ARMATURE" or missing_bones(candidate):
         return False
@@ -69,7 +72,7 @@ def is_character(candidate: bpy.types.Object) -> bool:
 
 
 def parts_of(character: bpy.types.Object) -> set[bpy.types.Object]:
-    """An armature, what hangs on it, its root and its targets."""
+    """A character's armature, what is parented to it, its root and its targets."""
     own = character.dafnet
     return {
         character,
@@ -136,6 +139,7 @@ def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:
             f"The armature '{armature.name}' has no bone '{missing[0]}'; use a character made "
             "with Add Character."
         )
+
     bones = [armature.data.bones[name] for name in JOINTS]
     chained = [bone.parent and bone.parent.name for bone in bones] == [
         JOINTS[p] if p >= 0 else None for p in PARENTS
@@ -147,6 +151,7 @@ def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:
             f"The bones of '{armature.name}' were given other parents or another inheritance; add "
             "a new character."
         )
+
     heads = np.array([bone.head_local for bone in bones])
     offsets = heads[1:] - heads[list(PARENTS[1:])]
     canonical = OFFSETS[1:] @ FACING
@@ -155,6 +160,7 @@ def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:
         raise InputError(
             f"The bones of '{armature.name}' were moved in edit mode; add a new character instead."
         )
+
     size = np.array(armature.scale)
     if not np.isfinite(size).all() or size[0] <= 0.0 or np.ptp(size) > 1e-4 * size[0]:
         raise InputError(
@@ -173,11 +179,11 @@ def create_character(
     """A character of this height (metres) at the 3D cursor: armature, body, and root, head and hand
     empties.
 
-    ``build``: thickness of trunk and limbs over the usual; bones and motion are the same.
+    It stands in a T-pose and looks along the world's +y, in a new collection of its own. ``build``:
+    how thick trunk and limbs are, over the usual; bones and motion are the same.
 
-    It stands in a T-pose looking along the world's +y, in a new collection of its own. Returns the
-    armature, whose ``dafnet`` settings name the empties. ``InputError``: Blender is not in object
-    mode.
+    Returns the armature, whose ``dafnet`` settings name the empties. ``InputError``: Blender is not
+    in object mode.
     """
     if context.mode != "OBJECT":
         raise InputError(
@@ -194,20 +200,21 @@ def create_character(
     add_body(collection, armature, scale, build)
 
     def empty(role: str, point: tuple[float, float, float], size: float) -> bpy.types.Object:
-        made = bpy.data.objects.new(f"{name} {role}", None)
-        made.empty_display_type = "ARROWS"
-        made.empty_display_size = size * scale
-        made.location = place + Vector(point) * scale
-        collection.objects.link(made)
-        return made
+        target = bpy.data.objects.new(f"{name} {role}", None)
+        target.empty_display_type = "ARROWS"
+        target.empty_display_size = size * scale
+        target.location = place + Vector(point) * scale
+        collection.objects.link(target)
+        return target
 
     settings = armature.dafnet
     settings.root = empty("Root", (0.0, 0.0, 0.0), 0.4)
     settings.head = empty("Head", tuple(REST[joint("head")]), 0.2)
     settings.hand_left = empty("Left Hand", (-0.22, 0.08, 0.90), 0.15)
     settings.hand_right = empty("Right Hand", (0.22, 0.08, 0.90), 0.15)
-    for each in context.view_layer.objects.selected:
-        each.select_set(False)
+
+    for selected in context.view_layer.objects.selected:
+        selected.select_set(False)
     settings.root.select_set(True)
     armature.select_set(True)
     context.view_layer.objects.active = armature
@@ -219,6 +226,7 @@ def _mirrored(name: str) -> str:
 
 
 def _tail(name: str) -> np.ndarray:
+    """The tail (3,) of a joint's bone, canonical metres."""
     left = name.replace("right_", "left_")
     side = np.array([-1.0 if left != name else 1.0, 1.0, 1.0])
     if left in _LEAVES:
@@ -232,9 +240,9 @@ def _armature_object(
     name: str,
     scale: float,
 ) -> bpy.types.Object:
-    """Bones from joint to joint.
+    """An armature with a bone from joint to joint.
 
-    Arms turn about their vertical axis and legs about the lateral one: z up, or z ahead.
+    Bones of arms and feet have their z axis up, the upright ones have it ahead.
     """
     armature = bpy.data.objects.new(name, bpy.data.armatures.new(name))
     collection.objects.link(armature)
@@ -249,6 +257,7 @@ def _armature_object(
         across = abs(bone.vector.normalized().x) > 0.7
         ahead = abs(bone.vector.normalized().y) > 0.7
         bone.align_roll(Vector((0, 0, 1)) if across or ahead else Vector((0, -1, 0)))
+
     bpy.ops.object.mode_set(mode="OBJECT")
     for bone in armature.pose.bones:
         bone.rotation_mode = "QUATERNION"

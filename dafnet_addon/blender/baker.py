@@ -21,7 +21,14 @@ from .compat import action_curves, assign_action, new_action
 from .curves import copy_curve
 from .mannequin import FACING
 
-__all__ = ["TRANSFORMS", "bake", "driven", "key_curves", "laid_over", "require_bakeable"]
+__all__ = [
+    "TRANSFORMS",
+    "bake",
+    "has_drivers",
+    "key_curves",
+    "has_bone_overrides",
+    "require_bakeable",
+]
 
 TRANSFORMS = ("location", "rotation", "scale")
 """How the data paths of an object's own transform begin."""
@@ -39,18 +46,20 @@ def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
         raise InputError(
             f"The armature '{armature.name}' is linked or a library override; make it local first."
         )
+
     if armature.parent:
         raise InputError(
             f"The armature '{armature.name}' has a parent; clear it, and parent the root object "
             "instead."
         )
-    if any(not constraint.mute for constraint in armature.constraints) or driven(
+    if any(not constraint.mute for constraint in armature.constraints) or has_drivers(
         armature, TRANSFORMS
     ):
         raise InputError(
             f"The armature '{armature.name}' has object constraints or drivers; mute them and "
             "constrain the root."
         )
+
     delta = (
         *armature.delta_location,
         *armature.delta_rotation_euler,
@@ -60,6 +69,7 @@ def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
         raise InputError(
             f"The armature '{armature.name}' has delta transforms; apply them and try again."
         )
+
     if armature.data.pose_position == "REST":
         raise InputError(
             f"The armature '{armature.name}' shows its rest position; set it to Pose Position."
@@ -73,15 +83,17 @@ def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
     return character_scale(armature, unit)
 
 
-def laid_over(armature: bpy.types.Object) -> bool:
-    """Whether constraints or drivers of bones change what an action plays."""
+def has_bone_overrides(armature: bpy.types.Object) -> bool:
+    """Whether constraints or drivers of joints' bones change what an action plays."""
     constraints = (
         constraint for name in JOINTS for constraint in armature.pose.bones[name].constraints
     )
-    return any(not constraint.mute for constraint in constraints) or driven(armature, "pose.bones[")
+    return any(not constraint.mute for constraint in constraints) or has_drivers(
+        armature, "pose.bones["
+    )
 
 
-def driven(armature: bpy.types.Object, paths: str | tuple[str, ...]) -> bool:
+def has_drivers(armature: bpy.types.Object, paths: str | tuple[str, ...]) -> bool:
     """Whether drivers that are not muted move anything whose data path begins like one of these."""
     drivers = armature.animation_data.drivers if armature.animation_data else ()
     return any(not driver.mute and driver.data_path.startswith(paths) for driver in drivers)
@@ -124,28 +136,26 @@ def bake(
     carried = [curve for curve in action_curves(armature) if not _is_motion(curve.data_path)]
     action, add_curve = new_action(armature, name)
     action.use_fake_user = True
-    key_curves(add_curve, "location", "Root", frames, take.root[:, :3, 3] / unit)
-    key_curves(
-        add_curve,
-        "rotation_euler",
-        "Root",
-        frames,
-        np.stack([0 * heading, 0 * heading, heading], axis=1),
-    )
+
+    places = take.root[:, :3, 3] / unit
+    angles = np.stack([0 * heading, 0 * heading, heading], axis=1)
+    key_curves(add_curve, "location", "Root", frames=frames, values=places)
+    key_curves(add_curve, "rotation_euler", "Root", frames=frames, values=angles)
     for j, joint_name in enumerate(JOINTS):
         rest = np.array(armature.data.bones[joint_name].matrix_local)
         axes = FACING @ rest[:3, :3]
         quaternions = continuous_signs(quaternion_from_matrix(axes.T @ local[:, j] @ axes))
         path = f'pose.bones["{joint_name}"].'
         if j == 0:
-            key_curves(
-                add_curve,
-                path + "location",
-                joint_name,
-                frames,
-                (pelvis - rest[:3, 3]) @ rest[:3, :3],
-            )
-        key_curves(add_curve, path + "rotation_quaternion", joint_name, frames, quaternions)
+            moved = (pelvis - rest[:3, 3]) @ rest[:3, :3]
+            key_curves(add_curve, path + "location", joint_name, frames=frames, values=moved)
+        key_curves(
+            add_curve,
+            path + "rotation_quaternion",
+            joint_name,
+            frames=frames,
+            values=quaternions,
+        )
     for curve in carried:
         copy_curve(curve, add_curve)
 
@@ -164,10 +174,11 @@ def key_curves(
     add_curve: Callable[[str, int, str], bpy.types.FCurve],
     path: str,
     group: str,
+    *,
     frames: np.ndarray,
     values: np.ndarray,
 ) -> None:
-    """One linear curve for each column of ``values`` (T, D)."""
+    """One linear curve with keys at ``frames`` (T,) for each column of ``values`` (T, D)."""
     for index, column in enumerate(values.T):
         curve = add_curve(path, index, group)
         points = curve.keyframe_points

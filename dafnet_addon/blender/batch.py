@@ -35,8 +35,8 @@ def bake_takes(
     weights: "Weights | None" = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[Path, job.Result]:
-    """Bake ``takes`` takes of one character and save; the first plays, the others are Actions of
-    the file too.
+    """Bake ``takes`` takes of one character and save; the first one plays, the others are Actions
+    in the file, too.
 
     ``file`` None stands for the file that is open, ``output`` None for the file itself. ``scene``
     is needed where another one is active in the file, ``character`` names the armature where the
@@ -55,25 +55,29 @@ def bake_takes(
     assert written is not None
     if written.suffix != ".blend":
         raise InputError(f"The output '{written}' must end in .blend.")
+
     require_writable(written)
     if output is not None and source is not None and _same(output, source):
         raise InputError(
             f"'{output}' is the scene's own file; give the output another name, or use --in-place."
         )
+
     if file is not None:
         _open(file)
     progress(0.0)
-    warnings = tuple(_told(output is None))
+    warnings = tuple(_warnings_about_file(in_place=output is None))
     for library in bpy.data.libraries:
         if _same(written, Path(bpy.path.abspath(library.filepath))):
             raise InputError(
                 f"'{written}' is a library of the scene; give the output another name."
             )
+
     chosen = _scene(scene)
     with _active(chosen):
         armature = _character(chosen, character)
         settings = job.settings_of(armature, chosen, **{"take_count": takes, **(changes or {})})
         result = run_to_end(job.steps(bpy.context, settings, weights), progress)
+
     save_scene(written, lambda: progress(1.0))
     return written, replace(result, warnings=warnings + result.warnings)
 
@@ -104,8 +108,8 @@ def _same(one: Path, other: Path) -> bool:
 
 
 def _open(file: Path) -> None:
-    """Open a file. Its scripts run where Blender's own preferences let them, which at first they do
-    not.
+    """Open a file. Its scripts run only if Blender's preferences allow that, which by default they
+    do not.
     """
     if not file.is_file():
         raise InputError(f"There is no file '{file}'; check its path.")
@@ -118,10 +122,8 @@ def _open(file: Path) -> None:
         ) from error
 
 
-def _told(in_place: bool) -> Iterator[str]:
-    """Warnings about the open file. ``InputError`` where to write it anew would lose a part of
-    it.
-    """
+def _warnings_about_file(in_place: bool) -> Iterator[str]:
+    """Warnings about the open file. ``InputError`` where overwriting it would lose a part of it."""
     if bpy.data.version[:2] > bpy.app.version[:2]:
         newer = (
             f"The file was saved by Blender {bpy.data.version[0]}.{bpy.data.version[1]}, which is "
@@ -164,9 +166,9 @@ def _active(scene: bpy.types.Scene) -> AbstractContextManager[object]:
     return bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])
 
 
-def _elsewhere(scene: bpy.types.Scene, named: str | None) -> str:
-    """What is to be said of the other scenes: which of them has such an armature, or any
-    character.
+def _hint_at_other_scenes(scene: bpy.types.Scene, named: str | None) -> str:
+    """What to do where another scene has the armature that is ``named``, or for None any character;
+    empty where none has.
     """
     for other in bpy.data.scenes:
         armatures = [ob for ob in other.objects if ob.type == "ARMATURE" and other != scene]
@@ -188,13 +190,18 @@ def _character(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
     if name is not None:
         named = [ob for ob in armatures if name in (ob.name, ob.name_full)]
         if not named:
-            to_do = _elsewhere(scene, name) or "give --character the name of one that it has"
+            to_do = (
+                _hint_at_other_scenes(scene, name) or "give --character the name of one that it has"
+            )
             raise InputError(f"The scene '{scene.name}' has no armature '{name}'; {to_do}.")
         return named[0]
     characters = [ob for ob in armatures if is_character(ob)]
     directed = [ob for ob in characters if ob.dafnet.root is not None] or characters
     if not directed:
-        to_do = _elsewhere(scene, None) or "add one in Blender with Add Character and save the file"
+        to_do = (
+            _hint_at_other_scenes(scene, None)
+            or "add one in Blender with Add Character and save the file"
+        )
         raise InputError(f"The scene '{scene.name}' has no character; {to_do}.")
     if len(directed) > 1:
         names = ", ".join(f"'{ob.name}'" for ob in directed)

@@ -11,7 +11,7 @@ import bpy
 __all__ = [
     "new_action",
     "assign_action",
-    "playing",
+    "playback_restorer",
     "action_curves",
     "animated_paths",
     "shares_curves",
@@ -29,7 +29,7 @@ def new_action(
     """A new action for ``owner``, not assigned yet, and a function (path, index, group) that adds a
     curve to it.
 
-    An empty ``group`` is none.
+    With an empty ``group`` the curve is in none.
     """
     action = bpy.data.actions.new(name)
     if _SLOTS:
@@ -60,9 +60,10 @@ def assign_action(owner: bpy.types.Object, action: bpy.types.Action) -> None:
         data.action_slot = action.slots[0]
 
 
-def playing(owner: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
-    """A function that lets ``owner``, as it may have to be found again, play what it plays now,
-    mixed as it is now.
+def playback_restorer(owner: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
+    """A function that lets ``owner`` play again what it plays now, mixed as it is now.
+
+    It is given the object, which may have to be found again after an undo.
     """
     data = owner.animation_data
     if data is None:
@@ -73,7 +74,7 @@ def playing(owner: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
     slot = data.action_slot.handle if _SLOTS and data.action_slot else None
     last_slot = data.last_slot_identifier if _SLOTS else ""
 
-    def again(found: bpy.types.Object) -> None:
+    def restore(found: bpy.types.Object) -> None:
         data = found.animation_data_create()
         action = next((each for each in bpy.data.actions if each.name_full == name), None)
         data.action = action
@@ -87,7 +88,7 @@ def playing(owner: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
         if action:
             action.use_fake_user = kept
 
-    return again
+    return restore
 
 
 def action_curves(owner: bpy.types.Object) -> list[bpy.types.FCurve]:

@@ -1,4 +1,4 @@
-"""The curves of one action into another, with all that makes them play as they do."""
+"""Copies of animation curves, with everything that makes them play as they do."""
 
 from collections.abc import Callable
 from typing import Any
@@ -8,9 +8,9 @@ import numpy as np
 
 __all__ = ["copy_curve"]
 
-_KEY_FIRST = ("co", "handle_left_type", "handle_right_type")
-"""Of a key, what has to be set before its handles."""
-_ELSEWHERE = {
+_BEFORE_HANDLES = ("co", "handle_left_type", "handle_right_type")
+"""What of a key has to be set before its handles."""
+_NOT_COPIED = {
     "co_ui",
     "select",
     "select_control_point",
@@ -19,7 +19,7 @@ _ELSEWHERE = {
     "lock",
     "name",
 }
-"""Properties that others stand for, that are of a moment, or that are set apart."""
+"""Properties that follow from others, that say what is selected, or that are copied apart."""
 _KINDS = {"FLOAT": np.float32, "INT": np.int32, "ENUM": np.int32, "BOOLEAN": np.bool_}
 
 
@@ -35,12 +35,12 @@ def copy_curve(
     """
     group = source.group
     target = add_curve(source.data_path, source.array_index, group.name if group else "")
-    _alike(source, target, ("data_path", "array_index"))
-    _keys(source, target)  # after the settings, some of which let Blender lay the handles anew
+    _copy_properties(source, target, ("data_path", "array_index"))
+    _copy_keys(source, target)  # after the settings, some of which let Blender lay the handles anew
     for modifier in source.modifiers:
-        _modifier(modifier, target.modifiers.new(modifier.type))
+        _copy_modifier(modifier, target.modifiers.new(modifier.type))
     if group and len(target.group.channels) == 1:
-        _alike(group, target.group)
+        _copy_properties(group, target.group)
         target.group.lock = group.lock
     elif group and group.mute:
         target.mute = True
@@ -48,7 +48,7 @@ def copy_curve(
     return target
 
 
-def _keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
+def _copy_keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
     old, new = source.keyframe_points, target.keyframe_points
     if len(source.sampled_points):  # straight from sample to sample
         places = np.array([tuple(sample.co) for sample in source.sampled_points], np.float32)
@@ -61,8 +61,8 @@ def _keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
     kinds = bpy.types.Keyframe.bl_rna.properties
     names = [kind.identifier for kind in kinds if kind.type in _KINDS and not kind.is_readonly]
     for name in (
-        *_KEY_FIRST,
-        *(name for name in names if name not in _KEY_FIRST and name not in _ELSEWHERE),
+        *_BEFORE_HANDLES,
+        *(name for name in names if name not in _BEFORE_HANDLES and name not in _NOT_COPIED),
     ):
         length = max(1, getattr(kinds[name], "array_length", 1))
         values = np.empty(length * len(old), _KINDS[kinds[name].type])
@@ -70,8 +70,8 @@ def _keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
         new.foreach_set(name, values)
 
 
-def _modifier(source: bpy.types.FModifier, target: bpy.types.FModifier) -> None:
-    _alike(source, target)
+def _copy_modifier(source: bpy.types.FModifier, target: bpy.types.FModifier) -> None:
+    _copy_properties(source, target)
     if source.type != "ENVELOPE":
         return
     old, new = source.control_points, target.control_points
@@ -84,12 +84,12 @@ def _modifier(source: bpy.types.FModifier, target: bpy.types.FModifier) -> None:
         new.foreach_set(name, values)
 
 
-def _alike(source: Any, target: Any, apart: tuple[str, ...] = ()) -> None:
-    """Set all plain properties of ``target`` as those of ``source`` are."""
+def _copy_properties(source: Any, target: Any, skipped: tuple[str, ...] = ()) -> None:
+    """Copy all plain properties of ``source`` but some to ``target``."""
     for kind in source.bl_rna.properties:
         if (
             kind.type in {*_KINDS, "STRING"}
             and not kind.is_readonly
-            and kind.identifier not in {*_ELSEWHERE, *apart}
+            and kind.identifier not in {*_NOT_COPIED, *skipped}
         ):
             setattr(target, kind.identifier, getattr(source, kind.identifier))

@@ -1,5 +1,5 @@
-"""The example: a room from tables of parts, a character, its keyed root and hand target, a take and
-its preview.
+"""The demo: a room built from tables of parts, a character with keyed root and hand target, a take,
+and its preview.
 """
 
 import json
@@ -270,9 +270,9 @@ def run_demo(
 
 def new_collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
     """A new collection in the scene."""
-    made = bpy.data.collections.new(name)
-    scene.collection.children.link(made)
-    return made
+    collection = bpy.data.collections.new(name)
+    scene.collection.children.link(collection)
+    return collection
 
 
 def add_piece(

@@ -22,10 +22,15 @@ from .walking import extended_to
 
 __all__ = ["EXAMPLES", "Example", "add_example"]
 
-# seconds after the root has come to rest and before it leaves, in which hands go to their targets
-_COMES_OVER = 0.2
-_BED_TOP, _PILLOW = 0.46, 0.07  # metres
-_HERE = Place((0.0, 0.0), 0.0)
+_BLEND_SECONDS = 0.2
+"""Seconds in which hands go to their targets: after the root has come to rest, and before it
+leaves.
+"""
+_BED_TOP = 0.46
+"""Metres; height of the mattress."""
+_PILLOW = 0.07
+"""Metres; thickness of the pillow."""
+_ORIGIN = Place((0.0, 0.0), 0.0)
 _WRITING_DESK = (  # the demo's, with a sheet of paper where its computer stands
     *(part for part in FURNITURE["Desk"] if part.center[2] < 0.74 or part.round),
     Part("Paper", (0.21, 0.297, 0.004), (-0.13, 0.19, 0.742), bevel=0.0),
@@ -34,13 +39,13 @@ _WRITING_DESK = (  # the demo's, with a sheet of paper where its computer stands
 
 @dataclass(frozen=True)
 class Plan:
-    """What a character does: its ``walked`` root, the ``targets`` (T, 3) of some of head and hands,
-    and the mode EE in frames ``reaching`` (first, end exclusive); metres from the example's middle.
+    """What a character does: the root's ``route``, the ``targets`` (T, 3) of some of head and
+    hands, and the frames (start, stop) in which its mode is EE; metres from the example's middle.
     """
 
-    walked: Route
+    route: Route
     targets: dict[str, np.ndarray] = field(default_factory=dict)
-    reaching: tuple[int, int] | None = None
+    ee_frames: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -58,8 +63,10 @@ class Example:
 def _writing(
     seconds: np.ndarray, width: float, tall: float, line: float = 3.0
 ) -> tuple[np.ndarray, ...]:
-    """A hand that writes: metres along the line, up the page, and off it (N,) each, between lines
-    of so many seconds.
+    """A hand that writes, at (N,) ``seconds``: metres (N,) along the line, up the page, and,
+    between lines, off it.
+
+    ``width`` of a line and height (``tall``) of its letters, metres; ``line``: seconds for each.
     """
     number, u = np.floor(seconds / line), (seconds % line) / line
     back = np.clip((u - 0.85) / 0.15, 0.0, 1.0)
@@ -76,11 +83,14 @@ def _writing(
     return along, letters - 1.4 * tall * (number + ease), np.sin(np.pi * back)
 
 
-def _during(rest: Rest, frames: int, fps: float) -> tuple[np.ndarray, tuple[int, int]]:
-    """Seconds (T,) since the hands are there, held before and after; and the frames in which they
-    are.
+def _ee_seconds(rest: Rest, frames: int, fps: float) -> tuple[np.ndarray, tuple[int, int]]:
+    """Seconds (T,) since the hands have reached their targets during a rest, constant before and
+    after; and the frames (start, stop) in which they are there.
     """
-    first, last = rest.start + round(_COMES_OVER * fps), rest.stop - 1 - round(_COMES_OVER * fps)
+    first, last = (
+        rest.start + round(_BLEND_SECONDS * fps),
+        rest.stop - 1 - round(_BLEND_SECONDS * fps),
+    )
     return (np.clip(np.arange(frames), first, last) - first) / fps, (first, last)
 
 
@@ -93,11 +103,11 @@ def _desk(fps: float) -> Plan:
         Stop((0.0, 0.0), 0.0, 7.0, seated=True),
         fps=fps,
     )
-    seconds, reaching = _during(walked.rests[-1], len(walked.path), fps)
+    seconds, ee_frames = _ee_seconds(walked.rests[-1], len(walked.path), fps)
     along, up, off = _writing(seconds, 0.15, 0.022)
     right = np.stack([0.07 + along, 0.545 + up, 0.785 + 0.03 * off], axis=1)
     left = np.tile([-0.17, 0.535, 0.785], (len(right), 1))
-    return Plan(walked, {"hand_right": right, "hand_left": left}, (reaching[0], len(right)))
+    return Plan(walked, {"hand_right": right, "hand_left": left}, (ee_frames[0], len(right)))
 
 
 def _whiteboard(fps: float) -> Plan:
@@ -110,10 +120,10 @@ def _whiteboard(fps: float) -> Plan:
         Stop((-1.5, -1.0), facing((0.45, -1.0)), 1.5),
         fps=fps,
     )
-    seconds, reaching = _during(walked.rests[1], len(walked.path), fps)
+    seconds, ee_frames = _ee_seconds(walked.rests[1], len(walked.path), fps)
     along, up, off = _writing(seconds, 0.34, 0.085)
     right = np.stack([0.04 + along, 0.37 - 0.07 * off, 1.43 + up], axis=1)
-    return Plan(walked, {"hand_right": right}, reaching)
+    return Plan(walked, {"hand_right": right}, ee_frames)
 
 
 def _sofa(fps: float) -> Plan:
@@ -158,8 +168,10 @@ def _bed(fps: float) -> Plan:
     )
     position[:, 1] -= inward * turned
     path = RootPath(position, yaw)
+
     back = 0.6 * eased(0.15, 1.65) + 0.4 * eased(1.4, 2.0)
     angle = np.radians(88.0) * back
+
     over = _BED_TOP + 0.12
     head = np.stack(
         [
@@ -172,8 +184,10 @@ def _bed(fps: float) -> Plan:
     right = np.stack(
         [0.20 + 0.10 * back, 0.10 - 0.10 * back, _BED_TOP + 0.20 - 0.11 * back], axis=1
     )
+
     local = {"head": head, "hand_right": right, "hand_left": right * (-1.0, 1.0, 1.0)}
     targets = {role: rotate(yaw_matrix(yaw), place) + position for role, place in local.items()}
+
     rests = (
         sits.rests[0],
         sits.rests[1],
@@ -186,7 +200,10 @@ EXAMPLES = {
     "DESK": Example(
         "Chair and Desk",
         "Walks up to a desk, sits down and writes",
-        {"Chair": (FURNITURE["Chair"], _HERE), "Desk": (_WRITING_DESK, Place((0.0, 0.80), np.pi))},
+        {
+            "Chair": (FURNITURE["Chair"], _ORIGIN),
+            "Desk": (_WRITING_DESK, Place((0.0, 0.80), np.pi)),
+        },
         _desk,
     ),
     "WHITEBOARD": Example(
@@ -202,7 +219,7 @@ EXAMPLES = {
         _sofa,
     ),
     "BED": Example(
-        "Bed", "Sits down on a bed and lies down on it", {"Bed": (FURNITURE["Bed"], _HERE)}, _bed
+        "Bed", "Sits down on a bed and lies down on it", {"Bed": (FURNITURE["Bed"], _ORIGIN)}, _bed
     ),
 }
 """What the Add menu offers besides a character alone."""
@@ -222,13 +239,14 @@ def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
     unit, fps = metres_per_unit(scene), scene.render.fps / scene.render.fps_base
     plan = example.plan(fps)
     middle = scene.cursor.location.copy()
+
     furniture = new_collection(scene, example.label)
     for name, (parts, place) in example.pieces.items():
         made = add_piece(furniture, name, parts, place)
         made.data.transform(Matrix.Scale(1.0 / unit, 4))
         made.location = middle + made.location / unit
 
-    path, first = plan.walked.path, scene.frame_start
+    path, first = plan.route.path, scene.frame_start
     try:
         scene.cursor.location = middle + Vector(path.position[0]) / unit
         armature = create_character(context)
@@ -237,7 +255,7 @@ def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
     armature.rotation_euler.z += float(path.yaw[0])
     own = armature.dafnet
     own.furniture = furniture
-    placed = Route(RootPath(path.position + np.array(middle) * unit, path.yaw), plan.walked.rests)
+    placed = Route(RootPath(path.position + np.array(middle) * unit, path.yaw), plan.route.rests)
     write_keys(own.root, placed, first=first, scale=1.0 / unit, fps=fps)
     _direct(armature, plan, first, np.array(middle), unit)
     extended_to(scene, armature, first + len(path) - 1)
@@ -254,16 +272,16 @@ def _direct(
     own = armature.dafnet
     for role in ("head", "hand_left", "hand_right"):
         target = getattr(own, role)
-        if plan.reaching is None or role not in plan.targets:
-            setattr(own, f"{role}_influence", 0.0 if plan.reaching else 1.0)
+        if plan.ee_frames is None or role not in plan.targets:
+            setattr(own, f"{role}_influence", 0.0 if plan.ee_frames else 1.0)
             continue
-        begin, end = plan.reaching
+        begin, end = plan.ee_frames
         frames = np.arange(begin, end)
         key_channels(target, first + frames, location=middle + plan.targets[role][frames] / unit)
-    if plan.reaching is not None:
-        modes = [(0, "FREE"), (plan.reaching[0], "EE")]
-        if plan.reaching[1] < len(plan.walked.path):
-            modes.append((plan.reaching[1], "FREE"))
+    if plan.ee_frames is not None:
+        modes = [(0, "FREE"), (plan.ee_frames[0], "EE")]
+        if plan.ee_frames[1] < len(plan.route.path):
+            modes.append((plan.ee_frames[1], "FREE"))
         for frame, mode in modes:
             own.mode = mode
             armature.keyframe_insert("dafnet.mode", frame=first + frame)

@@ -1,8 +1,8 @@
 """The meshes that a character may touch or must avoid, as the viewport evaluates them, and how they
 move.
 
-What follows the character is none, nor are helpers: what no render shows and the viewport draws as
-wire or bounds, and what is there to be cut out of something else.
+What follows the character is not furniture, and neither are helpers: objects that no render shows
+and that the viewport draws as wire or bounds, and those that Booleans cut with.
 """
 
 from collections import defaultdict
@@ -24,8 +24,8 @@ from .settings import Settings
 __all__ = ["Furniture", "array", "furniture_at", "furniture_now", "furniture_of"]
 
 _DRAWN_THROUGH = {"WIRE", "BOUNDS"}
-_CHANGED = 1e-3
-"""How far a vertex moves, over the mesh's size, when its shape has changed."""
+_SHAPE_TOLERANCE = 1e-3
+"""How far a vertex may move, over the mesh's size, before its shape counts as changed."""
 
 
 @dataclass
@@ -59,7 +59,13 @@ def furniture_of(settings: Settings, dependencies: Dependencies) -> "Furniture |
         *armature.children_recursive,
         *(o for o in scene.objects if o.name_full in named),
     }
-    return Furniture(scene, find_collection(settings.furniture), armature, own, dependencies)
+    return Furniture(
+        scene,
+        collection=find_collection(settings.furniture),
+        armature=armature,
+        own=own,
+        dependencies=dependencies,
+    )
 
 
 def furniture_now(context: bpy.types.Context, settings: Settings) -> dict[str, list[Mesh]]:
@@ -94,8 +100,8 @@ def furniture_at(
 
 
 class Furniture:
-    """A collection's evaluated meshes at the frame where it ``begin``s, and their matrices in that
-    and all frames added.
+    """A collection's evaluated meshes in the frame where it ``begin``s, and their matrices in that
+    frame and in all frames added.
 
     ``own``: the character, its parts and what directs it. ``members``: the objects whose meshes are
     furniture.
@@ -109,45 +115,52 @@ class Furniture:
         own: set[bpy.types.Object],
         dependencies: Dependencies,
     ) -> None:
-        self._collection, self._armature, self._own, self._dependencies = (
-            collection,
-            armature,
-            own,
-            dependencies,
-        )
+        self._collection = collection
+        self._armature = armature
+        self._own = own
+        self._dependencies = dependencies
+
         candidates = [o for o in collection.all_objects if o not in own]
-        self._held = {o for o in candidates if dependencies.follows(o, armature)}
+        self._carried = {o for o in candidates if dependencies.follows(o, armature)}
         drawn_through = {o for o in candidates if o.display_type in _DRAWN_THROUGH}
         unrendered = set(candidates) - _rendered(scene.collection)
         self._helpers = (drawn_through & unrendered) | (
             (drawn_through | unrendered) & _cutters(scene)
-        ) - self._held
-        self._doubtful = (drawn_through | unrendered) - self._helpers - self._held
-        self.members = set(candidates) - self._held - self._helpers
+        ) - self._carried
+        self._doubtful = (drawn_through | unrendered) - self._helpers - self._carried
+        self.members = set(candidates) - self._carried - self._helpers
+
         self._pieces: list[_Piece] = []
         self._shown: dict[bpy.types.Object, bool] = {}
         self._changed: dict[str, None] = {}
-        self._blinking: dict[str, None] = {}
+        self._toggled: dict[str, None] = {}
 
     def begin(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Read the meshes with faces; instances of one mesh share its arrays. ``InputError``: there
         are none.
         """
         shapes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-        met = False
+        found = False
         for instance in self._meshes(depsgraph):
-            met = True
+            found = True
             pointer = instance.object.data.as_pointer()
             if pointer not in shapes:
                 shapes[pointer] = _geometry(instance.object)
             vertices, triangles = shapes[pointer]
             if len(triangles):
                 source = None if instance.is_instance else instance.object.original
-                piece = _Piece(_key(instance), _owner(instance).name, source, vertices, triangles)
+                piece = _Piece(
+                    key=_key(instance),
+                    name=_owner(instance).name,
+                    source=source,
+                    vertices=vertices,
+                    triangles=triangles,
+                )
                 piece.matrices.append(array(instance.matrix_world))
                 self._pieces.append(piece)
+
         name = self._collection.name
-        if not met:
+        if not found:
             raise InputError(
                 f"The furniture collection '{name}' has no visible mesh besides the character's "
                 "own; add some, or clear the setting."
@@ -172,11 +185,12 @@ class Furniture:
                 if not instance.is_instance:
                     continue
                 if key not in shapes:
-                    self._blinking[_owner(instance).name] = None
+                    self._toggled[_owner(instance).name] = None
                     continue
                 found[key] = array(instance.matrix_world)
                 if _owner(instance) in shaped or instance.object.original in shaped:
                     self._compare(shapes[key], instance.object)
+
         for piece in self._pieces:
             if piece.source is not None:
                 evaluated = piece.source.evaluated_get(depsgraph)
@@ -184,18 +198,19 @@ class Furniture:
                 if piece.source in shaped and piece.source.visible_get():
                     self._compare(piece, evaluated)
             elif piece.key not in found:
-                self._blinking[piece.name] = None
+                self._toggled[piece.name] = None
             piece.matrices.append(found[piece.key] if piece.key in found else piece.matrices[-1])
+
         for member, shown in self._shown.items():
             if member.visible_get() != shown:
-                self._blinking[member.name] = None
+                self._toggled[member.name] = None
 
     def solids(self, unit: float) -> tuple[Mesh, ...]:
         """The furniture in metres, of which a Blender unit is ``unit``."""
         return tuple(_solid(piece, unit) for piece in self._pieces)
 
-    def told(self) -> Iterator[str]:
-        """Sentences about what was read otherwise than the scene shows it."""
+    def warnings(self) -> Iterator[str]:
+        """Sentences about what was read differently from what the scene shows."""
         nowhere = (
             p.name
             for p in self._pieces
@@ -210,18 +225,19 @@ class Furniture:
                 f"The shape of '{name}' changes during the shot; its shape at the first frame is "
                 "used."
             )
-        for name in self._blinking:
+        for name in self._toggled:
             yield (
                 f"'{name}' is shown or hidden during the shot; it counts throughout as it does at "
                 "the first frame."
             )
+
         worn = {
             o
-            for o in self._held
+            for o in self._carried
             if any(m.type == "ARMATURE" and m.object == self._armature for m in o.modifiers)
         }
-        if held := self._named(self._held - worn):
-            yield f"Ignored as furniture, since the character moves it: {held}."
+        if carried := self._named(self._carried - worn):
+            yield f"Ignored as furniture, since the character moves it: {carried}."
         if helpers := self._named(self._helpers):
             yield (
                 f"Ignored as helpers, since no render shows them: {helpers}; let renders show "
@@ -241,27 +257,27 @@ class Furniture:
     def _meshes(
         self, depsgraph: bpy.types.Depsgraph
     ) -> Iterator[bpy.types.DepsgraphObjectInstance]:
-        """Every evaluated mesh that is furniture, instances among them."""
+        """Every evaluated mesh that is furniture, including instances."""
         for instance in depsgraph.object_instances:
             if instance.object.type != "MESH" or not (instance.is_instance or instance.show_self):
                 continue
-            owner, made_of = _owner(instance), instance.object.original
-            if owner in self.members and owner.visible_get() and not self._follows(made_of):
+            owner, original = _owner(instance), instance.object.original
+            if owner in self.members and owner.visible_get() and not self._follows(original):
                 yield instance
 
-    def _follows(self, made_of: bpy.types.Object) -> bool:
+    def _follows(self, original: bpy.types.Object) -> bool:
         """Whether an object that may lie outside the collection, in an instanced one, is the
         character's or moved by it.
         """
-        if made_of in self.members:
+        if original in self.members:
             return False
-        return made_of in self._own or self._dependencies.follows(made_of, self._armature)
+        return original in self._own or self._dependencies.follows(original, self._armature)
 
     def _compare(self, piece: _Piece, evaluated: bpy.types.Object) -> None:
         if piece.name in self._changed:
             return
         vertices, _ = _geometry(evaluated)
-        tolerance = _CHANGED * np.ptp(piece.vertices, axis=0).max()
+        tolerance = _SHAPE_TOLERANCE * np.ptp(piece.vertices, axis=0).max()
         if (
             vertices.shape != piece.vertices.shape
             or np.abs(vertices - piece.vertices).max() > tolerance

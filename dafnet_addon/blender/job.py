@@ -23,20 +23,22 @@ from .armature import metres_per_unit
 from .baker import bake
 from .lookup import find_action, find_object, find_scene, names_in_use
 from .preferences import device_of, weights_path
-from .rollback import state_of, undone_on_failure
+from .rollback import state_restorer, undone_on_failure
 from .scene_reader import read_scene
 from .settings import CLEAN_UP, Settings, settings_of
-from .takes import add_take, draw_of, play_take, stored
+from .takes import add_take, draw_of, play_take, stored_take
 
 if TYPE_CHECKING:
     from ..core.weights import Weights
 
 __all__ = ["Result", "Settings", "clean_again_of", "draws_of", "settings_of", "steps", "run"]
 
-_READ, _GENERATED = 0.1, 0.95
-"""Progress after the scene is read and after the takes are generated."""
+_READ = 0.1
+"""Progress once the scene is read."""
+_GENERATED = 0.95
+"""Progress once the takes are generated."""
 _FURTHER_TAKES = 1.0
-"""Temperature of every take but the first where none is set: at 0 all would be the same."""
+"""Temperature of every take but the first where it is set to 0, at which all would be the same."""
 
 
 @dataclass(frozen=True)
@@ -56,17 +58,17 @@ class Result:
 
     @property
     def action(self) -> bpy.types.Action:
-        """The first one's."""
+        """The first take's action."""
         return self.actions[0]
 
     @property
     def take(self) -> Take:
-        """The first one."""
+        """The first take."""
         return self.takes[0]
 
 
 def draws_of(settings: Settings) -> list[Draw]:
-    """What the takes are drawn with: each further one with the next seed."""
+    """The seeds and temperatures of the takes: each further one has the next seed."""
     first = Draw(
         settings.seed, settings.lower_seed, settings.temperature, settings.lower_temperature
     )
@@ -97,21 +99,7 @@ def run(
         weights = load_weights(weights_path(context))
     started = perf_counter()
     used = names_in_use(settings)
-    resume, at = None, 0
-    if settings.kept is not None:
-        action = find_action(settings.kept)
-        resume, at = stored(action)[0], settings.kept_until - settings.frame_start
-        if action.dafnet.frame_start != settings.frame_start:
-            raise InputError(
-                f"The take '{action.name}' begins at another frame than the range; let the range "
-                "start there."
-            )
-        render = find_scene(settings).render
-        if not 0.0 < at * render.fps_base / render.fps < len(resume) / resume.fps:
-            raise InputError(
-                f"Frame {settings.kept_until} is not inside the take '{action.name}'; go to a "
-                "frame in it."
-            )
+    resume, resume_frame = _kept_take(settings)
     try:
         read = yield from within(read_scene.steps(context, settings), 0.0, _READ)
     except ReferenceError as error:
@@ -128,7 +116,7 @@ def run(
             weights,
             draws,
             resume=resume,
-            resume_frame=at,
+            resume_frame=resume_frame,
             device=device_of(context),
             clean_up=_clean_up(settings),
             watch=watch,
@@ -136,6 +124,7 @@ def run(
         _READ,
         _GENERATED,
     )
+
     started = perf_counter()
     if gone := used - names_in_use(settings):
         raise InputError(f"'{min(gone)}' is no longer in the scene; generate again.")
@@ -144,11 +133,39 @@ def run(
     seconds["baking"] = perf_counter() - started
     yield 1.0
     return Result(
-        tuple(actions), tuple(takes), tuple(draws), read.warnings + takes[0].warnings, seconds
+        actions=tuple(actions),
+        takes=tuple(takes),
+        draws=tuple(draws),
+        warnings=read.warnings + takes[0].warnings,
+        seconds=seconds,
     )
 
 
 steps = run.steps
+
+
+def _kept_take(settings: Settings) -> tuple[Take | None, int]:
+    """The take of which a part is kept, and its first frame to generate anew; None and 0 where none
+    is kept.
+    """
+    if settings.kept is None:
+        return None, 0
+
+    action = find_action(settings.kept)
+    take, _ = stored_take(action)
+    index = settings.kept_until - settings.frame_start
+    if action.dafnet.frame_start != settings.frame_start:
+        raise InputError(
+            f"The take '{action.name}' begins at another frame than the range; let the range "
+            "start there."
+        )
+    render = find_scene(settings).render
+    if not 0.0 < index * render.fps_base / render.fps < len(take) / take.fps:
+        raise InputError(
+            f"Frame {settings.kept_until} is not inside the take '{action.name}'; go to a "
+            "frame in it."
+        )
+    return take, index
 
 
 def _bake_steps(
@@ -159,13 +176,16 @@ def _bake_steps(
     """
     names: list[str] = []
     with ExitStack() as undo:
-        undo.callback(_unbake, settings, names, state_of(_character(settings)))
+        undo.callback(_unbake, settings, names, state_restorer(_character(settings)))
         for take, draw in zip(takes, draws, strict=True):
             armature = _character(settings)
             with undone_on_failure(armature):
                 unit = metres_per_unit(find_scene(settings))
-                action = bake(take, armature, settings.frame_start, f"{armature.name} take", unit)
-                add_take(armature, action, take, controls, draw, settings.frame_start)
+                start = settings.frame_start
+                action = bake(take, armature, start, name=f"{armature.name} take", unit=unit)
+                add_take(
+                    armature, action, take=take, controls=controls, draw=draw, frame_start=start
+                )
                 names.append(action.name_full)
             if len(names) < len(takes):
                 yield len(names) / len(takes)
@@ -198,7 +218,7 @@ def clean_again_of(
     Targets, root and mode count as they were when it was generated, furniture as it is now.
     ``InputError`` as for ``steps``, and where the action holds no take; nothing is changed then.
     """
-    take, controls = stored(action)
+    take, controls = stored_take(action)
     start = action.dafnet.frame_start
     settings = settings_of(
         armature, context.scene, frame_start=start, frame_end=start + len(take) - 1, mode="FREE"
@@ -207,4 +227,10 @@ def clean_again_of(
     again = run_to_end(clean_again_steps(read.scene, controls, take, _clean_up(settings)))
     draw = draw_of(action)
     actions = run_to_end(_bake_steps(settings, [again], controls, [draw]))
-    return Result(tuple(actions), (again,), (draw,), again.warnings, again.seconds)
+    return Result(
+        actions=tuple(actions),
+        takes=(again,),
+        draws=(draw,),
+        warnings=again.warnings,
+        seconds=again.seconds,
+    )

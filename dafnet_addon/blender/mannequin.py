@@ -17,9 +17,12 @@ inverse.
 
 _LIGHT, _DARK = 0, 1
 _MATERIALS = (("Mannequin", (0.62, 0.56, 0.50, 1.0)), ("Mannequin Joints", (0.16, 0.15, 0.15, 1.0)))
-_RINGS, _SEGMENTS = 14, 16
-_LEAN = ("head", "left_wrist", "left_ankle", "left_foot")
-"""Parts that are as they are on any build."""
+_RINGS = 14
+"""Rings of vertices along a part."""
+_SEGMENTS = 16
+"""Vertices of a ring."""
+_ANY_BUILD = ("head", "left_wrist", "left_ankle", "left_foot")
+"""Parts that have the same thickness for every build."""
 
 # Bone, material, axis, and sections along that axis: the place on it, the centre's two other
 # coordinates, half widths.
@@ -330,7 +333,7 @@ def add_body(
     groups: dict[str, list[int]] = {}
     count = 0
     for bone, material, axis, sections in _PARTS:
-        points, shape = _part(axis, sections, 1.0 if bone in _LEAN else build)
+        points, shape = _part(axis, sections, 1.0 if bone in _ANY_BUILD else build)
         for side in ("left", "right") if bone.startswith("left_") else ("middle",):
             if side == "right":
                 points, shape = points * (-1.0, 1.0, 1.0), [face[::-1] for face in shape]

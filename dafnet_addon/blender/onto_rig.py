@@ -17,19 +17,18 @@ from ..core.root import root_from_matrices
 from ..core.rotations import continuous_signs, normalised, quaternion_from_matrix
 from ..core.skeleton import ANKLES, HEAD, HIPS, JOINTS, WRISTS
 from .armature import character_scale, metres_per_unit
-from .baker import TRANSFORMS, driven, key_curves
+from .baker import TRANSFORMS, has_drivers, key_curves
 from .compat import action_curves, assign_action, new_action
 from .mannequin import FACING
 from .playback import frame_kept
 from .rig_controls import (
-    Attachments,
     Channels,
     Control,
-    channels,
+    channels_for,
     controls_of,
-    posed,
-    probe,
-    settled,
+    evaluated_now,
+    find_attachments,
+    rotations_without,
 )
 from .rig_reading import character_motion, pose_matrices, rigid_parts, shape_of
 from .rigs import RigMap, in_names_of, required
@@ -37,8 +36,10 @@ from .rollback import undone_on_failure
 
 __all__ = ["Baked", "bake_onto_rig", "frames_played"]
 
-_CHECKED = 24
-"""Frames in which the result is measured."""
+_MEASURED_FRAMES = 24
+"""How many frames the result is measured in."""
+_INTERFERING = 1e-3
+"""How far a matrix of a joint's bone changes, at least, when a bone that interferes is moved."""
 _BONE_PATH = re.compile(r'^pose\.bones\["(.+?)"\](?:\["(.+)"\])?')
 Curves = Callable[[str, int, str], bpy.types.FCurve]
 
@@ -61,9 +62,9 @@ class Baked:
 
 
 @dataclass(frozen=True)
-class _Read:
-    """Matrices of every frame: ``bodies`` and ``poses`` of the character, ``above`` (T, 4, 4) what
-    carries the rig's object.
+class _Recording:
+    """Matrices of every frame: ``bodies`` (T, 4, 4) and ``poses`` (T, 22, 4, 4) of the character,
+    ``above`` (T, 4, 4) of what carries the rig's object.
     """
 
     bodies: np.ndarray
@@ -101,6 +102,7 @@ def bake_onto_rig(
     frames = frames_played(character, context.scene) if frames is None else frames
     unit = metres_per_unit(context.scene)
     size = character_scale(character, 1.0)
+
     _require_bakeable(context, rig, root_motion)
     if character.data.pose_position == "REST":
         raise InputError(
@@ -108,31 +110,33 @@ def bake_onto_rig(
         )
     rig_map = in_names_of(rig_map, rig.data.bones.keys()) if rig.mode != "EDIT" else rig_map
     required(rig, rig_map)
+
     controls = controls_of(rig, rig_map, limbs, root_motion == "BONE")
-    read = _read(context, character, rig, frames)
+    recording = _record(context, character, rig, frames)
+    options = _BakeOptions(
+        root_motion=root_motion,
+        limbs=limbs,
+        frames=np.array(frames, float),
+        name=name or f"{character.name} on {rig.name}",
+        size=size,
+        unit=unit,
+    )
     with frame_kept(context.scene), undone_on_failure(rig):
         return _bake(
             context,
-            character,
-            rig,
-            rig_map,
-            controls,
-            read,
-            _Wish(
-                root_motion,
-                limbs,
-                np.array(frames, float),
-                name or f"{character.name} on {rig.name}",
-                size,
-                unit,
-            ),
+            character=character,
+            rig=rig,
+            rig_map=rig_map,
+            controls=controls,
+            recording=recording,
+            options=options,
         )
 
 
 @dataclass(frozen=True)
-class _Wish:
-    """What was asked for, see ``bake_onto_rig``; ``size``: of the character, in Blender units of
-    the canonical metre.
+class _BakeOptions:
+    """How to bake, see ``bake_onto_rig``; ``frames`` (T,); ``size``: of the character, in Blender
+    units for a canonical metre; ``unit``: a Blender unit in metres.
     """
 
     root_motion: str
@@ -145,71 +149,116 @@ class _Wish:
 
 def _bake(
     context: bpy.types.Context,
+    *,
     character: bpy.types.Object,
     rig: bpy.types.Object,
     rig_map: RigMap,
     controls: list[Control],
-    read: _Read,
-    wish: _Wish,
+    recording: _Recording,
+    options: _BakeOptions,
 ) -> Baked:
     previous = rig.animation_data.action if rig.animation_data else None
-    moved, switched = _animated(rig)
-    action, add_curve = new_action(rig, wish.name)
-    action.use_fake_user = True
-    assign_action(rig, action)
-    for bone, key, value in (
-        *rig_map.settings.get(wish.limbs, ()),
-        *rig_map.settings.get("BOTH", ()),
-    ):
-        _set(rig, add_curve, bone, key, value, wish.frames[0])
-        switched.discard((bone, key))
-    for bone, key in switched:
-        _set(rig, add_curve, bone, key, rig.pose.bones[bone].get(key), wish.frames[0])
-    moved |= {bone.name for bone in rig.pose.bones if bone.matrix_basis != Matrix.Identity(4)}
-    for bone in _in_the_way(context, rig, rig_map, moved - {control.bone for control in controls}):
-        _at_rest(rig.pose.bones[bone], add_curve, wish.frames[0], ("location", "rotation", "scale"))
-    for control in controls:
-        if control.bone in moved:
-            _at_rest(
-                rig.pose.bones[control.bone],
-                add_curve,
-                wish.frames[0],
-                ("location", "scale")[control.moves :],
-            )
+    add_curve = _prepare_rig(context, rig=rig, rig_map=rig_map, controls=controls, options=options)
+    action = rig.animation_data.action
 
-    held = probe(context, rig, controls)
-    evaluated = settled(context, rig)
+    attachments = find_attachments(context, rig, controls)
+    evaluated = evaluated_now(context, rig)
     places = [rig_map.place(joint) for joint in JOINTS]
     basis = np.array(rig.matrix_basis, float)
-    still = read.above @ basis
+    still = recording.above @ basis
     _, scale = rigid_parts(still, f"armature '{rig.name}'")
+
     shape = shape_of(rig, rig_map, pose_matrices(evaluated, places), scale)
-    path, _ = root_from_matrices(_facing(read.bodies))
-    motion = character_motion(character, read.bodies, read.poses)
-    retargeted = retarget(motion, canonical_body(wish.size), shape.body, path.position)
+    path, _ = root_from_matrices(_facing(recording.bodies))
+    motion = character_motion(character, recording.bodies, recording.poses)
+    retargeted = retarget(motion, canonical_body(options.size), shape.body, path.position)
+
     carrier = path.matrices()
     carrier[:, :3, :3] = scale * carrier[:, :3, :3] @ shape.axes.T
-    objects = carrier if wish.root_motion == "OBJECT" else still
-    made = channels(
+    objects = carrier if options.root_motion == "OBJECT" else still
+    channels = channels_for(
         controls,
-        held,
-        shape,
-        retargeted,
-        objects,
-        carrier if wish.root_motion == "BONE" else objects,
+        attachments=attachments,
+        shape=shape,
+        retargeted=retargeted,
+        objects=objects,
+        carrier=carrier if options.root_motion == "BONE" else objects,
     )
 
-    _key_object(rig, add_curve, wish, np.linalg.inv(read.above) @ objects, basis)
+    local = np.linalg.inv(recording.above) @ objects
+    _key_object(rig, add_curve, options=options, matrices=local, rest=basis)
     curves = {
-        control.bone: _key_control(rig, add_curve, control, made, i, wish.frames)
-        for i, control in enumerate(controls)
+        control.bone: _key_control(
+            rig, add_curve, control, channels=channels, index=index, frames=options.frames
+        )
+        for index, control in enumerate(controls)
     }
     if previous:
         previous.use_fake_user = True
-    if held.loose:
-        _settle_loose(context, rig, controls, held, made, curves, wish.frames)
-    errors, angles = _measured(context, rig, rig_map, retargeted.targets, motion.joints, wish)
-    return Baked(action, errors, angles, retargeted.ratio, _overruled(rig, controls))
+    if attachments.loose:
+        _correct_loose(
+            context,
+            rig,
+            controls=controls,
+            loose=attachments.loose,
+            channels=channels,
+            curves=curves,
+            frames=options.frames,
+        )
+
+    errors, angles = _measure(
+        context,
+        rig,
+        rig_map,
+        targets=retargeted.targets,
+        source=motion.joints,
+        options=options,
+    )
+    return Baked(
+        action=action,
+        errors=errors,
+        angles=angles,
+        ratio=retargeted.ratio,
+        overruled=_overruled(rig, controls),
+    )
+
+
+def _prepare_rig(
+    context: bpy.types.Context,
+    *,
+    rig: bpy.types.Object,
+    rig_map: RigMap,
+    controls: list[Control],
+    options: _BakeOptions,
+) -> Curves:
+    """Let the rig play a new action in which its settings are keyed and everything at rest that
+    would interfere; returns what adds curves to it.
+    """
+    moved, switched = _animated(rig)
+    action, add_curve = new_action(rig, options.name)
+    action.use_fake_user = True
+    assign_action(rig, action)
+    first = options.frames[0]
+
+    for bone, key, value in (
+        *rig_map.settings.get(options.limbs, ()),
+        *rig_map.settings.get("BOTH", ()),
+    ):
+        _key_setting(rig, add_curve, bone=bone, key=key, value=value, frame=first)
+        switched.discard((bone, key))
+    for bone, key in switched:
+        value = rig.pose.bones[bone].get(key)
+        _key_setting(rig, add_curve, bone=bone, key=key, value=value, frame=first)
+
+    moved |= {bone.name for bone in rig.pose.bones if bone.matrix_basis != Matrix.Identity(4)}
+    unmapped = moved - {control.bone for control in controls}
+    for bone in _interfering(context, rig, rig_map, unmapped):
+        _key_rest(rig.pose.bones[bone], add_curve, first, ("location", "rotation", "scale"))
+    for control in controls:
+        if control.bone in moved:
+            kinds = ("location", "scale")[control.moves :]
+            _key_rest(rig.pose.bones[control.bone], add_curve, first, kinds)
+    return add_curve
 
 
 def _overruled(rig: bpy.types.Object, controls: list[Control]) -> tuple[str, ...]:
@@ -220,7 +269,7 @@ def _overruled(rig: bpy.types.Object, controls: list[Control]) -> tuple[str, ...
             not constraint.mute and constraint.influence > 0.0
             for constraint in rig.pose.bones[name].constraints
         )
-        return own or driven(
+        return own or has_drivers(
             rig,
             tuple(
                 f'pose.bones["{bpy.utils.escape_identifier(name)}"].{part}' for part in TRANSFORMS
@@ -259,7 +308,7 @@ def _require_bakeable(context: bpy.types.Context, rig: bpy.types.Object, root_mo
         raise InputError(
             f"The armature '{rig.name}' plays an NLA strip in tweak or solo mode; leave it first."
         )
-    if driven(rig, TRANSFORMS):
+    if has_drivers(rig, TRANSFORMS):
         raise InputError(f"The object '{rig.name}' is moved by drivers; mute them and bake again.")
     delta = (*rig.delta_location, *rig.delta_rotation_euler, *(s - 1.0 for s in rig.delta_scale))
     if root_motion == "OBJECT" and (any(not c.mute for c in rig.constraints) or any(delta)):
@@ -269,9 +318,9 @@ def _require_bakeable(context: bpy.types.Context, rig: bpy.types.Object, root_mo
         )
 
 
-def _read(
+def _record(
     context: bpy.types.Context, character: bpy.types.Object, rig: bpy.types.Object, frames: range
-) -> _Read:
+) -> _Recording:
     """Play the frames and note what is needed; the current frame is as it was afterwards."""
     bodies, poses, above = [], [], []
     with frame_kept(context.scene):
@@ -282,13 +331,15 @@ def _read(
             bodies.append(np.array(evaluated.matrix_world, float))
             poses.append(pose_matrices(evaluated, list(JOINTS)))
             above.append(np.array(own.matrix_world @ own.matrix_basis.inverted_safe(), float))
-    read = _Read(np.array(bodies), np.array(poses), np.array(above))
-    if not all(np.isfinite(values).all() for values in (read.bodies, read.poses, read.above)):
+    recording = _Recording(np.array(bodies), np.array(poses), np.array(above))
+    if not all(
+        np.isfinite(values).all() for values in (recording.bodies, recording.poses, recording.above)
+    ):
         raise InputError(
             f"'{character.name}' or '{rig.name}' has a transform that is not a number; fix what "
             "drives it."
         )
-    return read
+    return recording
 
 
 def _animated(rig: bpy.types.Object) -> tuple[set[str], set[tuple[str, str]]]:
@@ -308,11 +359,11 @@ def _animated(rig: bpy.types.Object) -> tuple[set[str], set[tuple[str, str]]]:
     return moved, switched
 
 
-def _in_the_way(
+def _interfering(
     context: bpy.types.Context, rig: bpy.types.Object, rig_map: RigMap, suspects: set[str]
 ) -> list[str]:
-    """Those of some bones that move joints when they are moved; they are left at rest, the others
-    keep their pose.
+    """Those among some bones that move joints when they are moved; they are left at rest, while the
+    others keep their pose.
 
     In control rigs they need not be parents of what they move, so each of them is tried.
     """
@@ -320,52 +371,50 @@ def _in_the_way(
     places = [rig_map.place(joint) for joint in JOINTS]
     for name in suspects:
         rig.pose.bones[name].matrix_basis.identity()
-    rest = pose_matrices(settled(context, rig), places) if suspects else np.empty(0)
+    rest = pose_matrices(evaluated_now(context, rig), places) if suspects else np.empty(0)
+
     found = []
     for name in sorted(suspects):
         bone = rig.pose.bones[name]
         bone.matrix_basis = Matrix.Rotation(0.3, 4, "X") @ Matrix.Rotation(0.3, 4, "Z")
         bone.location = (0.1 * bone.length,) * 3
-        off = np.abs(pose_matrices(settled(context, rig), places) - rest)
-        if np.nanmax(off) > 1e-3:
+        change = np.abs(pose_matrices(evaluated_now(context, rig), places) - rest)
+        if np.nanmax(change) > _INTERFERING:
             found.append(name)
         bone.matrix_basis.identity()
+
     for name in suspects - set(found):
         rig.pose.bones[name].matrix_basis = poses[name]
     return found
 
 
-def _at_rest(
+def _key_rest(
     bone: bpy.types.PoseBone, add_curve: Curves, frame: float, kinds: tuple[str, ...]
 ) -> None:
     """Put a bone at rest, with one key for each kind of channels."""
     bone.matrix_basis.identity()
     start = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].'
     path, rotation = _rotation_channels(bone.rotation_mode, np.array([[1.0, 0.0, 0.0, 0.0]]))
-    given = {
+    at_rest = {
         "location": ("location", np.zeros((1, 3))),
         "rotation": (path, rotation),
         "scale": ("scale", np.ones((1, 3))),
     }
     for kind in kinds:
-        key_curves(add_curve, start + given[kind][0], bone.name, np.array([frame]), given[kind][1])
+        path, values = at_rest[kind]
+        key_curves(add_curve, start + path, bone.name, frames=np.array([frame]), values=values)
 
 
-def _set(
-    rig: bpy.types.Object, add_curve: Curves, bone: str, key: str, value: Any, frame: float
+def _key_setting(
+    rig: bpy.types.Object, add_curve: Curves, *, bone: str, key: str, value: Any, frame: float
 ) -> None:
     """Set and key a custom property of a bone, where the bone has it as a number."""
-    holder = rig.pose.bones[bone]
-    if isinstance(holder.get(key), int | float):
-        holder[key] = type(holder[key])(value)
+    owner = rig.pose.bones[bone]
+    if isinstance(owner.get(key), int | float):
+        owner[key] = type(owner[key])(value)
         names = (bpy.utils.escape_identifier(part) for part in (bone, key))
-        key_curves(
-            add_curve,
-            'pose.bones["{}"]["{}"]'.format(*names),
-            bone,
-            np.array([frame]),
-            np.array([[value]]),
-        )
+        path = 'pose.bones["{}"]["{}"]'.format(*names)
+        key_curves(add_curve, path, bone, frames=np.array([frame]), values=np.array([[value]]))
 
 
 def _rotation_channels(mode: str, quaternions: np.ndarray) -> tuple[str, np.ndarray]:
@@ -394,101 +443,115 @@ def _quaternions(turns: np.ndarray) -> np.ndarray:
 def _key_object(
     rig: bpy.types.Object,
     add_curve: Curves,
-    wish: _Wish,
-    basis: np.ndarray,
-    now: np.ndarray,
+    *,
+    options: _BakeOptions,
+    matrices: np.ndarray,
+    rest: np.ndarray,
 ) -> None:
-    """Keys of the object: its way over the floor, or the one place where it stays."""
-    frames = wish.frames
-    if wish.root_motion != "OBJECT":
-        basis, frames = now[None], frames[:1]
-    turns, _ = rigid_parts(basis, f"armature '{rig.name}'")
-    path, values = _rotation_channels(rig.rotation_mode, _quaternions(turns))
-    key_curves(add_curve, "location", "Object", frames, basis[:, :3, 3])
-    key_curves(add_curve, path, "Object", frames, values)
+    """Keys of the object: ``matrices`` (T, 4, 4) that take it over the floor, or ``rest`` (4, 4)
+    where it stays in one place.
+    """
+    frames = options.frames
+    if options.root_motion != "OBJECT":
+        matrices, frames = rest[None], frames[:1]
+
+    rotations, _ = rigid_parts(matrices, f"armature '{rig.name}'")
+    path, values = _rotation_channels(rig.rotation_mode, _quaternions(rotations))
+    key_curves(add_curve, "location", "Object", frames=frames, values=matrices[:, :3, 3])
+    key_curves(add_curve, path, "Object", frames=frames, values=values)
 
 
 def _key_control(
     rig: bpy.types.Object,
     add_curve: Curves,
     control: Control,
-    made: Channels,
-    i: int,
+    *,
+    channels: Channels,
+    index: int,
     frames: np.ndarray,
 ) -> dict[str, list[bpy.types.FCurve]]:
-    """Keys of one control; returns its curves by channel."""
+    """Keys of one control, the one with this ``index``; returns its curves by channel."""
     bone = rig.pose.bones[control.bone]
     bone.matrix_basis.identity()
-    path, values = _rotation_channels(bone.rotation_mode, _quaternions(made.turns[:, i]))
+    path, values = _rotation_channels(bone.rotation_mode, _quaternions(channels.turns[:, index]))
     start = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].'
-    found: dict[str, list[bpy.types.FCurve]] = {}
+    curves: dict[str, list[bpy.types.FCurve]] = {}
 
-    def add(channel: str) -> Curves:
-        def kept(path: str, index: int, group: str) -> bpy.types.FCurve:
+    def adding_to(channel: str) -> Curves:
+        def add(path: str, index: int, group: str) -> bpy.types.FCurve:
             curve = add_curve(path, index, group)
-            found.setdefault(channel, []).append(curve)
+            curves.setdefault(channel, []).append(curve)
             return curve
 
-        return kept
+        return add
 
     if control.moves:
-        key_curves(add("location"), start + "location", bone.name, frames, made.moves[:, i])
+        moves = channels.moves[:, index]
+        key_curves(
+            adding_to("location"), start + "location", bone.name, frames=frames, values=moves
+        )
     if control.pole is None:
-        key_curves(add("rotation"), start + path, bone.name, frames, values)
-    return found
+        key_curves(adding_to("rotation"), start + path, bone.name, frames=frames, values=values)
+    return curves
 
 
-def _settle_loose(
+def _correct_loose(
     context: bpy.types.Context,
     rig: bpy.types.Object,
+    *,
     controls: list[Control],
-    held: Attachments,
-    made: Channels,
+    loose: list[int],
+    channels: Channels,
     curves: dict[str, dict[str, list[bpy.types.FCurve]]],
     frames: np.ndarray,
 ) -> None:
     """Where a control is not turned rigidly by another one, look in each frame how it lies, and
-    turn it as was wanted.
+    turn it as wanted.
 
     Once for every such control, since each of them may hang on the one before.
     """
-    for _ in held.loose:
-        bare = np.empty((len(frames), len(held.loose), 3, 3))
+    for _ in loose:
+        bare = np.empty((len(frames), len(loose), 3, 3))
         for t, frame in enumerate(frames):
             context.scene.frame_set(int(frame))
             evaluated = rig.evaluated_get(context.evaluated_depsgraph_get())
-            bare[t] = posed(evaluated, [controls[i] for i in held.loose], made.turns[t, held.loose])
-        for k, i in enumerate(held.loose):
-            made.turns[:, i] = np.swapaxes(bare[:, k], 1, 2) @ made.wanted[:, i]
+            bare[t] = rotations_without(
+                evaluated, [controls[i] for i in loose], channels.turns[t, loose]
+            )
+
+        for k, i in enumerate(loose):
+            channels.turns[:, i] = np.swapaxes(bare[:, k], 1, 2) @ channels.wanted[:, i]
             mode = rig.pose.bones[controls[i].bone].rotation_mode
-            _, values = _rotation_channels(mode, _quaternions(made.turns[:, i]))
+            _, values = _rotation_channels(mode, _quaternions(channels.turns[:, i]))
             for curve, column in zip(curves[controls[i].bone]["rotation"], values.T, strict=True):
                 points = np.stack([frames, column], axis=1).astype(np.float32)
                 curve.keyframe_points.foreach_set("co", points.ravel())
                 curve.update()
 
 
-def _measured(
+def _measure(
     context: bpy.types.Context,
     rig: bpy.types.Object,
     rig_map: RigMap,
+    *,
     targets: np.ndarray,
     source: np.ndarray,
-    wish: _Wish,
+    options: _BakeOptions,
 ) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[float, float]]]:
-    """Errors and angles as in ``Baked``, of the joints' targets and the source's joints (T, 22,
-    3).
+    """Errors and angles as in ``Baked``, measured against the joints' targets and the source's
+    joints (T, 22, 3).
     """
-    chosen = np.unique(np.linspace(0, len(wish.frames) - 1, _CHECKED).astype(int))
+    count = len(options.frames)
+    chosen = np.unique(np.linspace(0, count - 1, _MEASURED_FRAMES).astype(int))
     bones = {j: rig_map.place(name) for j, name in enumerate(JOINTS) if rig_map.place(name)}
     played = np.full((len(chosen), len(JOINTS), 3), np.nan)
-    for t, frame in enumerate(wish.frames[chosen]):
+    for t, frame in enumerate(options.frames[chosen]):
         context.scene.frame_set(int(frame))
         evaluated = rig.evaluated_get(context.evaluated_depsgraph_get())
         for j, bone in bones.items():
             played[t, j] = evaluated.matrix_world @ evaluated.pose.bones[bone].head
 
-    def told(values: np.ndarray) -> tuple[float, float]:
+    def mean_and_largest(values: np.ndarray) -> tuple[float, float]:
         return float(np.mean(values)), float(np.max(values))
 
     off = played - targets[chosen]
@@ -499,8 +562,11 @@ def _measured(
         "pelvis": off[:, HIPS].mean(axis=1, keepdims=True),
     }
     errors = {
-        part: told(wish.unit * np.linalg.norm(values, axis=-1)) for part, values in parts.items()
+        part: mean_and_largest(options.unit * np.linalg.norm(values, axis=-1))
+        for part, values in parts.items()
     }
-    return errors, {
-        limb: told(values) for limb, values in limb_errors(played, source[chosen]).items()
+    angles = {
+        limb: mean_and_largest(values)
+        for limb, values in limb_errors(played, source[chosen]).items()
     }
+    return errors, angles

@@ -39,7 +39,7 @@ from .overlay_drawing import (
     ring,
 )
 from .overlay_furniture import furniture_near
-from .takes import PACKED, played_take, stored, takes_of
+from .takes import PACKED, played_take, stored_take, takes_of
 
 __all__ = [
     "CIRCLE",
@@ -132,7 +132,7 @@ def _unpacked(action: bpy.types.Action) -> _UnpackedTake | None:
         return None
 
     def unpack() -> _UnpackedTake:
-        take, controls = stored(action)
+        take, controls = stored_take(action)
         return _UnpackedTake(take, controls, _planted(take))
 
     return cache.recall("takes", action.session_uid, unpack, _CAPACITY)

@@ -12,7 +12,7 @@ from ..core.nearby import REACH_OF_A_BODY, solids_near
 from ..core.occupancy import distance
 from .scene_reader import read_scene
 from .settings import settings_of
-from .takes import frames_of, stored
+from .takes import frames_of, stored_take
 
 __all__ = ["FaultBars", "Faults", "fault_bars", "faults_of"]
 
@@ -58,7 +58,7 @@ def faults_of(
     """
     found, scenes = {}, {}
     for action in actions:
-        take, _ = stored(action)
+        take, _ = stored_take(action)
         first, last = frames = frames_of(action)
         if frames not in scenes:
             settings = settings_of(

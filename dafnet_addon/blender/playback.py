@@ -13,13 +13,13 @@ from .dependencies import Simulation
 __all__ = ["frame_kept", "in_order", "play_steps"]
 
 _BATCH = 16
-"""Frames that are set between two looks at the user's input."""
+"""How many frames are set between two yields, at which the user's input is looked at."""
 Look = Callable[[int, bpy.types.Depsgraph, set[bpy.types.Object]], None]
 
 
 @contextmanager
 def frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
-    """Return to the current frame at the end, whatever happens."""
+    """A block after which the scene shows the current frame again, whatever happens."""
     frame, subframe = scene.frame_current, scene.frame_subframe
     try:
         yield

@@ -24,17 +24,23 @@ __all__ = [
     "Attachments",
     "Channels",
     "Control",
-    "channels",
+    "channels_for",
     "controls_of",
-    "posed",
-    "probe",
-    "settled",
+    "evaluated_now",
+    "find_attachments",
+    "rotations_without",
 ]
 
-_TRIES, _TURN = 4, 0.7  # random poses, and how far they turn, radians
+_RANDOM_POSES = 4
+"""In how many random poses the rig is asked."""
+_RANDOM_ANGLE = 0.7
+"""Radians by which controls are turned in them."""
 _RIGID = 0.01
+"""How far a rotation may vary that is still taken for rigidly attached."""
 _ROOT = -1
-_CARRIED = (1, 2, 3, 6, 9)  # joints that have to go where the pelvis goes
+"""Stands for a joint: the root bone has none."""
+_CARRIED = (1, 2, 3, 6, 9)
+"""Joints that have to go where the pelvis goes: hips and spine."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +97,7 @@ def controls_of(
             f"'{rig.name}' has no root bone set; choose it in the Your Rig panel, or another root "
             "motion."
         )
+
     replaced: set[int] = set()
     ends: list[Control] = []
     if limbs == "IK":
@@ -106,12 +113,14 @@ def controls_of(
             if "toe" in names:
                 ends.append(Control(names["toe"], joints[2] + 3))
             ends.append(Control(names["pole"], joints[1], moves=True, pole=k))
+
     for j, joint in enumerate(JOINTS):
         if joint in rig_map.joints and j not in replaced:
             controls.append(
-                Control(rig_map.joints[joint], j, moves=j == 0 or _apart(rig, rig_map, j))
+                Control(rig_map.joints[joint], j, moves=j == 0 or _is_detached(rig, rig_map, j))
             )
     controls += sorted(ends, key=lambda control: control.pole is not None)
+
     for control in controls:
         bone = rig.data.bones[control.bone]
         if control.moves and bone.parent and bone.use_connect:
@@ -122,7 +131,7 @@ def controls_of(
     return controls
 
 
-def _apart(rig: bpy.types.Object, rig_map: RigMap, joint: int) -> bool:
+def _is_detached(rig: bpy.types.Object, rig_map: RigMap, joint: int) -> bool:
     """Whether a hand or foot hangs on no bone of the body, as where inverse kinematics was lost on
     the way into Blender.
     """
@@ -135,7 +144,7 @@ def _apart(rig: bpy.types.Object, rig_map: RigMap, joint: int) -> bool:
     )
 
 
-def settled(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.types.Object:
+def evaluated_now(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.types.Object:
     """The rig evaluated as its channels now are; twice, for what lags by an update."""
     for _ in range(2):
         rig.update_tag(refresh={"DATA", "OBJECT"})
@@ -143,28 +152,29 @@ def settled(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.types.Obje
     return rig.evaluated_get(context.evaluated_depsgraph_get())
 
 
-def probe(
+def find_attachments(
     context: bpy.types.Context, rig: bpy.types.Object, controls: list[Control]
 ) -> Attachments:
-    """Find what the controls move with; leaves all of their channels empty.
+    """Find what the controls move with; all of their channels are empty afterwards.
 
     ``InputError``: trunk or legs stay behind when the pelvis is moved.
     """
     names: list[str | None] = [control.bone for control in controls]
     rng = np.random.default_rng(0)
     poses, channels = [], []
-    for k in range(_TRIES + 1):
+    for k in range(_RANDOM_POSES + 1):  # the last one is neutral
         turns = matrix_from_vector(
-            _TURN * normalised(rng.normal(size=(len(controls), 3))) * (k < _TRIES)
+            _RANDOM_ANGLE * normalised(rng.normal(size=(len(controls), 3))) * (k < _RANDOM_POSES)
         )
         for control, turn in zip(controls, turns, strict=True):
             rig.pose.bones[control.bone].matrix_basis = Matrix(turn.tolist()).to_4x4()
-        poses.append(pose_matrices(settled(context, rig), names))
+        poses.append(pose_matrices(evaluated_now(context, rig), names))
         channels.append(turns)
+
     neutral, rotation, place = poses[-1], _rotations(np.array(poses)), np.array(poses)[..., :3, 3]
     bare = rotation @ transpose(np.array(channels))  # without the control's own rotation
     size = np.ptp(neutral[:, :3, 3], axis=0).max() or 1.0
-    _require_carried(context, rig, controls, neutral[:, :3, 3], 0.1 * size)
+    _require_carried(context, rig, controls, start=neutral[:, :3, 3], distance=0.1 * size)
 
     turned_by, moved_by, loose = [], [], []
     for i in range(len(controls)):
@@ -177,25 +187,29 @@ def probe(
         moved_by.append(int(np.argmin(moved)) - 1)
         if min(turned) > _RIGID and controls[i].pole is None:
             loose.append(i)
+
     axes = np.array([_location_axes(rig, control.bone) for control in controls])
-    return Attachments(neutral, turned_by, moved_by, loose, axes)
+    return Attachments(
+        neutral=neutral, turned_by=turned_by, moved_by=moved_by, loose=loose, axes=axes
+    )
 
 
 def _require_carried(
     context: bpy.types.Context,
     rig: bpy.types.Object,
     controls: list[Control],
+    *,
     start: np.ndarray,
-    way: float,
+    distance: float,
 ) -> None:
-    """``InputError`` where hips or trunk do not go along when the pelvis is moved by ``way``;
-    ``start`` (N, 3): all places.
+    """``InputError`` where hips or trunk do not go along when the pelvis is moved by ``distance``;
+    ``start`` (N, 3): where all controls are before.
     """
     pelvis = next(k for k, control in enumerate(controls) if control.joint == 0)
     bone = rig.pose.bones[controls[pelvis].bone]
-    bone.matrix_basis = Matrix.Translation((0.0, way, 0.0))
+    bone.matrix_basis = Matrix.Translation((0.0, distance, 0.0))
     moved = (
-        pose_matrices(settled(context, rig), [control.bone for control in controls])[:, :3, 3]
+        pose_matrices(evaluated_now(context, rig), [control.bone for control in controls])[:, :3, 3]
         - start
     )
     bone.matrix_basis = Matrix.Identity(4)
@@ -219,8 +233,8 @@ def _rotations(matrices: np.ndarray) -> np.ndarray:
 
 
 def _location_axes(rig: bpy.types.Object, name: str) -> np.ndarray:
-    """(3, 3): columns are where the location channels lead, in the armature's space, as the rig is
-    posed now.
+    """Axes (3, 3) of a control's location channels as columns, in the armature's space, as the rig
+    is posed now.
     """
     bone = rig.data.bones[name]
     rest = np.array(bone.matrix_local, float)[:3, :3]
@@ -232,67 +246,74 @@ def _location_axes(rig: bpy.types.Object, name: str) -> np.ndarray:
     return parent @ np.array(bone.parent.matrix_local, float)[:3, :3].T @ rest
 
 
-def channels(
+def channels_for(
     controls: list[Control],
-    held: Attachments,
+    *,
+    attachments: Attachments,
     shape: Shape,
     retargeted: RetargetedMotion,
     objects: np.ndarray,
     carrier: np.ndarray,
 ) -> Channels:
-    """Channels of all controls for a motion that has retargeted on the rig.
+    """Channels of all controls that give a motion which was retargeted onto the rig.
 
     ``objects`` (T, 4, 4): the rig's object in the world. ``carrier`` (T, 4, 4): where the root bone
     carries the rig, as a matrix that the object would otherwise have.
     """
-    frames, n = len(objects), len(controls)
+    frames, count = len(objects), len(controls)
     scale = np.linalg.norm(objects[0, :3, 0])
-    turned, origin = objects[:, :3, :3] / scale, objects[:, :3, 3]
-    neutral, start = _rotations(held.neutral), held.neutral[:, :3, 3]
-    wanted, place = np.empty((frames, n, 3, 3)), np.empty((frames, n, 3))
-    turns, moves = np.empty((frames, n, 3, 3)), np.zeros((frames, n, 3))
+    object_turns, object_places = objects[:, :3, :3] / scale, objects[:, :3, 3]
+    neutral, start = _rotations(attachments.neutral), attachments.neutral[:, :3, 3]
+
+    # Of each control in the armature's space: the rotation and the place that it is to have.
+    wanted, place = np.empty((frames, count, 3, 3)), np.empty((frames, count, 3))
+    turns, moves = np.empty((frames, count, 3, 3)), np.zeros((frames, count, 3))
 
     def to_rig(points: np.ndarray) -> np.ndarray:
-        return rotate(transpose(turned), points - origin) / scale
+        return rotate(transpose(object_turns), points - object_places) / scale
 
     for i, control in enumerate(controls):
-        by, at = held.turned_by[i], held.moved_by[i]
-        free = neutral[i] if by < 0 else wanted[:, by] @ neutral[by].T @ neutral[i]
+        # Where what it hangs on takes it, without channels of its own.
+        turner, mover = attachments.turned_by[i], attachments.moved_by[i]
+        free = neutral[i] if turner < 0 else wanted[:, turner] @ neutral[turner].T @ neutral[i]
         free = np.broadcast_to(free, (frames, 3, 3))
-        turn = (
-            np.broadcast_to(np.eye(3), (frames, 3, 3)) if at < 0 else wanted[:, at] @ neutral[at].T
-        )
-        rest = (
-            np.broadcast_to(start[i], (frames, 3))
-            if at < 0
-            else place[:, at] + rotate(turn, start[i] - start[at])
-        )
+        if mover < 0:
+            carried = np.broadcast_to(np.eye(3), (frames, 3, 3))
+            rest = np.broadcast_to(start[i], (frames, 3))
+        else:
+            carried = wanted[:, mover] @ neutral[mover].T
+            rest = place[:, mover] + rotate(carried, start[i] - start[mover])
+
         if control.pole is not None:
             _, middle, end = list(LIMBS.values())[control.pole]
-            out = retargeted.bends[:, control.pole] * (
-                shape.body.length(middle) + shape.body.length(end)
-            )
-            wanted[:, i], place[:, i] = free, to_rig(retargeted.motion.joints[:, middle] + out)
+            reach = shape.body.length(middle) + shape.body.length(end)
+            out = retargeted.bends[:, control.pole] * reach
+            wanted[:, i] = free
+            place[:, i] = to_rig(retargeted.motion.joints[:, middle] + out)
         elif control.joint == _ROOT:
-            motion = transpose(turned) @ carrier[:, :3, :3] / scale
+            motion = transpose(object_turns) @ carrier[:, :3, :3] / scale
             wanted[:, i] = motion @ neutral[i]
             place[:, i] = to_rig(rotate(carrier[:, :3, :3], start[i]) + carrier[:, :3, 3])
         else:
-            j = control.joint
-            body = retargeted.turns[:, j] @ shape.axes.T
-            wanted[:, i] = transpose(turned) @ body @ neutral[i]
+            joint = control.joint
+            body = retargeted.turns[:, joint] @ shape.axes.T
+            wanted[:, i] = transpose(object_turns) @ body @ neutral[i]
             place[:, i] = rest
             if control.moves:
-                beside = np.nan_to_num(scale * (start[i] - shape.rest[j, :3, 3]))
-                place[:, i] = to_rig(retargeted.motion.joints[:, j] + rotate(body, beside))
+                offset = np.nan_to_num(scale * (start[i] - shape.rest[joint, :3, 3]))
+                place[:, i] = to_rig(retargeted.motion.joints[:, joint] + rotate(body, offset))
+
         turns[:, i] = transpose(free) @ wanted[:, i]
         if control.moves:
-            moves[:, i] = rotate(np.linalg.inv(turn @ held.axes[i]), place[:, i] - rest)
+            axes = carried @ attachments.axes[i]
+            moves[:, i] = rotate(np.linalg.inv(axes), place[:, i] - rest)
     return Channels(turns, moves, wanted)
 
 
-def posed(rig: bpy.types.Object, controls: list[Control], turns: np.ndarray) -> np.ndarray:
-    """Rotations (N, 3, 3) that an evaluated rig's controls would have without their own ``turns``
-    (N, 3, 3).
+def rotations_without(
+    rig: bpy.types.Object, controls: list[Control], turns: np.ndarray
+) -> np.ndarray:
+    """Rotations (N, 3, 3) that the controls of an evaluated rig would have without their own
+    ``turns`` (N, 3, 3).
     """
     return _rotations(pose_matrices(rig, [control.bone for control in controls])) @ transpose(turns)

@@ -53,10 +53,10 @@ _SHIPPED = Path(__file__).parent / "rig_maps"
 class RigMap:
     """One convention of names, or one armature's own.
 
-    ``joints``: bones by joint. ``root``: the bone that carries the whole rig, or None. ``places``:
-    bones by joint. ``limbs``: for a limb the bones ``end``, ``pole`` and perhaps ``toe``.
-    ``settings``: (bone, custom property, value) to be set for limbs in ``FK``, in ``IK`` and in
-    ``BOTH``.
+    ``joints``: the bones to key, by joint. ``root``: the bone that carries the whole rig, or None.
+    ``places``: the bones at whose heads joints lie, where those are others. ``limbs``: for a limb
+    the bones ``end``, ``pole`` and perhaps ``toe``. ``settings``: (bone, custom property, value) to
+    be set for limbs in ``FK``, in ``IK`` and in ``BOTH``.
     """
 
     name: str
@@ -91,7 +91,7 @@ def map_files() -> dict[str, Path]:
 
 
 def load_map(file: Path) -> RigMap:
-    """A map from its file; ``InputError`` where it is none."""
+    """A map from its file; ``InputError`` where it cannot be read as one."""
     try:
         return from_text(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
@@ -107,7 +107,9 @@ def as_text(rig_map: RigMap) -> str:
 
 
 def from_text(text: str) -> RigMap:
-    """The inverse of ``as_text``; raises whatever comes where the text is something else."""
+    """The inverse of ``as_text``; for any other text, ``ValueError``, ``KeyError``, ``TypeError``
+    or ``AttributeError``.
+    """
     data: dict[str, Any] = json.loads(text)
     settings = {
         kind: tuple((str(bone), str(key), float(value)) for bone, key, value in rows)
@@ -163,6 +165,7 @@ def detected(armature: bpy.types.Object) -> RigMap:
         named = in_names_of(rig_map, bones.keys())
         if len(named.known_by) == len(rig_map.known_by):
             found.append(((len(named.joints), len(rig_map.known_by), key.startswith("my_")), named))
+
     best = max(found, key=lambda each: each[0])[1] if found else None
     if best is not None and all(joint in best.joints for joint in NEEDED):
         return best
@@ -197,8 +200,8 @@ def in_names_of(rig_map: RigMap, bones: Iterable[str]) -> RigMap:
 
 
 def edited(rig_map: RigMap, root: str | None, joints: dict[str, str]) -> RigMap:
-    """The map with other bones; controls and places of joints whose bone was changed are
-    forgotten.
+    """The map with other bones; the controls and places of joints whose bone has changed are
+    dropped.
     """
     changed = {joint for joint in JOINTS if rig_map.joints.get(joint) != joints.get(joint)}
     ends = {
@@ -320,15 +323,19 @@ def _split(name: str) -> tuple[str | None, set[str]]:
 
 
 def _guessed(armature: bpy.types.Object) -> RigMap:
-    """A map by what words the bones' names hold; of several that fit, the one nearest to the root
-    counts.
+    """A map guessed by the words in the bones' names; of several bones that fit, the one nearest to
+    the root counts.
     """
     bones = sorted(armature.data.bones, key=lambda bone: len(bone.parent_recursive))
     names = [(bone.name, *_split(bone.name)) for bone in bones if not _split(bone.name)[1] & _NEVER]
 
     def first(side: str | None, words: set[str], used: Iterable[str] = ()) -> str | None:
         return next(
-            (name for name, at, held in names if at == side and held & words and name not in used),
+            (
+                name
+                for name, own_side, own_words in names
+                if own_side == side and own_words & words and name not in used
+            ),
             None,
         )
 
@@ -341,18 +348,19 @@ def _guessed(armature: bpy.types.Object) -> RigMap:
     put("pelvis", first(None, _WORDS["pelvis"]) or first(None, {"hip"}))
     column = [
         name
-        for name, at, held in names
-        if at is None and held & _WORDS["spine"] and name not in joints.values()
+        for name, side, words in names
+        if side is None and words & _WORDS["spine"] and name not in joints.values()
     ]
     if "pelvis" not in joints and column:
         put("pelvis", column.pop(0))
-    picked = [column[0], column[(len(column) - 1) // 2], column[-1]] if len(column) > 2 else column
-    for joint, bone in zip(
-        {1: ["spine2"], 2: ["spine1", "spine3"]}.get(len(picked), ["spine1", "spine2", "spine3"]),
-        picked,
-        strict=False,
-    ):
+    if len(column) > 2:
+        column = [column[0], column[(len(column) - 1) // 2], column[-1]]
+    spine = {1: ["spine2"], 2: ["spine1", "spine3"]}.get(
+        len(column), ["spine1", "spine2", "spine3"]
+    )
+    for joint, bone in zip(spine, column, strict=False):
         put(joint, bone)
+
     put("neck", first(None, _WORDS["neck"]))
     put("head", first(None, _WORDS["head"]))
     for side in ("left", "right"):
@@ -367,6 +375,7 @@ def _guessed(armature: bpy.types.Object) -> RigMap:
         put(f"{side}_knee", first(side, _WORDS["knee"]) or first(side, {"leg"}, {thigh or ""}))
         for joint in ("elbow", "wrist", "ankle", "foot"):
             put(f"{side}_{joint}", first(side, _WORDS[joint], joints.values()))
+
     above = [
         joints[joint]
         for joint in ("spine1", "spine2", "neck", "left_hip", "right_hip")

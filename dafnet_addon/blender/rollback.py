@@ -1,4 +1,4 @@
-"""What writing a motion changes on an armature, and how it is all taken back where the writing
+"""What writing a motion changes on an armature, and how all of it is undone where the writing
 fails.
 """
 
@@ -7,9 +7,9 @@ from contextlib import contextmanager
 
 import bpy
 
-from .compat import playing
+from .compat import playback_restorer
 
-__all__ = ["state_of", "undone_on_failure"]
+__all__ = ["state_restorer", "undone_on_failure"]
 
 _TRANSFORM = (
     "rotation_mode",
@@ -40,20 +40,20 @@ def _set(owner: bpy.types.Object | bpy.types.PoseBone, channels: _Channels) -> N
         setattr(owner, name, value)
 
 
-def state_of(armature: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
-    """A function that gives the armature, as it may have to be found again, the state that it has
-    now.
+def state_restorer(armature: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
+    """A function that gives the armature the state back that it has now; it is given the armature,
+    which may have to be found again after an undo.
 
-    That is what it plays, its own transform and its bones', their custom numbers, and its list of
-    takes, to which a bake adds rows at the end.
+    The state is what it plays, its own transform and its bones', their custom numbers, and its list
+    of takes, to which a bake adds rows at the end.
     """
-    again = playing(armature)
+    restore_playback = playback_restorer(armature)
     own = _channels(armature)
     bones = {bone.name: (_channels(bone), _numbers(bone)) for bone in armature.pose.bones}
     listed, active = len(armature.dafnet.takes), armature.dafnet.active_take
 
     def restore(found: bpy.types.Object) -> None:
-        again(found)
+        restore_playback(found)
         _set(found, own)
         for name, (channels, numbers) in bones.items():
             bone = found.pose.bones[name]
@@ -70,16 +70,16 @@ def state_of(armature: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
 
 @contextmanager
 def undone_on_failure(armature: bpy.types.Object) -> Iterator[None]:
-    """A block that writes to an armature: where it fails, whatever the reason, its actions are gone
-    and its state is back.
+    """A block that writes to an armature: if it fails, for whatever reason, the actions that it
+    made are removed and the armature's state is restored.
     """
-    restore, before = state_of(armature), set(bpy.data.actions)
+    restore, before = state_restorer(armature), set(bpy.data.actions)
     try:
         yield
     except BaseException:
         # first of all, since an action that is removed while it plays leaves its slot's number
         # behind
         restore(armature)
-        for made in set(bpy.data.actions) - before:
-            bpy.data.actions.remove(made)
+        for added in set(bpy.data.actions) - before:
+            bpy.data.actions.remove(added)
         raise

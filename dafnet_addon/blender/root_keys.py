@@ -1,5 +1,5 @@
-"""Keys on a character's root: it then goes where it was sent, or nothing is changed and a sentence
-says why.
+"""Keys on a character's root: it then follows its route, or nothing is changed and a sentence says
+why.
 """
 
 from collections.abc import Iterable, Iterator
@@ -21,10 +21,13 @@ __all__ = ["MOVES", "keyable_root", "keyed_along", "last_key", "unchanged_on_fai
 MOVES = ("location", "rotation_euler")
 """What is keyed of a root."""
 _KEYS_A_SECOND = 10
-_LOOKS = 12
-"""Frames in which is looked whether the root is where it was sent."""
-_NEAR, _TURNED = 1e-3, 0.01
-"""Metres and radians from there that rounding may make."""
+"""How densely a route is keyed."""
+_CHECKED_FRAMES = 12
+"""In how many frames it is checked that the root follows its keys."""
+_DISTANCE_TOLERANCE = 1e-3
+"""Metres from the route that are put down to rounding."""
+_ANGLE_TOLERANCE = 0.01
+"""Radians from the route's heading that are put down to rounding."""
 
 
 def keyable_root(settings: Settings) -> bpy.types.Object:
@@ -61,8 +64,10 @@ def _in_the_way(root: bpy.types.Object) -> Iterator[str]:
         for driver in data.drivers
     ):
         yield "has drivers; remove them to key it."
+
     if data.use_tweak_mode or any(track.is_solo for track in data.nla_tracks):
         yield "plays an NLA strip in tweak or solo mode; leave it to key it."
+
     if data.action is None:
         return
     if data.action_blend_type != "REPLACE" or data.action_influence < 1.0:
@@ -72,6 +77,7 @@ def _in_the_way(root: bpy.types.Object) -> Iterator[str]:
         )
     if data.action.library or data.action.override_library:
         yield f"has its keys in a linked action; make '{data.action.name}' local to key it."
+
     users = bpy.data.user_map(subset=[data.action])[data.action] - {root}
     for other in sorted(
         (each for each in users if shares_curves(root, each)), key=lambda each: each.name
@@ -79,6 +85,7 @@ def _in_the_way(root: bpy.types.Object) -> Iterator[str]:
         yield (
             f"has its keys in common with '{other.name}'; make its action a single user to key it."
         )
+
     for curve in action_curves(root):
         if curve.data_path in MOVES:
             yield from _in_the_way_of_keys(curve)
@@ -109,7 +116,7 @@ def last_key(root: bpy.types.Object) -> int | None:
 
 @contextmanager
 def unchanged_on_failure(root: bpy.types.Object) -> Iterator[None]:
-    """The root's keys and place as they were where the block fails."""
+    """A block that writes keys: if it fails, the root's keys and place are as they were."""
     data = root.animation_data
     action = data.action if data else None
     kept = action.copy() if action else None
@@ -117,14 +124,14 @@ def unchanged_on_failure(root: bpy.types.Object) -> Iterator[None]:
     try:
         yield
     except BaseException:
-        made = root.animation_data.action if root.animation_data else None
+        added = root.animation_data.action if root.animation_data else None
         if action and kept:
             name, kept.use_fake_user = action.name, action.use_fake_user
             action.user_remap(kept)
             bpy.data.actions.remove(action)
             kept.name = name
-        elif made:
-            bpy.data.actions.remove(made)
+        elif added:
+            bpy.data.actions.remove(added)
         if data is None:
             root.animation_data_clear()
         root.location, root.rotation_euler = place, turn
@@ -142,22 +149,24 @@ def keyed_along(
     scale: float,
     fps: float,
 ) -> None:
-    """``write_keys``, and see that the root goes there.
+    """``write_keys``, and check that the root follows them.
 
-    ``InputError``: it does not, whatever moves it instead; to be called in
-    ``unchanged_on_failure``.
+    To be called within ``unchanged_on_failure``. ``InputError``: something else moves the root.
     """
     frames = write_keys(root, route, first=first, scale=scale, fps=fps)
-    shown = frames[np.unique(np.linspace(0, len(frames) - 1, _LOOKS).astype(int))]
+    checked = frames[np.unique(np.linspace(0, len(frames) - 1, _CHECKED_FRAMES).astype(int))]
     with frame_kept(context.scene):
-        for k in shown:
+        for k in checked:
             context.scene.frame_set(first + int(k))
             matrix = np.array(
                 root.evaluated_get(context.evaluated_depsgraph_get()).matrix_world, float
             )
             off = np.linalg.norm(matrix[:3, 3] - route.path.position[k] * scale) / scale
             wrong = yaw_of(matrix[:2, 1]) - route.path.yaw[k]
-            if not off < _NEAR or not abs(np.angle(np.exp(1j * wrong))) < _TURNED:
+            if (
+                not off < _DISTANCE_TOLERANCE
+                or not abs(np.angle(np.exp(1j * wrong))) < _ANGLE_TOLERANCE
+            ):
                 raise InputError(
                     f"Something other than its keys moves the root '{root.name}', so nothing was "
                     "keyed; look for physics, NLA strips or scripts."

@@ -30,7 +30,7 @@ from ..core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
 from ..core.solids import Scene
 from ..core.take import Controls
 from .armature import is_character, metres_per_unit
-from .baker import laid_over, require_bakeable
+from .baker import has_bone_overrides, require_bakeable
 from .compat import action_curves
 from .dependencies import Dependencies, Simulation
 from .furniture import Furniture, array, furniture_of
@@ -41,13 +41,14 @@ from .rig_properties import map_of
 from .rig_reading import joints_of, pose_matrices
 from .rigs import RigMap, required
 from .settings import Settings
-from .takes import stored
+from .takes import stored_take
 
 __all__ = ["ReadScene", "read_scene"]
 
-_TURNED = np.radians(0.1)
-# degrees, mean, by which a copied upper body may lie otherwise than its source without a word
-_OFF = 8.0
+_UNTURNED = np.radians(0.1)
+"""Radians of rotation up to which a target counts as not turned."""
+_LIMB_TOLERANCE = 8.0
+"""Degrees in the mean that limbs of a copied upper body may be off before the user is warned."""
 _TARGETS = {
     "head": "head target",
     "hand_left": "left hand target",
@@ -104,6 +105,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     unit = metres_per_unit(scene)
     armature = find_object(settings, settings.armature, "character")
     size = require_bakeable(armature, unit)
+
     if settings.root is None:
         raise InputError(
             f"The character '{armature.name}' has no root; choose its root object in the DAFNet "
@@ -112,12 +114,15 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     root = find_object(settings, settings.root, "root")
     names = {role: name for role in _TARGETS if (name := getattr(settings, role))}
     targets = {role: find_object(settings, name, _TARGETS[role]) for role, name in names.items()}
+
     source, source_map = _upper_body_source(settings, armature)
     places = [source_map.place(name) if source_map else name for name in JOINTS]
+
     dependencies = Dependencies(scene)
     leading = {f"root '{root.name}'": root}
     leading |= {f"{_TARGETS[role]} '{target.name}'": target for role, target in targets.items()}
     _require_independent(dependencies, armature, leading)
+
     furniture = furniture_of(settings, dependencies)
     sources, members = [source] if source else [], furniture.members if furniture else set()
     frames = range(settings.frame_start, settings.frame_end + 1)
@@ -125,7 +130,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     simulations += dependencies.simulations(sources)
     # it has a shape by then
     simulations += [each for each in dependencies.simulations(members) if each.since < frames[0]]
-    tracks = _Tracks(armature, root, targets, source, places)
+    tracks = _Tracks(armature, root=root, targets=targets, source=source, places=places)
 
     def look(frame: int, depsgraph: bpy.types.Depsgraph, shaped: set[bpy.types.Object]) -> None:
         if frame == frames[0]:
@@ -139,15 +144,17 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     yield from play_steps(context, frames, simulations, look)
 
     modes = [settings.mode] * len(frames) if settings.mode else tracks.modes
-    warnings = tuple(_told(armature, furniture, dependencies, simulations))
+    warnings = tuple(_warnings(armature, furniture, dependencies, simulations))
     fps = scene.render.fps / scene.render.fps_base
     root_matrices = _rigid(np.array(tracks.root), unit, f"root '{root.name}'")
+
     given: dict[str, Any] = {}
     for role, target in targets.items():
         matrices = _rigid(np.array(tracks.targets[role]), unit, f"{_TARGETS[role]} '{target.name}'")
         given[role] = matrices[:, :3, 3]
         if _is_turned(target, np.array(tracks.local[role])):
             given[f"{role}_rotation"] = matrices[:, :3, :3]
+
     if source and "FULL" in modes:
         if dependencies.follows(source, armature):
             raise InputError(
@@ -155,22 +162,35 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
                 "links the two."
             )
         bones, bodies = np.array(tracks.bones), np.array(tracks.bodies)
-        given["upper_body"], off = _carried(
-            source, source_map, bones, bodies, unit, root_matrices, size, fps
+        given["upper_body"], off = _upper_body_of_source(
+            source,
+            source_map,
+            bones=bones,
+            bodies=bodies,
+            unit=unit,
+            root=root_matrices,
+            size=size,
+            fps=fps,
         )
         if off:
             warnings += (f"'{source.name}' is copied, but {off}; check its bones in Your Rig.",)
     elif settings.upper_body_take and "FULL" in modes:
-        given["upper_body"] = _of_take(
-            settings, np.array([mode == "FULL" for mode in modes]), root_matrices, size, fps
+        given["upper_body"] = _upper_body_of_take(
+            settings,
+            full=np.array([mode == "FULL" for mode in modes]),
+            root=root_matrices,
+            size=size,
+            fps=fps,
         )
     elif "FULL" in modes:
         raise InputError(
             f"The mode of '{armature.name}' is FULL but no source is set; choose one to copy from."
         )
+
     for role in targets:
         if min(tracks.influences[role]) < 1.0:
             given[f"{role}_influence"] = np.array(tracks.influences[role])
+
     mode = modes[0] if len(set(modes)) == 1 else tuple(modes)
     controls = Controls(
         fps=fps,
@@ -199,13 +219,12 @@ class _Tracks:
         source: bpy.types.Object | None,
         places: list[str | None],
     ) -> None:
-        self._armature, self._root, self._targets, self._source, self._places = (
-            armature,
-            root,
-            targets,
-            source,
-            places,
-        )
+        self._armature = armature
+        self._root = root
+        self._targets = targets
+        self._source = source
+        self._places = places
+
         self.modes: list[str] = []
         self.influences: dict[str, list[float]] = {role: [] for role in targets}
         self.root: list[np.ndarray] = []
@@ -235,7 +254,7 @@ def _require_independent(
     armature: bpy.types.Object,
     leading: dict[str, bpy.types.Object],
 ) -> None:
-    """What leads the character may not follow it, nor be pushed by it, or each take would change
+    """What leads the character must not follow it, nor be pushed by it, or each take would change
     the next.
     """
     if dependencies.setting_follows(armature, "dafnet.", armature):
@@ -271,20 +290,20 @@ def _require_alive(depsgraph: bpy.types.Depsgraph, needed: list[bpy.types.Object
             )
 
 
-def _told(
+def _warnings(
     armature: bpy.types.Object,
     furniture: Furniture | None,
     dependencies: Dependencies,
     simulations: list[Simulation],
 ) -> Iterator[str]:
-    """Warnings about what can be used, but hardly as it was meant."""
-    if laid_over(armature):
+    """Warnings about what can be used, but probably not as it was meant."""
+    if has_bone_overrides(armature):
         yield (
             f"Bones of '{armature.name}' have constraints or drivers, which change the take; mute "
             "them to see it as generated."
         )
     if furniture:
-        yield from furniture.told()
+        yield from furniture.warnings()
     pushed = (
         simulation.name for simulation in simulations if _meets(simulation, dependencies, armature)
     )
@@ -296,8 +315,8 @@ def _told(
 
 
 def _rigid(matrices: np.ndarray, unit: float, what: str) -> np.ndarray:
-    """Matrices (T, 4, 4) in metres, without scale and shear: y stays as it is, z and then x are
-    made to fit it.
+    """Matrices (T, 4, 4) in metres, without scale and shear: the y axis stays as it is, z and then
+    x are made orthogonal to it.
     """
     if not np.isfinite(matrices).all():
         raise InputError(
@@ -317,13 +336,13 @@ def _rigid(matrices: np.ndarray, unit: float, what: str) -> np.ndarray:
 
 
 def _is_turned(target: bpy.types.Object, local: np.ndarray) -> bool:
-    """Whether a target's rotation is meant: keyed, or anywhere other than its parent's."""
+    """Whether a target's rotation is meant to count: it is keyed, or differs from its parent's."""
     if any("rotation" in curve.data_path for curve in action_curves(target)):
         return True
     axes = local[:, :3, :3] / np.maximum(
         np.linalg.norm(local[:, :3, :3], axis=1, keepdims=True), 1e-9
     )
-    return bool(np.abs(axes - np.eye(3)).max() > _TURNED)
+    return bool(np.abs(axes - np.eye(3)).max() > _UNTURNED)
 
 
 def _upper_body_source(
@@ -347,8 +366,8 @@ def _upper_body_source(
     return source, rig_map
 
 
-def _of_take(
-    settings: Settings, full: np.ndarray, root: np.ndarray, size: float, fps: float
+def _upper_body_of_take(
+    settings: Settings, *, full: np.ndarray, root: np.ndarray, size: float, fps: float
 ) -> np.ndarray:
     """Upper body (T, 14, 3) of the chosen take, frame by frame of the scene, on this character's
     root and of its ``size``.
@@ -357,7 +376,7 @@ def _of_take(
     (T,).
     """
     action = find_action(settings.upper_body_take or "")
-    take, _ = stored(action)
+    take, _ = stored_take(action)
     if abs(take.fps - fps) > 1e-3:
         raise InputError(
             f"The take '{action.name}' has {take.fps:g} frames per second, the scene {fps:g}; "
@@ -371,10 +390,11 @@ def _of_take(
         )
     at = np.clip(at, 0, len(take) - 1)
     path, _ = root_from_matrices(take.root[at])
-    return _onto(root, fps, size / take.scale * to_root(path, take.joints[at][:, list(UPPER)]))
+    local = size / take.scale * to_root(path, take.joints[at][:, list(UPPER)])
+    return _on_root(root, fps, local)
 
 
-def _onto(root: np.ndarray, fps: float, local: np.ndarray) -> np.ndarray:
+def _on_root(root: np.ndarray, fps: float, local: np.ndarray) -> np.ndarray:
     """Points (T, N, 3) of a root's frames in the world, that root being this character's, ``root``
     (T, 4, 4).
     """
@@ -388,9 +408,10 @@ def _onto(root: np.ndarray, fps: float, local: np.ndarray) -> np.ndarray:
     )
 
 
-def _carried(
+def _upper_body_of_source(
     source: bpy.types.Object,
     rig_map: RigMap | None,
+    *,
     bones: np.ndarray,
     bodies: np.ndarray,
     unit: float,
@@ -399,7 +420,7 @@ def _carried(
     fps: float,
 ) -> tuple[np.ndarray, str]:
     """Upper body (T, 14, 3), world metres, on this character's ``root`` (T, 4, 4) and of its
-    ``size``; and what of it is off.
+    ``size``; and which limbs are off by how much, in words, empty where none is.
 
     ``bones`` (T, 22, 4, 4): the source's bones in its own space; ``bodies`` (T, 4, 4): its object's
     matrices; both in Blender units.
@@ -411,25 +432,29 @@ def _carried(
             f"The {what} has a transform that is not a number; clear its transform or fix what "
             "drives it."
         )
+
     off: dict[str, float] = {}
     if rig_map is None:
         joints = unit * (bodies[:, None] @ bones)[..., :3, 3]
     else:
-        joints, off = joints_of(source, rig_map, bodies, bones, size / unit)
+        joints, off = joints_of(source, rig_map, bodies=bodies, poses=bones, size=size / unit)
         joints = unit * joints
+
     if rig_map is None and source.dafnet.root:
         frames = _rigid(bodies, unit, what)
         frames[:, :3, :3] = frames[:, :3, :3] @ FACING
         path, _ = root_from_matrices(frames)
     else:
         path = root_from_joints(joints, floor=float(unit * bodies[0, 2, 3]))
+
     offsets = joints[:, 1:] - joints[:, list(PARENTS[1:])]
     upper = [j - 1 for j in UPPER[1:]]
     lengths = np.linalg.norm(offsets[:, upper], axis=-1).mean(axis=0).sum()
     ratio = size * np.linalg.norm(OFFSETS[1:][upper], axis=-1).sum() / lengths
-    told = ", ".join(
-        f"the {limb} by {degrees:.0f} degrees" for limb, degrees in off.items() if degrees > _OFF
+    far = ", ".join(
+        f"the {limb} by {degrees:.0f} degrees"
+        for limb, degrees in off.items()
+        if degrees > _LIMB_TOLERANCE
     )
-    return _onto(
-        root, fps, ratio * to_root(path, joints[:, list(UPPER)])
-    ), f"{told} off" if told else ""
+    local = ratio * to_root(path, joints[:, list(UPPER)])
+    return _on_root(root, fps, local), f"{far} off" if far else ""

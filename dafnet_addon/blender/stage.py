@@ -29,9 +29,14 @@ Colour = tuple[float, float, float]
 """Red, green and blue as a screen shows them, in [0, 1]."""
 
 _FLOOR: Colour = (0.86, 0.86, 0.85)
-_EXPOSURE = 0.65  # stops; the studio light leaves white at a middle grey
+_EXPOSURE = 0.65
+"""Stops; the studio light alone would leave white at a middle grey."""
 _JOINTS_DARKER = 0.45
-_LENS, _SENSOR = 70.0, 36.0  # millimetres
+"""How far a mannequin's joints are mixed with a dark grey."""
+_LENS = 70.0
+"""Millimetres; the camera's focal length."""
+_SENSOR = 36.0
+"""Millimetres; the width of its sensor."""
 
 
 def mixed(a: Colour, b: Colour, share: float) -> Colour:
@@ -67,12 +72,13 @@ class Stage:
         self.seen: list[np.ndarray] = []
         """Points (N, 3) that the picture has to hold."""
         self._materials: dict[Colour, bpy.types.Material] = {}
-        a, b = np.radians([toward, above])
-        back = np.array([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)])
-        right = np.array([-np.sin(a), np.cos(a), 0.0])
+        azimuth, elevation = np.radians([toward, above])
+        level = np.array([np.cos(azimuth), np.sin(azimuth)])
+        back = np.append(level * np.cos(elevation), np.sin(elevation))
+        right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
         self.axes = np.stack([right, np.cross(back, right), back])
         """(3, 3) rows right, up and back of the camera."""
-        self._light_from = a + np.radians(-35.0)
+        self._light_from = azimuth + np.radians(-35.0)
         self._camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
         self._camera.data.lens, self._camera.data.sensor_width = _LENS, _SENSOR
         self._camera.data.sensor_fit = "HORIZONTAL"
@@ -215,8 +221,8 @@ class Stage:
         display = self.scene.display
         display.render_aa = "8"
         display.shading.show_specular_highlight = False  # or the floor would not be of one tone
-        # Blender's studio light lies in a frame whose y is up and whose z comes towards who looks
-        # along +y.
+        # Blender's studio light lies in a frame whose y is up and whose z comes towards a
+        # viewer who looks along +y.
         display.light_direction = (
             0.6 * np.cos(self._light_from),
             0.8,

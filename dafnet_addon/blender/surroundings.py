@@ -1,4 +1,4 @@
-"""The furniture that a character comes near on its root path, found in the scene."""
+"""Finds the furniture near a character's root path in the scene."""
 
 from dataclasses import dataclass
 
@@ -18,35 +18,40 @@ from .path_sources import places_of
 from .scene_reader import read_scene
 from .settings import Settings, settings_of
 
-__all__ = ["Found", "find_furniture"]
+__all__ = ["FoundFurniture", "find_furniture"]
 
-_NEAR = 1.5  # metres over the floor: of what counts as near
-# metres over the floor: floors and rugs are lower, lamps and ceilings higher
-_LOW, _HIGH = 0.07, 2.0
-_SPACING = 0.1  # metres between points on a surface
-_LOOKS = 10  # places a second along the path
+_NEAR = 1.5
+"""Metres from the path, in plan, within which furniture is near."""
+_LOW = 0.07
+"""Metres above the floor; floors and rugs are lower."""
+_HIGH = 2.0
+"""Metres above the floor; lamps and ceilings are higher."""
+_SPACING = 0.1
+"""Metres between the points on a surface."""
+_PLACES_A_SECOND = 10
+"""How densely the path is looked along."""
 _UNSEEN = {"CURVE", "SURFACE", "META", "FONT"}
-"""Types of objects that may have faces, but are not meshes."""
+"""Types of objects that may have faces but are not meshes."""
 
 
 @dataclass(frozen=True)
-class Found:
-    """``taken``: names of what lies in ``collection`` now; ``warnings``: sentences about what the
-    sensor cannot see.
+class FoundFurniture:
+    """``names`` of the objects that lie in ``collection`` now; ``warnings``: sentences about what
+    the sensor cannot see.
     """
 
     collection: bpy.types.Collection
-    taken: tuple[str, ...]
+    names: tuple[str, ...]
     warnings: tuple[str, ...]
 
 
-def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Found:
+def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> FoundFurniture:
     """Link the visible meshes near the root's path into a collection "… Furniture", which becomes
     the character's.
 
-    The character, other armatures with what is parented to or deformed by them, and floors are
-    none. What the collection holds of an earlier time and is not near any more is unlinked again,
-    as far as it lies in another collection as well. ``InputError``: there is no root or nothing
+    The character, other armatures with what is parented to or deformed by them, and floors do not
+    count. What the collection holds from an earlier time and is no longer near is unlinked again,
+    if it also lies in another collection. ``InputError``: there is no root or nothing
     near it, or the scene cannot be read; nothing is changed then.
     """
     scene, own = context.scene, armature.dafnet
@@ -61,6 +66,7 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
         for each in candidates:
             if each.visible_get():
                 made.objects.link(each)
+
         meshes = furniture_now(context, settings_of(armature, scene, furniture=made.name_full))
         away = {name: _distance(found, path, size) for name, found in meshes.items()}
         near = {name for name, distance in away.items() if distance < _NEAR * size}
@@ -69,9 +75,11 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
                 f"No visible mesh lies within {_NEAR:g} m of the root's path; animate the root "
                 "near the furniture first."
             )
+
         for each in list(made.objects):
             if each.name not in near:
                 made.objects.unlink(each)
+
         read = read_scene(
             context, settings_of(armature, scene, mode="FREE", furniture=made.name_full)
         )
@@ -83,18 +91,18 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
         warnings.append(
             f"Never closer than {REACH:g} m, so the character does not see: {', '.join(unseen)}."
         )
-    return Found(
-        _kept(scene, own, made),
+    return FoundFurniture(
+        _adopted(scene, own, made),
         tuple(sorted(near)),
-        (*_hidden(candidates, path, unit, size), *warnings),
+        (*_ignored(candidates, path, unit, size), *warnings),
     )
 
 
-def _kept(
+def _adopted(
     scene: bpy.types.Scene, own: bpy.types.PropertyGroup, made: bpy.types.Collection
 ) -> bpy.types.Collection:
-    """The collection of an earlier time with what is in ``made``, else ``made`` itself, as the
-    character's furniture.
+    """Make ``made`` the character's furniture: the collection of an earlier time gets its objects,
+    or else it is used itself.
     """
     wanted = f"{own.id_data.name} Furniture"
     earlier = own.furniture
@@ -102,6 +110,7 @@ def _kept(
         scene.collection.children.link(made)
         own.furniture = made
         return made
+
     for each in list(made.objects):
         if each.name not in earlier.objects:
             earlier.objects.link(each)
@@ -120,7 +129,7 @@ def _path(context: bpy.types.Context, settings: Settings, armature: bpy.types.Ob
             f"The character '{armature.name}' has no root; choose its root object in the DAFNet "
             "panel."
         )
-    step = max(1, round(scene.render.fps / scene.render.fps_base / _LOOKS))
+    step = max(1, round(scene.render.fps / scene.render.fps_base / _PLACES_A_SECOND))
     frames = [*range(settings.frame_start, settings.frame_end, step), settings.frame_end]
     return places_of(
         context, find_object(settings, settings.root, "root"), frames
@@ -149,14 +158,15 @@ def _distance(meshes: list[Mesh], path: np.ndarray, size: float) -> float:
     points = points[((points > low) & (points < high))[:, :2].all(1)]
     points = np.unique(np.round(points / (0.5 * _SPACING * size)), axis=0) * (0.5 * _SPACING * size)
     over = points[:, None, 2] - path[None, :, 2]
-    beside = np.linalg.norm(points[:, None, :2] - path[None, :, :2], axis=-1)
-    return float(np.min(beside, where=(over > _LOW * size) & (over < _HIGH * size), initial=np.inf))
+    away = np.linalg.norm(points[:, None, :2] - path[None, :, :2], axis=-1)
+    standing = (over > _LOW * size) & (over < _HIGH * size)
+    return float(np.min(away, where=standing, initial=np.inf))
 
 
-def _hidden(
+def _ignored(
     candidates: list[bpy.types.Object], path: np.ndarray, unit: float, size: float
 ) -> list[str]:
-    """Sentences about what stands beside the path and is hidden, or no mesh."""
+    """Sentences about what stands near the path but is hidden, or is not a mesh."""
     hidden: list[str] = []
     others: list[str] = []
     for each in candidates:
@@ -171,10 +181,9 @@ def _hidden(
         corners = (np.array(each.bound_box) @ matrix[:3, :3].T + matrix[:3, 3]) * unit
         low, high = corners.min(0), corners.max(0)
         beyond = np.maximum(np.maximum(low[:2] - path[:, :2], path[:, :2] - high[:2]), 0.0)
-        beside = np.linalg.norm(beyond, axis=1) < _NEAR * size
-        if (
-            beside & (high[2] - path[:, 2] > _LOW * size) & (low[2] - path[:, 2] < _HIGH * size)
-        ).any():
+        near = np.linalg.norm(beyond, axis=1) < _NEAR * size
+        standing = (high[2] - path[:, 2] > _LOW * size) & (low[2] - path[:, 2] < _HIGH * size)
+        if (near & standing).any():
             (others if seen else hidden).append(f"'{each.name}'")
     out = []
     if hidden:

@@ -1,9 +1,9 @@
-"""A character's takes: actions that carry what they were made of, listed on the armature, found
-again in a reopened file.
+"""A character's takes: actions that carry what they were made from, listed on the armature and kept
+in the file.
 
-An action's ``dafnet`` settings say how it was drawn and how good it is; the motion before the
-clean-up and what was asked for are packed beside them, so a take that is copied or appended to
-another file keeps them.
+An action's ``dafnet`` settings say how it was generated and how good it is. The motion before the
+clean-up and the controls are packed into the action as well, so a take that is copied or appended
+to another file keeps them.
 """
 
 import bpy
@@ -23,21 +23,24 @@ __all__ = [
     "frames_of",
     "play_take",
     "played_take",
-    "stored",
+    "stored_take",
     "takes_of",
 ]
 
 PACKED = "dafnet_take"
 """The property of an action that holds its take."""
 
-_STATURE = 1.7  # metres, by which ``end_effector_error`` was divided
-_FIGURES = {
+_STATURE = 1.7
+"""Metres that ``end_effector_error`` was divided by."""
+_METRICS = {
     "sliding": "foot_sliding_per_frame",
     "collisions": "bad_collisions_per_frame",
     "miss": "end_effector_error",
     "jerk": "jerk",
 }
+"""The metrics of a take by the names of an action's settings."""
 _unpacked: dict[int, tuple[int, tuple[Take, Controls]]] = {}
+"""The take unpacked last, by its action's pointer, with a hash of what was unpacked."""
 
 
 def add_take(
@@ -48,32 +51,31 @@ def add_take(
     draw: Draw,
     frame_start: int,
 ) -> None:
-    """Keep with ``action`` what it was made of, and list it as the armature's active take."""
+    """Pack into ``action`` what it was made from, and list it as the armature's active take."""
     action[PACKED] = packed(take, controls)
-    kept = action.dafnet
-    kept.seed, kept.temperature, kept.frame_start = draw.seed, draw.temperature, frame_start
-    kept.lower_seed = draw.seed if draw.lower_seed is None else draw.lower_seed
-    kept.lower_temperature = (
+    facts = action.dafnet
+    facts.frame_start = frame_start
+    facts.seed, facts.temperature = draw.seed, draw.temperature
+    facts.lower_seed = draw.seed if draw.lower_seed is None else draw.lower_seed
+    facts.lower_temperature = (
         draw.temperature if draw.lower_temperature is None else draw.lower_temperature
     )
-    kept.log_likelihood = take.log_likelihood
-    for before, figures in (("", take.metrics), ("raw_", take.raw_metrics)):
-        for name, figure in _FIGURES.items():
-            value = figures.get(figure)
-            setattr(
-                kept,
-                before + name,
-                -1.0 if value is None else value * (_STATURE if name == "miss" else 1.0),
-            )
+    facts.log_likelihood = take.log_likelihood
+    for prefix, metrics in (("", take.metrics), ("raw_", take.raw_metrics)):
+        for name, metric in _METRICS.items():
+            value = metrics.get(metric)
+            factor = _STATURE if name == "miss" else 1.0
+            setattr(facts, prefix + name, -1.0 if value is None else value * factor)
+
     own = armature.dafnet
     own.takes.add().action = action
     own.active_take = len(own.takes) - 1
 
 
 def draw_of(action: bpy.types.Action) -> Draw:
-    """What the take was drawn with."""
-    kept = action.dafnet
-    return Draw(kept.seed, kept.lower_seed, kept.temperature, kept.lower_temperature)
+    """The seeds and temperatures that the take was generated with."""
+    facts = action.dafnet
+    return Draw(facts.seed, facts.lower_seed, facts.temperature, facts.lower_temperature)
 
 
 def takes_of(armature: bpy.types.Object) -> list[bpy.types.Action]:
@@ -93,7 +95,7 @@ def active_take(armature: bpy.types.Object) -> bpy.types.Action | None:
     return own.takes[own.active_take].action if 0 <= own.active_take < len(own.takes) else None
 
 
-def stored(action: bpy.types.Action) -> tuple[Take, Controls]:
+def stored_take(action: bpy.types.Action) -> tuple[Take, Controls]:
     """The take and its controls. ``InputError`` where the action holds none."""
     data = action.get(PACKED)
     if not isinstance(data, bytes):
@@ -110,7 +112,7 @@ def stored(action: bpy.types.Action) -> tuple[Take, Controls]:
 
 def frames_of(action: bpy.types.Action) -> tuple[int, int]:
     """The take's first and last frame in the scene."""
-    take, _ = stored(action)
+    take, _ = stored_take(action)
     return action.dafnet.frame_start, action.dafnet.frame_start + len(take) - 1
 
 
@@ -134,6 +136,6 @@ def drop_take(armature: bpy.types.Object, index: int) -> None:
     if action is None or action in takes_of(armature):
         return
     action.use_fake_user = action.dafnet.accepted = action.dafnet.ghost = False
-    playing = armature.animation_data and armature.animation_data.action == action
-    if playing and (others := takes_of(armature)):
+    plays = armature.animation_data and armature.animation_data.action == action
+    if plays and (others := takes_of(armature)):
         play_take(armature, others[min(index, len(others) - 1)])

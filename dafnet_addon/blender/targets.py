@@ -1,4 +1,4 @@
-"""The empties that a character follows, made where it has none: the root, and the targets of head
+"""The empties that a character follows, added where it has none: the root, and the targets of head
 and hands.
 """
 
@@ -25,9 +25,9 @@ def lacks_root(context: bpy.types.Context, armature: bpy.types.Object) -> bool:
 
 
 def add_root(context: bpy.types.Context, armature: bpy.types.Object) -> bpy.types.Object:
-    """Make the root where the armature stands and looks in the current frame, in its collection.
+    """Add the root where the armature stands and looks in the current frame, in its collection.
 
-    ``InputError``: it has one already, or is not a character or linked; nothing is changed then.
+    ``InputError``: it already has one, is not a character, or is linked; nothing is changed then.
     """
     if not lacks_root(context, armature):
         raise InputError(
@@ -35,6 +35,7 @@ def add_root(context: bpy.types.Context, armature: bpy.types.Object) -> bpy.type
         )
     if armature.library:
         raise InputError(f"The character '{armature.name}' is linked; make it local to add a root.")
+
     size = character_scale(armature)
     place = armature.evaluated_get(context.evaluated_depsgraph_get()).matrix_world
     root = bpy.data.objects.new(f"{armature.name} Root", None)
@@ -58,10 +59,10 @@ def missing_targets(context: bpy.types.Context, armature: bpy.types.Object) -> l
 
 
 def add_targets(context: bpy.types.Context, armature: bpy.types.Object) -> list[bpy.types.Object]:
-    """Make the missing ones where head and hands are in the current frame, in the character's
+    """Add the missing ones where head and hands are in the current frame, in the character's
     collection.
 
-    ``InputError``: nothing is missing, or the armature is not a character or linked; nothing is
+    ``InputError``: nothing is missing, or the armature is not a character or is linked; nothing is
     changed then.
     """
     missing = missing_targets(context, armature)
@@ -73,9 +74,10 @@ def add_targets(context: bpy.types.Context, armature: bpy.types.Object) -> list[
         raise InputError(
             f"The character '{armature.name}' is linked; make it local to add targets."
         )
+
     size = character_scale(armature)
     evaluated = armature.evaluated_get(context.evaluated_depsgraph_get())
-    made = []
+    added = []
     for role in missing:
         bone, name, shown = _TARGETS[role]
         target = bpy.data.objects.new(f"{armature.name} {name}", None)
@@ -83,5 +85,5 @@ def add_targets(context: bpy.types.Context, armature: bpy.types.Object) -> list[
         target.location = evaluated.matrix_world @ evaluated.pose.bones[bone].head
         armature.users_collection[0].objects.link(target)
         setattr(armature.dafnet, role, target)
-        made.append(target)
-    return made
+        added.append(target)
+    return added

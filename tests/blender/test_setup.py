@@ -345,7 +345,7 @@ def test_find_furniture_takes_what_stands_beside_the_path(stage: Set) -> None:
     bpy.ops.dafnet.add_character(name="Bob")
     stage.select(stage.ann)
     found = find_furniture(bpy.context, stage.ann)
-    assert found.taken == ("Chair", "Shelf") and {o.name for o in found.collection.objects} == {
+    assert found.names == ("Chair", "Shelf") and {o.name for o in found.collection.objects} == {
         "Chair",
         "Shelf",
     }

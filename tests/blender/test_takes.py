@@ -18,7 +18,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.properties import _is_take
 from bl_ext.user_default.dafnet.dafnet_addon.blender.takes import (
     PACKED,
     frames_of,
-    stored,
+    stored_take,
     takes_of,
 )
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
@@ -43,7 +43,7 @@ class Shot(Stage):
 
     def motion(self, action: Any) -> np.ndarray:
         """Joints (T, 22, 3) that the stored take has."""
-        return stored(action)[0].joints
+        return stored_take(action)[0].joints
 
 
 @pytest.fixture
@@ -152,7 +152,7 @@ def test_from_here_on_keeps_what_comes_before(shot: Shot) -> None:
     shot.scene.frame_set(40)
     bpy.ops.dafnet.generate(task="ONWARD")
     second = shot.listed()[1]
-    apart = np.abs(stored(first)[0].poses - stored(second)[0].poses).max(axis=1)[70:]
+    apart = np.abs(stored_take(first)[0].poses - stored_take(second)[0].poses).max(axis=1)[70:]
     assert apart[:28].max() < 1e-5 and apart[-3:].max() > 0.01 and shot.scene.frame_current == 40
     shot.scene.frame_set(200)
     with pytest.raises(RuntimeError, match="go to a frame in it"):
@@ -162,13 +162,13 @@ def test_from_here_on_keeps_what_comes_before(shot: Shot) -> None:
 def test_from_here_on_counts_seconds_where_the_rate_has_changed(shot: Shot) -> None:
     bpy.ops.dafnet.generate()
     first = shot.listed()[0]
-    before = stored(first)[0]
+    before = stored_take(first)[0]
     shot.ann.dafnet.seed, shot.ann.dafnet.temperature = 3, 1.5
     shot.scene.render.fps *= 2
     at = shot.ann.dafnet.frame_end if not shot.ann.dafnet.use_scene_range else shot.scene.frame_end
     shot.scene.frame_set(at - 10)
     bpy.ops.dafnet.generate(task="ONWARD")
-    after = stored(shot.listed()[1])[0]
+    after = stored_take(shot.listed()[1])[0]
     assert after.fps == 2 * before.fps
     kept = (at - 10 - first.dafnet.frame_start) // 2
     assert np.abs(after.poses[:70] - before.poses[:70]).max() < 1e-5
@@ -194,7 +194,7 @@ def test_cleaned_again_makes_a_new_take_and_leaves_the_old(shot: Shot) -> None:
     raw, clean = shot.listed()
     assert shot.ann.animation_data.action == clean and clean.dafnet.sliding < raw.dafnet.sliding
     assert clean.dafnet.raw_sliding == pytest.approx(raw.dafnet.sliding)
-    assert np.abs(stored(raw)[0].poses - stored(clean)[0].poses).max() == 0
+    assert np.abs(stored_take(raw)[0].poses - stored_take(clean)[0].poses).max() == 0
     bpy.ops.dafnet.play_take(index=0)
     after = {name: np.array([p.co for p in c.keyframe_points]) for name, c in _curves(shot).items()}
     assert all(np.array_equal(before[name], after[name]) for name in before)
