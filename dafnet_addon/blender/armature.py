@@ -108,10 +108,10 @@ def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def sent(context: bpy.types.Context) -> tuple[bpy.types.Object | None, bpy.types.Object | None]:
-    """The character to direct, and the mesh that it is to go to: from what is active and selected.
+    """The character to direct and the mesh to send it to, from what is active and selected.
 
     The character is the active one, else a selected one, else the only one of the scene. The mesh
-    is the active or the only selected object that is not part of a character.
+    is the active or the only selected object that does not belong to a character.
     """
     characters = [o for o in context.scene.objects if is_character(o)]
     chosen = [character_of(context), *(o for o in context.selected_objects if o in characters)]

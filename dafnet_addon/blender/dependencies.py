@@ -1,5 +1,5 @@
-"""What an object of the scene follows, near or far: its place, its shape, and the simulations that
-move it.
+"""What an object of the scene follows, directly or indirectly: with its place and its shape, and
+which simulations move it.
 
 Blender's own graph of dependencies cannot be asked for this, so what that graph is built from is
 read: parents, constraints (of bones, too), drivers, modifiers with their node groups, shape keys,
@@ -19,8 +19,9 @@ from .compat import animated_paths
 __all__ = ["Dependencies", "Simulation"]
 
 _PLACE = ("location", "rotation", "scale", "delta_", "constraints[", "parent")
+"""How the data paths begin that move an object."""
 _SHAPE = ("modifiers[", "pose.", "instance_")
-"""How the data paths of an object begin that move it, and that shape it."""
+"""How the data paths begin that shape an object."""
 _SIMULATED = {
     "CLOTH",
     "SOFT_BODY",
@@ -30,7 +31,8 @@ _SIMULATED = {
     "FLUID",
     "COLLISION",
 }
-"""Modifiers that name what they may push against: ``Simulation.met``, not what they follow."""
+"""Modifiers that name what they may push against: ``Simulation.colliders``, not what they follow.
+"""
 _BY_PLACE = {
     "COPY_LOCATION",
     "COPY_ROTATION",
@@ -54,13 +56,15 @@ vertex group of it.
 """
 _QUOTED = re.compile(r"""["'](.+?)["']""")
 _NESTED = 2
-"""How deep in a constraint or a modifier what it points to may lie."""
+"""How many levels of properties in a constraint or a modifier are searched for what it points to.
+"""
 
 
 class _Aspect(NamedTuple):
-    """What something follows of a datablock: of an object ``_IN_PLACE`` or ``_IN_SHAPE`` (which has
-    the place in it), of any datablock a single property by its data path, of all but objects else
-    everything.
+    """What of a datablock something follows.
+
+    ``what``: of an object its place (``_IN_PLACE``) or its shape as well (``_IN_SHAPE``), of any
+    datablock a single property by its data path; otherwise everything, except of objects.
     """
 
     owner: bpy.types.ID
@@ -75,17 +79,17 @@ class Simulation:
     """A simulation that is not baked: the object's ``name``, and the frame that it starts
     ``since``.
 
-    ``met``: the objects that it may push against.
+    ``colliders``: the objects that it may push against.
     """
 
     name: str
     since: int
-    met: tuple[bpy.types.Object, ...]
+    colliders: tuple[bpy.types.Object, ...]
 
 
 class Dependencies:
-    """What objects of one scene follow. Each datablock is looked at once, so it is of the moment
-    when it was made.
+    """What the objects of one scene follow, at the moment when this is made: each datablock is read
+    only once.
     """
 
     def __init__(self, scene: bpy.types.Scene) -> None:
@@ -98,13 +102,13 @@ class Dependencies:
         """Whether ``leader`` moves ``follower``, or with ``shaped`` also whether it shapes it; an
         object follows itself.
         """
-        return _meets(self._all([_Aspect(follower, _IN_SHAPE if shaped else _IN_PLACE)]), leader)
+        return _includes(self._all([_Aspect(follower, _IN_SHAPE if shaped else _IN_PLACE)]), leader)
 
     def setting_follows(self, owner: bpy.types.Object, path: str, leader: bpy.types.Object) -> bool:
-        """Whether drivers let ``leader`` set any property of ``owner`` whose data path begins like
+        """Whether drivers let ``leader`` set any property of ``owner`` whose data path begins with
         ``path``.
         """
-        return _meets(self._all([_Aspect(owner, path)]), leader)
+        return _includes(self._all([_Aspect(owner, path)]), leader)
 
     def simulations(
         self, owners: Iterable[bpy.types.Object], shaped: bool = True
@@ -135,7 +139,7 @@ class Dependencies:
         return found
 
     def _rigid(self, owner: bpy.types.Object) -> Iterator[Simulation]:
-        """The rigid body that moves an object: an active one that is not animated all along."""
+        """The rigid body that moves an object: an active one, unless it is animated throughout."""
         world, body = self._scene.rigidbody_world, owner.rigid_body
         if (
             world is None
@@ -144,12 +148,12 @@ class Dependencies:
             or world.point_cache.is_baked
         ):
             return
-        handed_over = "rigid_body.kinematic" in animated_paths(owner)
+        may_be_released = "rigid_body.kinematic" in animated_paths(owner)
         if (
             body is not None
             and body.type == "ACTIVE"
             and body.enabled
-            and (handed_over or not body.kinematic)
+            and (may_be_released or not body.kinematic)
         ):
             yield Simulation(
                 owner.name, world.point_cache.frame_start, tuple(world.collection.all_objects)
@@ -158,7 +162,7 @@ class Dependencies:
     def _soft(self, owner: bpy.types.Object) -> Iterator[Simulation]:
         """Simulations among the modifiers."""
         scene = self._scene
-        modifiers = list(_on(owner.modifiers, owner))
+        modifiers = list(_effective(owner.modifiers, owner))
         since = [
             cache.frame_start for each in modifiers for cache in _caches(each) if not cache.is_baked
         ]
@@ -172,11 +176,13 @@ class Dependencies:
                 else scene.frame_start
             )
         if since:
-            met = (o for o in scene.objects if any(m.type == "COLLISION" for m in o.modifiers))
-            yield Simulation(owner.name, min(since), tuple(met))
+            colliders = (
+                o for o in scene.objects if any(m.type == "COLLISION" for m in o.modifiers)
+            )
+            yield Simulation(owner.name, min(since), tuple(colliders))
 
 
-def _meets(aspects: set[_Aspect], leader: bpy.types.Object) -> bool:
+def _includes(aspects: set[_Aspect], leader: bpy.types.Object) -> bool:
     return not aspects.isdisjoint({_Aspect(leader, _IN_PLACE), _Aspect(leader, _IN_SHAPE)})
 
 
@@ -195,7 +201,7 @@ def _followed(owner: bpy.types.ID, what: str) -> Iterator[_Aspect]:
 
 
 def _inside(owner: bpy.types.ID) -> Iterator[Any]:
-    """What a datablock that is not an object is made of, as far as shapes may depend on it."""
+    """What a datablock other than an object is made of, as far as shapes may depend on it."""
     if isinstance(owner, bpy.types.Collection):
         yield from owner.all_objects
     elif isinstance(owner, bpy.types.NodeTree):
@@ -227,9 +233,9 @@ def _placed(owner: bpy.types.Object) -> Iterator[_Aspect]:
 
 def _shaped(owner: bpy.types.Object) -> Iterator[_Aspect]:
     yield from _aspects([owner.data])
-    for modifier in _on(owner.modifiers, owner):
+    for modifier in _effective(owner.modifiers, owner):
         if modifier.type not in _SIMULATED:
-            yield from _aspects(_pointed(modifier, _NESTED))
+            yield from _aspects(_pointers(modifier, _NESTED))
     if owner.pose is not None:
         for bone in owner.pose.bones:
             yield from _constrained(bone.constraints, owner)
@@ -238,17 +244,17 @@ def _shaped(owner: bpy.types.Object) -> Iterator[_Aspect]:
 def _constrained(
     constraints: Iterable[bpy.types.Constraint], owner: bpy.types.Object
 ) -> Iterator[_Aspect]:
-    for constraint in _on(constraints, owner):
+    for constraint in _effective(constraints, owner):
         parts = [constraint, *getattr(constraint, "targets", ())]
         inside = constraint.type not in _BY_PLACE or any(
             getattr(part, "subtarget", "") for part in parts
         )
-        yield from _aspects(_pointed(constraint, _NESTED), _IN_SHAPE if inside else _IN_PLACE)
+        yield from _aspects(_pointers(constraint, _NESTED), _IN_SHAPE if inside else _IN_PLACE)
 
 
-def _on(blocks: Iterable[Any], owner: bpy.types.Object) -> Iterator[Any]:
-    """Those of an object's modifiers or constraints that do something now, or may since their
-    switch is animated.
+def _effective(blocks: Iterable[Any], owner: bpy.types.Object) -> Iterator[Any]:
+    """Those of an object's modifiers or constraints that have an effect now, or that may have one
+    since their switch is animated.
     """
     for block in blocks:
         off = (
@@ -266,8 +272,8 @@ def _on(blocks: Iterable[Any], owner: bpy.types.Object) -> Iterator[Any]:
         yield block
 
 
-def _pointed(block: bpy.types.bpy_struct, depth: int) -> Iterator[bpy.types.ID]:
-    """The datablocks that a block's properties, its inputs of a node group among them, point to."""
+def _pointers(block: bpy.types.bpy_struct, depth: int) -> Iterator[bpy.types.ID]:
+    """The datablocks that a block's properties point to, including its inputs of a node group."""
     for each in block.values() if isinstance(block, bpy.types.NodesModifier) else ():
         if isinstance(each, bpy.types.ID):
             yield each
@@ -279,11 +285,11 @@ def _pointed(block: bpy.types.bpy_struct, depth: int) -> Iterator[bpy.types.ID]:
             if isinstance(each, bpy.types.ID):
                 yield each
             elif each is not None and depth:
-                yield from _pointed(each, depth - 1)
+                yield from _pointers(each, depth - 1)
 
 
 def _driven(owner: bpy.types.ID, paths: str | tuple[str, ...]) -> Iterator[_Aspect]:
-    """What the drivers of those properties read whose data path begins like one of these."""
+    """What the drivers of the properties whose data path begins with one of these read."""
     data = getattr(owner, "animation_data", None)
     for curve in data.drivers if data else ():
         if curve.mute or not curve.data_path.startswith(paths):
@@ -310,8 +316,8 @@ def _driven(owner: bpy.types.ID, paths: str | tuple[str, ...]) -> Iterator[_Aspe
 
 
 def _is_setting(path: str) -> bool:
-    """Whether a data path is a custom property or one of ours: keyed by hand, and moved by nothing
-    but a driver.
+    """Whether a data path is that of a custom property or of one of ours: these are keyed by hand,
+    and only drivers move them.
     """
     return path.startswith("dafnet.") or path.endswith(('"]', "']"))
 

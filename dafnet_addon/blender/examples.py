@@ -222,7 +222,7 @@ EXAMPLES = {
         "Bed", "Sits down on a bed and lies down on it", {"Bed": (FURNITURE["Bed"], _ORIGIN)}, _bed
     ),
 }
-"""What the Add menu offers besides a character alone."""
+"""What the Add menu offers in addition to a bare character."""
 
 
 def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:

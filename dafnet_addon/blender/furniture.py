@@ -72,7 +72,7 @@ def furniture_now(context: bpy.types.Context, settings: Settings) -> dict[str, l
     """The furniture's meshes in the current frame by the names of the objects that they belong to;
     world, metres.
 
-    ``InputError`` where there is none to be seen, as for ``scene_reader.read_scene``.
+    ``InputError`` where none is visible, as for ``scene_reader.read_scene``.
     """
     scene = find_scene(settings)
     furniture = furniture_of(settings, Dependencies(scene))
@@ -136,8 +136,8 @@ class Furniture:
         self._toggled: dict[str, None] = {}
 
     def begin(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Read the meshes with faces; instances of one mesh share its arrays. ``InputError``: there
-        are none.
+        """Read the meshes that have faces; instances of one mesh share its arrays. ``InputError``:
+        there is none.
         """
         shapes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         found = False

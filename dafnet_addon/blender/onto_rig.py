@@ -1,5 +1,5 @@
-"""The motion that a DAFNet character plays, hand edits included, onto an armature of the animator's
-own: a new action.
+"""Bakes the motion that a DAFNet character plays, hand edits included, onto an armature of the
+animator's own, in a new action.
 """
 
 import re
@@ -48,7 +48,7 @@ Curves = Callable[[str, int, str], bpy.types.FCurve]
 class Baked:
     """The new ``action``; ``errors``: mean and largest distance (metres) of wrists, ankles, head
     and pelvis (the middle of the hip joints) from where they were to lie. ``angles``: mean and
-    largest angle (degrees) by which limbs and trunk lie otherwise than the character's
+    largest angle (degrees) between the limbs and trunk and the character's
     (``limb_errors``). Both are measured on the rig as Blender plays it. ``ratio``: the rig's size
     over the character's, by which the motion was scaled. ``overruled``: keyed bones that
     constraints or drivers of their own move, too.
@@ -262,7 +262,7 @@ def _prepare_rig(
 
 
 def _overruled(rig: bpy.types.Object, controls: list[Control]) -> tuple[str, ...]:
-    """Controls that their own constraints or drivers move, besides their keys."""
+    """Controls that constraints or drivers of their own move, in addition to their keys."""
 
     def moved(name: str) -> bool:
         own = any(

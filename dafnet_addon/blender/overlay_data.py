@@ -166,7 +166,7 @@ class _Played:
 
 
 def _played(context: bpy.types.Context, armature: bpy.types.Object) -> _Played | None:
-    """What the armature plays; None where that is not a take."""
+    """The take that the armature plays; None where it plays none."""
     action = played_take(armature)
     unpacked = _unpacked(action) if action else None
     if action is None or unpacked is None:

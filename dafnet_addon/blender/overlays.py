@@ -157,7 +157,7 @@ def shown_faults(action: bpy.types.Action | None) -> Faults | None:
     return _faults.get(action.session_uid) if action else None
 
 
-# Asking Blender to draw, and to say what changes.
+# Asking Blender to draw, and to report what changes.
 
 
 def _arrange() -> None:

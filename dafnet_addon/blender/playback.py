@@ -1,5 +1,5 @@
-"""Setting the scene's frames: the current one comes back, and simulations run as they do when the
-shot is played.
+"""Sets the scene's frames one after the other: simulations run as they do when the shot is played,
+and the current frame comes back.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -28,11 +28,11 @@ def frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 def in_order(frames: Sequence[int], simulations: Sequence[Simulation]) -> Sequence[int]:
-    """The frames to set, in this order, to see some rising ``frames``: those, or with simulations
-    all from their start on.
+    """The frames to set, in this order, to see some rising ``frames``: those alone, or with
+    simulations every frame from their start on.
 
-    A simulation makes each frame of the one before, so it knows no jumps: not over frames, and not
-    back and forth either.
+    A simulation computes each frame from the one before, so frames cannot be skipped, nor visited
+    in another order.
     """
     if not simulations:
         return frames
@@ -45,8 +45,8 @@ def play_steps(
     simulations: Sequence[Simulation],
     look: Look,
 ) -> Generator[float, None, None]:
-    """Set each frame and ``look`` at it; yields progress in [0, 1), at which the current frame is
-    as it was.
+    """Set each frame and ``look`` at it; yields progress in [0, 1), each time with the current
+    frame as it was.
 
     With ``simulations`` the frames run on instead, and the current one comes back at the end or
     when the generator is closed. ``look`` gets the frame, the evaluated scene, and the objects that

@@ -35,7 +35,7 @@ def _is_not_the_character(settings: "CharacterSettings", candidate: bpy.types.Ob
 
 class TakeSettings(bpy.types.PropertyGroup):
     """What is known of an action that holds a take (``Action.dafnet``); the motion itself is packed
-    beside it (``takes``).
+    into it as well (``takes``).
     """
 
     seed: IntProperty(name="Seed", options=set(), description="The seed that it was generated with")

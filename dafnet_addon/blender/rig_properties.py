@@ -30,7 +30,7 @@ class RigRow(bpy.types.PropertyGroup):
 
 
 class RigSettings(bpy.types.PropertyGroup):
-    """Settings of one armature that is not a DAFNet character."""
+    """Settings of an armature that is not a DAFNet character."""
 
     rows: CollectionProperty(type=RigRow, options=set(), description="Bones of the joints")
     active_row: IntProperty(name="Joint", options=set(), description="The row that is selected")
@@ -104,7 +104,7 @@ def unregister() -> None:
 
 
 def rig_of(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The armature of the animator's own that is active, or whose mesh is."""
+    """The animator's own armature: the active one, or the one whose mesh is active."""
     active = context.object
     if active is not None and active.type != "ARMATURE":
         active = active.parent
@@ -119,7 +119,7 @@ def character_for(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.type
     """The character to bake from: the rig's own setting, else a selected one, else the only one of
     the scene.
 
-    ``InputError`` where there is none, or more than one to choose from.
+    ``InputError``: there is none, or more than one to choose from.
     """
     chosen = rig.dafnet_rig.character
     there = [o for o in context.scene.objects if is_character(o)]
@@ -155,9 +155,7 @@ def show_map(rig: bpy.types.Object, rig_map: rigs.RigMap) -> None:
 
 
 def map_of(rig: bpy.types.Object) -> rigs.RigMap:
-    """The map as the rig's settings have it, or the one that is detected where nothing was set
-    yet.
-    """
+    """The map in the rig's settings, or the detected one if none has been set yet."""
     own = rig.dafnet_rig
     if not own.more:
         return rigs.detected(rig)

@@ -1,5 +1,5 @@
-"""Armatures as bodies and motions: from pose matrices of any mapped rig, or of our own character,
-to joints and frames.
+"""Reads armatures as bodies and motions: from the pose matrices of a mapped rig, or of our own
+character, to joints and frames.
 """
 
 from dataclasses import dataclass
@@ -55,7 +55,7 @@ def pose_matrices(evaluated: bpy.types.Object, bones: list[str | None]) -> np.nd
 def rigid_parts(matrices: np.ndarray, what: str) -> tuple[np.ndarray, float]:
     """Rotations (T, 3, 3) of an object's matrices (T, 4, 4), and its one scale.
 
-    ``InputError``: it is scaled unevenly, mirrored, or over time.
+    ``InputError``: it is mirrored, or scaled unevenly or over time.
     """
     lengths = np.linalg.norm(matrices[:, :3, :3], axis=1)
     if not np.isfinite(matrices).all():
@@ -77,8 +77,8 @@ def rigid_parts(matrices: np.ndarray, what: str) -> tuple[np.ndarray, float]:
 
 
 def shape_of(armature: bpy.types.Object, rig_map: RigMap, rest: np.ndarray, scale: float) -> Shape:
-    """The rig's shape, of the matrices (22, 4, 4) of its joints' bones at rest; ``scale``: the
-    object's in the world.
+    """The rig's shape, from the matrices (22, 4, 4) of its joints' bones at rest; ``scale``: that
+    of the object in the world.
     """
     heads = rest[:, :3, 3]
     axes = _axes(heads)
@@ -192,8 +192,7 @@ def joints_of(
     """Joints (T, 22, 3) of a DAFNet body of this size (world lengths) that moves as any mapped rig
     does; world.
 
-    And by how many degrees its limbs and trunk lie otherwise than the rig's, in the mean
-    (``limb_errors``).
+    And the mean angles, in degrees, between its limbs and trunk and the rig's (``limb_errors``).
 
     ``bodies`` (T, 4, 4): the rig's object; ``poses`` (T, 22, 4, 4): the bones ``rig_map.place`` of
     the joints, in its space, NaN where there is none.

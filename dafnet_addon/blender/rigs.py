@@ -1,5 +1,5 @@
-"""Which bone of an armature is which of our joints: maps by name, one JSON file each, the user's
-own beside those that ship.
+"""Which bone of an armature is which of our joints: maps by name, one JSON file each, those that
+ship and the user's own.
 
 A map's ``joints`` name the bones that are keyed. Where those are controls whose own poses are not
 the body's, ``places`` name the bones that lie as the body does; ``limbs`` name the controls of
@@ -391,8 +391,8 @@ def _carrier(armature: bpy.types.Object, bone: str | None, others: list[str]) ->
     """The bone itself, or the nearest one above it of which all the others are descendants; itself
     where there is none.
 
-    Some rigs have a bone for the hips' own turns beside the trunk, and both hang on the one that
-    moves the body.
+    Some rigs have a bone for the hips' own rotation next to the trunk, and both hang on the one
+    that moves the body.
     """
     if bone is None:
         return None

@@ -34,7 +34,7 @@ def keyable_root(settings: Settings) -> bpy.types.Object:
     """The root, whose keys are to be written: its own place must be its place in the world, and its
     action play alone.
 
-    ``InputError``: there is none, or something stands in the way.
+    ``InputError``: there is none, or something keeps it from being keyed.
     """
     if settings.root is None:
         raise InputError(

@@ -1,7 +1,7 @@
 """The scene as plain arrays: evaluated furniture, the root, targets, mode and source pose, frame by
 frame, in metres.
 
-One unit of Blender is ``metres_per_unit`` metres; everything handed to the core is in metres. The
+One unit of Blender is ``metres_per_unit`` metres; everything that the core gets is in metres. The
 evaluated scene is read, so keys, constraints, drivers, modifiers and instances all count; what is
 hidden in the viewport does not exist.
 """
@@ -268,15 +268,17 @@ def _require_independent(
                 f"The {what} follows the character itself; let it follow something else."
             )
         for simulation in dependencies.simulations([leader], shaped=False):
-            if _meets(simulation, dependencies, armature):
+            if _may_push(simulation, dependencies, armature):
                 raise InputError(
                     f"The character itself may push '{simulation.name}', which moves the {what}; "
                     "bake the simulation first."
                 )
 
 
-def _meets(simulation: Simulation, dependencies: Dependencies, armature: bpy.types.Object) -> bool:
-    return any(dependencies.follows(each, armature) for each in simulation.met)
+def _may_push(
+    simulation: Simulation, dependencies: Dependencies, armature: bpy.types.Object
+) -> bool:
+    return any(dependencies.follows(each, armature) for each in simulation.colliders)
 
 
 def _require_alive(depsgraph: bpy.types.Depsgraph, needed: list[bpy.types.Object]) -> None:
@@ -305,7 +307,9 @@ def _warnings(
     if furniture:
         yield from furniture.warnings()
     pushed = (
-        simulation.name for simulation in simulations if _meets(simulation, dependencies, armature)
+        simulation.name
+        for simulation in simulations
+        if _may_push(simulation, dependencies, armature)
     )
     for name in dict.fromkeys(pushed):
         yield (
@@ -349,8 +353,8 @@ def _upper_body_source(
     settings: Settings,
     armature: bpy.types.Object,
 ) -> tuple[bpy.types.Object | None, RigMap | None]:
-    """The upper body's source, and which of its bones are which joints where it is not a character
-    of ours.
+    """The upper body's source, and which of its bones are which joints if it is not one of our
+    characters.
     """
     if settings.upper_body_source is None:
         return None, None

@@ -51,7 +51,7 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
 
     The character, other armatures with what is parented to or deformed by them, and floors do not
     count. What the collection holds from an earlier time and is no longer near is unlinked again,
-    if it also lies in another collection. ``InputError``: there is no root or nothing
+    if it also lies in another collection. ``InputError``: there is no root, nothing is
     near it, or the scene cannot be read; nothing is changed then.
     """
     scene, own = context.scene, armature.dafnet
