@@ -1,4 +1,4 @@
-"""Drawings of the overlays as plain arrays: figures of lines, paths, rings, the circle of actions.
+"""Drawings of the overlays as plain arrays: stick figures, paths, rings, the circle of actions.
 
 Nothing here knows the scene, and nothing draws (``overlays`` does).
 """

@@ -175,9 +175,9 @@ def presets(_settings: Any, _context: bpy.types.Context) -> list[tuple[str, str,
         except InputError:
             continue
         items.append((key, rig_map.name, rig_map.about))
-    _kept[:] = items
-    return _kept
+    _menu_items[:] = items
+    return _menu_items
 
 
-_kept: list[tuple[str, str, str]] = []
+_menu_items: list[tuple[str, str, str]] = []
 """Blender needs the strings of a dynamic menu to live on."""

@@ -25,6 +25,13 @@ NAMES = {
     "MOST_SEED": "MAX_SEED",
     "absorb": "encode",
     "Made": "Samples",
+    "_Wish": "_BakeOptions",
+    "laid_over": "has_bone_overrides",
+    "settled": "evaluated_now",
+    "show_growing": "show_live_pose",
+    "_COMES_OVER": "_BLEND_SECONDS",
+    "_stored": "stored_take",
+    "_elsewhere": "_hint_at_other_scenes",
 }
 """Names that said nothing alone, or two things, and what stands in their place."""
 
@@ -36,6 +43,12 @@ PHRASES = (
     r"\bcame of a\b",
     r"\bgoes? again\b",
     r"the first was so before",
+    r"\bany more;",
+    r"\belse than its\b",
+    r"\bnot there for the character\b",
+    r"\boverrules the character's own\b",
+    r"\bfigures? of lines\b",
+    r"\bset the range's start to its\b",
 )
 """What is not English, or not clear: "is no armature" is "is not an armature"."""
 
