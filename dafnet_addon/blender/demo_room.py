@@ -253,7 +253,9 @@ def run_demo(
     )
 
     read = read_scene(bpy.context, settings)
-    report = demo_report(result.take, read.scene, read.controls, loaded, result.seconds)
+    report = demo_report(
+        result.take, read.scene, read.controls, weights=loaded, seconds=result.seconds
+    )
     save_text(folder / "report.json", json.dumps(report, indent=2))
     save_scene(folder / "demo.blend", lambda: progress(generating), compress=True)
     if preview:

@@ -71,7 +71,8 @@ class _Aspect(NamedTuple):
     what: str
 
 
-_IN_PLACE, _IN_SHAPE = "its place", "its shape"
+_IN_PLACE = "its place"
+_IN_SHAPE = "its shape"
 
 
 @dataclass(frozen=True)

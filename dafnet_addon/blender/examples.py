@@ -257,14 +257,14 @@ def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
     own.furniture = furniture
     placed = Route(RootPath(path.position + np.array(middle) * unit, path.yaw), plan.route.rests)
     write_keys(own.root, placed, first=first, scale=1.0 / unit, fps=fps)
-    _direct(armature, plan, first, np.array(middle), unit)
+    _direct(armature, plan, first=first, middle=np.array(middle), unit=unit)
     extended_to(scene, armature, first + len(path) - 1)
     scene.frame_set(first)
     return armature
 
 
 def _direct(
-    armature: bpy.types.Object, plan: Plan, first: int, middle: np.ndarray, unit: float
+    armature: bpy.types.Object, plan: Plan, *, first: int, middle: np.ndarray, unit: float
 ) -> None:
     """Key the targets while they count, and the mode; targets without a plan are kept, without
     influence.

@@ -15,7 +15,10 @@ FACING = np.diag([-1.0, -1.0, 1.0])
 inverse.
 """
 
-_LIGHT, _DARK = 0, 1
+_LIGHT = 0
+"""Material of limbs and trunk, an index of ``_MATERIALS``."""
+_DARK = 1
+"""Material of the joints, likewise."""
 _MATERIALS = (("Mannequin", (0.62, 0.56, 0.50, 1.0)), ("Mannequin Joints", (0.16, 0.15, 0.15, 1.0)))
 _RINGS = 14
 """Rings of vertices along a part."""
