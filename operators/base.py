@@ -45,5 +45,5 @@ def idle(operator: Any) -> bool:
     """Whether no job is running; else the operator's button says why it has to wait."""
     if running_job() is None:
         return True
-    operator.poll_message_set("Wait for the take to be generated, or cancel it with Esc")
+    operator.poll_message_set("Wait for the job that is running, or cancel it with Esc")
     return False

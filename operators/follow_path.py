@@ -1,6 +1,6 @@
 """Key the character's root from a curve, something that moves, or points on the floor."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 
 import bpy
 from bpy.props import BoolProperty, FloatProperty
@@ -15,9 +15,10 @@ from ..dafnet_addon.blender.path_sources import (
     may_move,
     through_points,
 )
+from ..dafnet_addon.blender.walking import Walk
 from ..dafnet_addon.core.trails import FASTEST, SLOWEST
 from .base import idle
-from .reporting import keyed, reported
+from .walking import WalkOperator
 
 __all__ = [
     "DAFNET_OT_root_from_object",
@@ -58,7 +59,7 @@ def _has(
     return chosen(context, fits)[1] is not None
 
 
-class DAFNET_OT_walk_along_curve(bpy.types.Operator):
+class DAFNET_OT_walk_along_curve(WalkOperator, bpy.types.Operator):
     """Key the character's root along the selected curve from the current frame on; keys after that
     are replaced
     """
@@ -93,26 +94,21 @@ class DAFNET_OT_walk_along_curve(bpy.types.Operator):
             "Select the one curve to walk along, with the character or alone",
         )
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Key the walk."""
+    def steps(self, context: bpy.types.Context) -> Generator[float, None, Walk]:
+        """Look for the way to the curve, and key the walk."""
         character, curve = chosen(context, is_curve)
-        with reported(self):
-            return keyed(
-                self,
-                along_curve(
-                    context,
-                    character,
-                    curve,
-                    speed=self.speed,
-                    seconds=self.seconds,
-                    keep_facing=self.keep_facing,
-                    backwards=self.backwards,
-                ),
-            )
-        return {"CANCELLED"}
+        return along_curve.steps(
+            context,
+            character,
+            curve,
+            speed=self.speed,
+            seconds=self.seconds,
+            keep_facing=self.keep_facing,
+            backwards=self.backwards,
+        )
 
 
-class DAFNET_OT_walk_through_points(bpy.types.Operator):
+class DAFNET_OT_walk_through_points(WalkOperator, bpy.types.Operator):
     """Key the root on through the selected empties in the order of their names; where none is
     selected, to the 3D cursor
     """
@@ -139,24 +135,19 @@ class DAFNET_OT_walk_through_points(bpy.types.Operator):
         """There is a character to send."""
         return may_direct(cls, context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Key the walk."""
-        with reported(self):
-            return keyed(
-                self,
-                through_points(
-                    context,
-                    sent(context)[0],
-                    floor_points(context),
-                    speed=self.speed,
-                    seconds=self.seconds,
-                    to_cursor=self.to_cursor,
-                ),
-            )
-        return {"CANCELLED"}
+    def steps(self, context: bpy.types.Context) -> Generator[float, None, Walk]:
+        """Look for the way, and key the walk."""
+        return through_points.steps(
+            context,
+            sent(context)[0],
+            floor_points(context),
+            speed=self.speed,
+            seconds=self.seconds,
+            to_cursor=self.to_cursor,
+        )
 
 
-class DAFNET_OT_root_from_object(bpy.types.Operator):
+class DAFNET_OT_root_from_object(WalkOperator, bpy.types.Operator):
     """Key the root where the selected moving object goes, in the same frames; keys from there on
     are replaced
     """
@@ -175,9 +166,7 @@ class DAFNET_OT_root_from_object(bpy.types.Operator):
             "Select the one animated object to follow, with the character or alone",
         )
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Key what it does."""
+    def steps(self, context: bpy.types.Context) -> Generator[float, None, Walk]:
+        """Look where it goes, and key that."""
         character, source = chosen(context, may_move)
-        with reported(self):
-            return keyed(self, as_moved(context, character, source))
-        return {"CANCELLED"}
+        return as_moved.steps(context, character, source)

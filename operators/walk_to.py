@@ -1,17 +1,20 @@
 """Send the character to a seat or to the 3D cursor."""
 
+from collections.abc import Generator
+
 import bpy
 from bpy.props import EnumProperty, FloatProperty
 
 from ..dafnet_addon.blender.armature import sent
-from ..dafnet_addon.blender.walking import walk
+from ..dafnet_addon.blender.walking import Walk, walk
+from ..dafnet_addon.core.errors import InputError
 from .base import idle
-from .reporting import keyed, reported
+from .walking import WalkOperator
 
 __all__ = ["DAFNET_OT_walk_to"]
 
 
-class DAFNET_OT_walk_to(bpy.types.Operator):
+class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
     """Key the character's root on from its last key: it walks round the furniture and sits down, or
     stands at the 3D cursor
     """
@@ -56,15 +59,10 @@ class DAFNET_OT_walk_to(bpy.types.Operator):
         cls.poll_message_set("Add a character, or select one beside its goal")
         return context.mode == "OBJECT" and sent(context)[0] is not None
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Key the walk."""
+    def steps(self, context: bpy.types.Context) -> Generator[float, None, Walk]:
+        """Look for the way, and key the walk."""
         character, seat = sent(context)
         if self.goal == "SEAT" and seat is None:
-            self.report({"ERROR"}, "Select the one object to sit on, with the character or alone.")
-            return {"CANCELLED"}
-        with reported(self):
-            made = walk(
-                context, character, seat if self.goal == "SEAT" else None, self.seconds, self.speed
-            )
-            return keyed(self, made)
-        return {"CANCELLED"}
+            raise InputError("Select the one object to sit on, with the character or alone.")
+        goal = seat if self.goal == "SEAT" else None
+        return walk.steps(context, character, goal, self.seconds, self.speed)

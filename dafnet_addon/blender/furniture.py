@@ -6,7 +6,7 @@ and that the viewport draws as wire or bounds, and those that Booleans cut with.
 """
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field
 
 import bpy
@@ -18,7 +18,7 @@ from ..core.solids import Mesh
 from .armature import metres_per_unit
 from .dependencies import Dependencies
 from .lookup import find_collection, find_object, find_scene
-from .playback import in_order
+from .playback import play_steps
 from .settings import Settings
 
 __all__ = ["Furniture", "array", "furniture_at", "furniture_now", "furniture_of"]
@@ -86,17 +86,25 @@ def furniture_now(context: bpy.types.Context, settings: Settings) -> dict[str, l
 
 
 def furniture_at(
-    context: bpy.types.Context, settings: Settings, frame: int
-) -> dict[str, list[Mesh]]:
-    """``furniture_now`` in another frame, as it lies there when the scene is played; that frame
-    stays set.
+    context: bpy.types.Context, settings: Settings, frame: int, look: Callable[[], None]
+) -> Generator[float, None, tuple[Mesh, ...]]:
+    """The furniture's meshes in another frame, as they lie there when the scene is played; world,
+    metres. ``look`` is called in that frame too.
+
+    A job, see ``playback.play_steps``. ``InputError`` as for ``furniture_now``.
     """
-    dependencies = Dependencies(find_scene(settings))
+    scene = find_scene(settings)
+    dependencies = Dependencies(scene)
     furniture = furniture_of(settings, dependencies)
     simulations = dependencies.simulations(furniture.members) if furniture else []
-    for each in in_order([frame], simulations):
-        context.scene.frame_set(each)
-    return furniture_now(context, settings)
+
+    def begin(_frame: int, depsgraph: bpy.types.Depsgraph, _shaped: set[bpy.types.Object]) -> None:
+        look()
+        if furniture:
+            furniture.begin(depsgraph)
+
+    yield from play_steps(context, [frame], simulations, begin)
+    return furniture.solids(metres_per_unit(scene)) if furniture else ()
 
 
 class Furniture:

@@ -3,30 +3,26 @@ moves, points on the floor.
 """
 
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Sequence
 
 import bpy
 import numpy as np
 
-from ..core.distance import scaled
 from ..core.errors import InputError
-from ..core.passage import Passage, met_along
+from ..core.passage import SatOn, met_along
 from ..core.paths import AFTER_SEAT, Route, Stop, facing, route
+from ..core.progress import stepwise, within
 from ..core.root import forward_of
-from ..core.solids import Scene
 from ..core.trails import FASTEST, followed, trail
-from ..director.seats import on_a_seat
-from ..director.surfaces import surface_points
-from ..director.walks import around, way_round
-from .armature import character_scale, is_character, metres_per_unit, parts_of, sent
+from ..director.walks import doubted, ways
+from .armature import is_character, parts_of, sent
 from .compat import action_curves
 from .dependencies import Dependencies
-from .furniture import furniture_at
-from .playback import frame_kept, in_order
-from .root_keys import MOVES, keyable_root, keyed_along, last_key, unchanged_on_failure
-from .settings import settings_of
-from .walking import Walk, extended_to, told_of, walk
+from .lookup import find_object
+from .playback import play_steps
+from .root_keys import MOVES, keyable_root, keyed_along, unchanged_on_failure
+from .settings import Settings, settings_of
+from .walking import Start, Walk, extended_to, rest_at, start_of, told_of, walk
 
 __all__ = [
     "along_curve",
@@ -39,7 +35,8 @@ __all__ = [
     "through_points",
 ]
 
-_BEFORE = 0.2  # seconds of rest before the first step
+_READ = 0.1  # progress when the scene is read
+_FOUND = 0.7  # progress when the way is found
 _SPACING = 0.05  # metres between points on the furniture
 _THERE = 0.1  # metres between a root and the line's beginning that need no walk
 
@@ -93,86 +90,36 @@ def floor_points(context: bpy.types.Context) -> list[bpy.types.Object]:
     )
 
 
-@dataclass(frozen=True)
-class _Directed:
-    """The character's ``root`` in the scene, its ``place`` (3,) and ``yaw`` at frame ``first`` and
-    the furniture then, in canonical metres, of which a Blender unit is ``unit``; the character's
-    ``size`` over the canonical one.
-    """
-
-    root: bpy.types.Object
-    first: int
-    unit: float
-    size: float
-    fps: float
-    place: np.ndarray
-    yaw: float
-    solids: Scene
-
-    @property
-    def floor(self) -> float:
-        return float(self.place[2])
-
-    def start(self) -> Stop:
-        """Where the root rests before it goes."""
-        seated = on_a_seat(self.solids.solids, self.place[:2], self.floor)
-        return Stop((float(self.place[0]), float(self.place[1])), self.yaw, _BEFORE, seated=seated)
-
-
-def _directed(
-    context: bpy.types.Context, armature: bpy.types.Object, first: int | None = None
-) -> _Directed:
-    """At frame ``first``, None for the root's last key or else the current frame. The scene's frame
-    is as before.
-    """
-    scene = context.scene
-    settings = settings_of(armature, scene)
-    root = keyable_root(settings)
-    fps, size = (
-        scene.render.fps / scene.render.fps_base,
-        character_scale(armature, metres_per_unit(scene)),
-    )
-    unit = metres_per_unit(scene) / size
-    if first is None:
-        keyed = last_key(root)
-        first = scene.frame_current if keyed is None else keyed
-    with frame_kept(scene):
-        meshes = [
-            mesh for found in furniture_at(context, settings, first).values() for mesh in found
-        ]
-        place, yaw = np.array(root.location, float) * unit, float(root.rotation_euler[2])
-    return _Directed(
-        root, first, unit, size, fps, place, yaw, scaled(Scene(tuple(meshes)), 1.0 / size)
-    )
-
-
 def _written(
     context: bpy.types.Context,
-    armature: bpy.types.Object,
-    directed: _Directed,
+    settings: Settings,
+    start: Start,
     walked: Route,
-    met: Sequence[Passage],
-    *warnings: str,
-) -> Walk:
-    """Key a route over what the root has from its first frame on, and tell what is ``met``; before
-    that it moves as it did.
+    end: Sequence[SatOn] | None = None,
+    warnings: Sequence[str] = (),
+) -> Generator[float, None, Walk]:
+    """Key a route over what the root has from its first frame on, and tell what is to be seen to;
+    before that it moves as it did. ``end``: see ``met_along``.
     """
-    root, first = directed.root, directed.first
+    met = yield from within(met_along.steps(start.scene, walked.path, start.fps, end=end), 0.0, 0.9)
+    places = walked.path.position[:, :2]
+    doubt = yield from within(
+        doubted.steps(start.scene.solids, places, start.floor, start.size), 0.9, 1.0
+    )
+    root, first = keyable_root(settings), start.first
+    armature = find_object(settings, settings.armature, "character")
     with unchanged_on_failure(root):
         kept = _cut(root, first)
-        keyed_along(context, root, walked, first=first, scale=1.0 / directed.unit, fps=directed.fps)
+        keyed_along(context, root, walked, first=first, scale=1.0 / start.unit, fps=start.fps)
         for curve in action_curves(root):
             for frame, value in kept.get((curve.data_path, curve.array_index), []):
                 if abs(curve.evaluate(frame) - value) > 1e-5:
                     curve.keyframe_points.insert(frame, value).interpolation = "LINEAR"
             curve.update()
-    last_frame = first + len(walked.path) - 1
-    return Walk(
-        first,
-        last_frame,
-        extended_to(context.scene, armature, last_frame),
-        (*told_of(met, first), *warnings),
-    )
+    last = first + len(walked.path) - 1
+    extended = extended_to(context.scene, armature, last)
+    told = (*told_of(met, first), *warnings, *([doubt] if doubt else []))
+    return Walk(first, last, extended, told)
 
 
 def _cut(root: bpy.types.Object, first: int) -> dict[tuple[str, int], list[tuple[int, float]]]:
@@ -254,6 +201,7 @@ def _lines(owner: bpy.types.Object) -> list[np.ndarray]:
     return [line for line in lines if len(line) > 1]
 
 
+@stepwise
 def along_curve(
     context: bpy.types.Context,
     armature: bpy.types.Object,
@@ -263,25 +211,32 @@ def along_curve(
     seconds: float = 1.0,
     keep_facing: bool = False,
     backwards: bool = False,
-) -> Walk:
+) -> Generator[float, None, Walk]:
     """Let the character walk along a curve from the current frame on, and stand at its end for some
     ``seconds``.
 
     Where the root has keys before that, it goes from where it is to the curve first; else the walk
     begins on the curve. Later keys are replaced. ``keep_facing``: it looks where it looks now all
     the way. ``backwards``: from the curve's end. ``InputError``: no curve, too short, or the root
-    cannot be keyed; nothing is changed then.
+    cannot be keyed; nothing is changed then, nor where the job is closed.
     """
+    settings, name = settings_of(armature, context.scene), curve.name
     line = _line_of(context, curve)[:: -1 if backwards else 1]
-    at = _directed(context, armature, context.scene.frame_current)
-    points = line[:, :2] * at.unit
     keys = [
-        p.co[0] for c in action_curves(at.root) if c.data_path in MOVES for p in c.keyframe_points
+        p.co[0]
+        for c in action_curves(keyable_root(settings))
+        if c.data_path in MOVES
+        for p in c.keyframe_points
     ]
+    at = yield from within(start_of(context, settings, context.scene.frame_current), 0.0, _READ)
+    points = line[:, :2] * at.unit
     away = float(np.linalg.norm(points[0] - at.place[:2]))
-    start = at.start() if away < _THERE or (keys and min(keys) < at.first) else None
+    start = None
+    if away < _THERE or (keys and min(keys) < at.first):
+        start = yield from within(rest_at(at), _READ, _READ)
     if start is not None and away >= _THERE:
-        points = np.concatenate([_way(at, start, [points[0]])[:-1], points])
+        way = yield from within(_way(at, start, [points[0]]), _READ, _FOUND)
+        points = np.concatenate([way[:-1], points])
     walked = trail(
         points,
         start,
@@ -290,56 +245,57 @@ def along_curve(
         floor=at.floor,
         yaw=at.yaw if keep_facing else None,
         seconds=seconds,
-        name=f"curve '{curve.name}'",
+        name=f"curve '{name}'",
     )
-    return _written(
-        context, armature, at, walked, met_along(at.solids, walked.path, at.fps, end=())
-    )
+    return (yield from within(_written(context, settings, at, walked, ()), _FOUND, 1.0))
 
 
-def _way(at: _Directed, start: Stop, goals: list[np.ndarray]) -> np.ndarray:
+def _way(at: Start, start: Stop, goals: Sequence[np.ndarray]) -> Generator[float, None, np.ndarray]:
     """Corners (N, 2) of the way round the furniture from ``start`` through the places ``goals``
     (2,), with these.
     """
     forward = forward_of(start.yaw)
-    here, corners = np.array(start.position) + (AFTER_SEAT if start.seated else 0.0) * forward, []
-    points = surface_points(at.solids.solids, _SPACING, around([here, *goals])) - np.array(
-        [0.0, 0.0, at.floor]
+    here = np.array(start.position) + (AFTER_SEAT if start.seated else 0.0) * forward
+    legs = yield from ways.steps(
+        at.scene.solids, [here, *goals], floor=at.floor, size=at.size, spacing=_SPACING
     )
-    for goal in goals:
-        corners += [*(np.array(corner) for corner in way_round(points, here, goal, at.size)), goal]
-        here = goal
-    return np.array(corners)
+    return np.array(
+        [corner for leg, goal in zip(legs, goals, strict=True) for corner in (*leg, goal)]
+    )
 
 
+@stepwise
 def places_of(
     context: bpy.types.Context, source: bpy.types.Object, frames: Sequence[int]
-) -> np.ndarray:
+) -> Generator[float, None, np.ndarray]:
     """Where an object is in some rising frames (N, 3), world, Blender units; the current frame
-    stays.
+    stays. ``InputError``: it is deleted while it is looked at.
     """
-    places = {}
-    with frame_kept(context.scene):
-        for frame in in_order(
-            frames, Dependencies(context.scene).simulations([source], shaped=False)
-        ):
-            context.scene.frame_set(frame)
-            places[frame] = tuple(
-                source.evaluated_get(context.evaluated_depsgraph_get()).matrix_world.translation
-            )
+    places: dict[int, tuple[float, ...]] = {}
+
+    def look(frame: int, depsgraph: bpy.types.Depsgraph, _shaped: set[bpy.types.Object]) -> None:
+        places[frame] = tuple(source.evaluated_get(depsgraph).matrix_world.translation)
+
+    simulations = Dependencies(context.scene).simulations([source], shaped=False)
+    try:
+        yield from play_steps(context, frames, simulations, look)
+    except ReferenceError as error:
+        raise InputError("Something was deleted while the scene was read; try again.") from error
     return np.array([places[frame] for frame in frames], float)
 
 
+@stepwise
 def as_moved(
     context: bpy.types.Context, armature: bpy.types.Object, source: bpy.types.Object
-) -> Walk:
+) -> Generator[float, None, Walk]:
     """Let the root go where ``source`` goes over the floor, at the same frames: those of its keys,
     else of the scene's range.
 
     The root's keys from there on are replaced. ``InputError``: it hardly moves, or the root cannot
-    be keyed; nothing is changed then.
+    be keyed; nothing is changed then, nor where the job is closed.
     """
-    scene = context.scene
+    scene, name = context.scene, source.name
+    settings = settings_of(armature, scene)
     keys = [
         p.co[0]
         for c in action_curves(source)
@@ -351,18 +307,21 @@ def as_moved(
         if keys
         else (scene.frame_start, scene.frame_end)
     )
-    at = _directed(context, armature, first)
-    places = places_of(context, source, range(first, last + 1))[:, :2] * at.unit
+    moves = places_of.steps(context, source, range(first, last + 1))
+    at = yield from within(start_of(context, settings, first), 0.0, _READ)
+    places = (yield from within(moves, _READ, _FOUND))[:, :2] * at.unit
     moved = followed(places, at.fps, at.yaw, at.floor)
     fastest = float(np.linalg.norm(np.diff(moved.path.position, axis=0), axis=1).max() * at.fps)
     hurried = (
-        f"'{source.name}' moves at up to {fastest:.1f} m/s, faster than this character can walk; "
+        f"'{name}' moves at up to {fastest:.1f} m/s, faster than this character can walk; "
         "slow it down."
     )
-    met = met_along(at.solids, moved.path, at.fps)
-    return _written(context, armature, at, moved, met, *([hurried] if fastest > FASTEST else []))
+    warnings = [hurried] if fastest > FASTEST else []
+    written = _written(context, settings, at, moved, None, warnings)
+    return (yield from within(written, _FOUND, 1.0))
 
 
+@stepwise
 def through_points(
     context: bpy.types.Context,
     armature: bpy.types.Object,
@@ -371,28 +330,29 @@ def through_points(
     speed: float = 1.1,
     seconds: float = 1.0,
     to_cursor: bool = False,
-) -> Walk:
+) -> Generator[float, None, Walk]:
     """Let the character walk through the places of ``points`` and stand at the last.
 
     ``to_cursor``: the 3D cursor is the last; it is the only one where there are no points. Goes on
     from the root's last key, else from the current frame, round the furniture and without rests in
-    between. ``InputError``: no way, or the root cannot be keyed; nothing is changed then.
+    between. ``InputError``: no way, or the root cannot be keyed; nothing is changed then, nor where
+    the job is closed.
     """
     if not points:
-        return walk(context, armature, None, seconds, speed)
-    at = _directed(context, armature)
+        return (yield from walk.steps(context, armature, None, seconds, speed))
+    settings = settings_of(armature, context.scene)
     spots = [point.matrix_world.translation for point in points] + [
         context.scene.cursor.location
     ] * to_cursor
-    places = [np.array(spot, float)[:2] * at.unit for spot in spots]
+    flat = [np.array(spot, float)[:2] for spot in spots]
+    at = yield from within(start_of(context, settings), 0.0, _READ)
+    places = [spot * at.unit for spot in flat]
     if len(places) > 1 and np.linalg.norm(places[0] - at.place[:2]) < 0.3:
         del places[0]  # it stands there already
-    start = at.start()
-    way = _way(at, start, places)
+    start = yield from within(rest_at(at), _READ, _READ)
+    way = yield from within(_way(at, start, places), _READ, _FOUND)
     last = way[-1] - (way[-2] if len(way) > 1 else np.array(start.position))
     via = [(float(x), float(y)) for x, y in way]
     goal = Stop(via.pop(), facing(last), seconds)
     walked = route(start, *via, goal, speed=speed, fps=at.fps, floor=at.floor)
-    return _written(
-        context, armature, at, walked, met_along(at.solids, walked.path, at.fps, end=())
-    )
+    return (yield from within(_written(context, settings, at, walked, ()), _FOUND, 1.0))

@@ -41,12 +41,12 @@ def in_order(frames: Sequence[int], simulations: Sequence[Simulation]) -> Sequen
 
 def play_steps(
     context: bpy.types.Context,
-    frames: range,
+    frames: Sequence[int],
     simulations: Sequence[Simulation],
     look: Look,
 ) -> Generator[float, None, None]:
-    """Set each frame and ``look`` at it; yields progress in [0, 1), each time with the current
-    frame as it was.
+    """Set each of some rising frames and ``look`` at it; yields progress in [0, 1), each time with
+    the current frame as it was.
 
     With ``simulations`` the frames run on instead, and the current one comes back at the end or
     when the generator is closed. ``look`` gets the frame, the evaluated scene, and the objects that
@@ -60,7 +60,7 @@ def play_steps(
         for start in range(0, len(played), _BATCH):
             if simulations and scene.frame_current != last:
                 raise InputError(
-                    "The current frame was changed while a simulation was read; generate again."
+                    "The current frame was changed while a simulation was read; try again."
                 )
             with nullcontext() if simulations else frame_kept(scene), _reshaped(scene) as shaped:
                 for frame in played[start : start + _BATCH]:

@@ -5,7 +5,7 @@ or gets up from is not a hindrance, and neither is what its legs are under while
 seat only what stands higher than it is met.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from .distance import prepared, rigid_frames
 from .nearby import solids_near
 from .occupancy import distance
+from .progress import stepwise, within
 from .root import RootPath
 from .rotations import rotate, transpose
 from .series import runs
@@ -39,6 +40,7 @@ _OVER_SEAT = 0.12  # metres over a seat's top that belong to it
 _COMES = 0.6  # metres from the place on a seat, within which a body is on its way to it
 _RESTS = 0.15  # metres from it, within which the body is there
 _NAMED = 3  # passages that a sentence names
+_SOLIDS_AT_ONCE = 100  # solids between two steps of a job
 
 
 @dataclass(frozen=True)
@@ -68,10 +70,20 @@ def _upright(path: RootPath, heights: np.ndarray) -> np.ndarray:
     return np.asarray(path.position[:, None] + heights[:, None] * (0.0, 0.0, 1.0))
 
 
-def _pieces(scene: Scene, path: RootPath) -> dict[str, Scene]:
+def _near(scene: Scene, path: RootPath) -> Generator[float, None, Scene]:
+    """The furniture beside the axis."""
+    found: list[Box | Mesh] = []
+    for k in range(0, len(scene.solids), _SOLIDS_AT_ONCE):
+        some = Scene(tuple(scene.solids[k : k + _SOLIDS_AT_ONCE]))
+        found += solids_near(some, path.position, _BESIDE).solids
+        yield k / len(scene.solids)
+    return Scene(tuple(found))
+
+
+def _pieces(scene: Scene, path: RootPath) -> Generator[float, None, dict[str, Scene]]:
     """The furniture beside the axis by its names."""
     found: dict[str, Scene] = {}
-    for solid in solids_near(scene, path.position, _BESIDE).solids:
+    for solid in (yield from _near(scene, path)).solids:
         found[solid.name] = Scene((*found.get(solid.name, Scene()).solids, solid))
     return found
 
@@ -85,19 +97,26 @@ def _still_over(solid: Box | Mesh, path: RootPath, fps: float) -> np.ndarray:
     return np.asarray(np.linalg.norm(np.gradient(over, axis=0), axis=1) * fps < _STILL)
 
 
-def seats_along(scene: Scene, path: RootPath, fps: float) -> tuple[SatOn, ...]:
+@stepwise
+def seats_along(
+    scene: Scene, path: RootPath, fps: float
+) -> Generator[float, None, tuple[SatOn, ...]]:
     """What a root sits on: the lowest piece that is under it while it stands still, where there is
     room above.
 
     ``scene``: canonical metres, static or with a matrix for each frame of ``path``, ``fps`` of them
     a second.
     """
-    pieces = _pieces(scene, path)
+    pieces = yield from within(_pieces(scene, path), 0.0, 0.3)
     if not pieces:
         return ()
     floor, column = path.position[:, 2], _upright(path, _COLUMN)
-    touched = np.stack([distance(piece, column, floor) < _TOUCHES for piece in pieces.values()])
-    still = np.stack([_still_over(piece.solids[0], path, fps) for piece in pieces.values()])
+    touching, standing = [], []
+    for k, piece in enumerate(pieces.values()):
+        touching.append(distance(piece, column, floor) < _TOUCHES)
+        standing.append(_still_over(piece.solids[0], path, fps))
+        yield 0.3 + 0.7 * k / len(pieces)
+    touched, still = np.stack(touching), np.stack(standing)
     carries = touched & still[..., None] & (_COLUMN < _HIGHEST)
 
     # The lowest piece's own parts may be apart, a chair's cross-bar and its seat; over its highest
@@ -138,9 +157,10 @@ def _inside(piece: Scene, path: RootPath, fps: float) -> np.ndarray:
     return np.asarray(middle & (left == right))
 
 
+@stepwise
 def passages(
     scene: Scene, path: RootPath, fps: float, seats: Sequence[SatOn]
-) -> tuple[Passage, ...]:
+) -> Generator[float, None, tuple[Passage, ...]]:
     """Where the body is in furniture, in order of time; ``seats``: see ``seats_along``, whose
     arguments the others are.
     """
@@ -151,7 +171,9 @@ def passages(
         lowest = np.where(gap < _COMES, np.maximum(lowest, seat.top + _OVER_SEAT - floor), lowest)
 
     met: dict[str, np.ndarray] = {}
-    for name, piece in _pieces(scene, path).items():
+    pieces = yield from within(_pieces(scene, path), 0.0, 0.3)
+    for k, (name, piece) in enumerate(pieces.items()):
+        yield 0.3 + 0.7 * k / len(pieces)
         inside = _inside(piece, path, fps)
         limit = lowest.copy()
         for seat, gap in zip(seats, away, strict=True):
@@ -179,22 +201,23 @@ def _visits(flags: np.ndarray, fps: float) -> list[tuple[int, int]]:
     return runs(flags, gap=max(_PAUSE * fps - 1, 0))
 
 
+@stepwise
 def met_along(
     scene: Scene, path: RootPath, fps: float, end: Sequence[SatOn] | None = None
-) -> tuple[Passage, ...]:
+) -> Generator[float, None, tuple[Passage, ...]]:
     """``passages`` of a path that is about to be keyed, through a ``scene`` not yet measured.
 
     ``end``: what the body sits on at the path's end, nothing where it stands there; None for what
     it seems to sit on.
     """
-    near = prepared(
-        solids_near(scene, path.position, _BESIDE), float(np.median(path.position[:, 2]))
-    )[0]
-    seats = seats_along(near, path, fps)
+    floor = float(np.median(path.position[:, 2]))
+    near = yield from within(_near(scene, path), 0.0, 0.2)
+    near = (yield from within(prepared.steps(near, floor), 0.2, 0.6))[0]
+    seats = yield from within(seats_along.steps(near, path, fps), 0.6, 0.8)
     if end is not None:
         last = path.position[-1, :2]
         seats = (*(seat for seat in seats if np.linalg.norm(seat.place - last) > _COMES), *end)
-    return passages(near, path, fps, seats)
+    return (yield from within(passages.steps(near, path, fps, seats), 0.8, 1.0))
 
 
 def listed(found: Sequence[Passage], when: Callable[[Passage], str]) -> str:

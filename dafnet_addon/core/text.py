@@ -8,7 +8,7 @@ import unicodedata
 from numbers import Number
 from typing import Any
 
-__all__ = ["printable", "read_json"]
+__all__ = ["metres", "printable", "read_json"]
 
 _DEEPEST = 32  # lists and objects within each other
 _LONGEST = 18  # digits of a whole number
@@ -27,6 +27,11 @@ def printable(words: object, max_length: int = 200) -> str:
     return "".join(
         each if _is_shown(each) else each.encode("unicode_escape").decode("ascii") for each in text
     )
+
+
+def metres(length: float) -> str:
+    """A length in metres with its unit, in two digits or more: 0.0095 m, 95 m, 1,250 m."""
+    return f"{length:,.0f} m" if length >= 10.0 else f"{length:.2g} m"
 
 
 def _brief(thing: object) -> str:

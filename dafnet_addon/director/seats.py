@@ -1,6 +1,6 @@
 """Where, and which way round, one sits on a piece of furniture, found on its mesh."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,12 +8,15 @@ import numpy as np
 from ..core.errors import InputError
 from ..core.nearby import extent
 from ..core.paths import facing
+from ..core.progress import stepwise, within
 from ..core.solids import Box, Mesh
-from .surfaces import HeightField, height_field, surface_points
+from ..core.text import metres
+from .surfaces import HeightField, height_field, parts_of_surfaces
 
 __all__ = ["SeatPlace", "on_a_seat", "seat_of"]
 
 _CELL = 0.03
+_MAX_CELLS = 1_000_000  # cells; larger furniture is looked at more coarsely
 _LOWEST = 0.22  # metres over the floor, of seats
 _HIGHEST = 0.85  # metres over the floor, of seats
 _OVERHEAD = 1.5  # metres over the floor; what is higher is not part of a seat
@@ -74,6 +77,14 @@ def _hull(points: np.ndarray) -> np.ndarray:
     return np.array(half(ordered) + half(ordered[::-1])) if len(ordered) > 2 else np.array(ordered)
 
 
+def _ends_of_rows(cells: np.ndarray) -> np.ndarray:
+    """The first and the last cell (N, 2) of each row, of cells in order: their hull is that of
+    all.
+    """
+    starts = np.flatnonzero(np.diff(cells[:, 0], prepend=-1))
+    return cells[np.concatenate([starts, np.append(starts[1:], len(cells)) - 1])]
+
+
 def _axes(cells: np.ndarray) -> np.ndarray:
     """The two directions (2, 2) of the smallest rectangle around points (N, 2), the longer side
     first.
@@ -106,7 +117,9 @@ def _roomy(mask: np.ndarray, reach: int) -> np.ndarray:
     return ~_shrunk(~_shrunk(closed, reach), reach) & mask
 
 
-def _seat_level(field: HeightField, floor: float) -> tuple[float, np.ndarray] | None:
+def _seat_level(
+    field: HeightField, floor: float
+) -> Generator[float, None, tuple[float, np.ndarray] | None]:
     """Height and cells (N, 2) of the level that one sits on: the lowest one that has about as much
     room as any.
 
@@ -116,7 +129,10 @@ def _seat_level(field: HeightField, floor: float) -> tuple[float, np.ndarray] | 
     over = field.top - floor
     reach = max(1, round(0.5 * _ROOM / field.cell))
     levels = np.arange(_LOWEST, _HIGHEST, 0.02)
-    masks = [_roomy(np.abs(over - level) < _FLAT, reach) for level in levels]
+    masks = []
+    for k, level in enumerate(levels):
+        masks.append(_roomy(np.abs(over - level) < _FLAT, reach))
+        yield k / len(levels)
     room = np.array([mask.sum() for mask in masks])
     if not room.any():
         masks = [np.abs(over - level) < _FLAT for level in levels]
@@ -152,6 +168,8 @@ def _spot(
     """
     sideways = np.array([forward[1], -forward[0]])
     depth, width = places @ forward, places @ sideways
+    order = np.argsort(width)
+    depth, width = depth[order], width[order]
     middle = 0.5 * float(width.min() + width.max())
     room = max(0.0, 0.5 * float(np.ptp(width)) - _HALF_WIDTH)
     low, high = middle - room, middle + room
@@ -159,7 +177,8 @@ def _spot(
     others = np.linspace(low, high, 1 + round(2 * room / _CELL))
     spots = []
     for aside in (wanted, *others[np.argsort(np.abs(others - wanted))]):
-        column = depth[np.abs(width - aside) < 0.5 * _ROOM]
+        first, last = np.searchsorted(width, (aside - _ROOM, aside + _ROOM))
+        column = depth[first:last][np.abs(width[first:last] - aside) < 0.5 * _ROOM]
         column = column if len(column) else depth
         spots.append((float(aside), room, float(column.min()), float(column.max())))
     return next((spot for spot in spots if spot[3] - depth.min() <= _DEEPEST), spots[0])
@@ -172,15 +191,25 @@ def _blocked(up: np.ndarray, forward: np.ndarray, spot: tuple[float, float, floa
     return bool(((along > -0.1) & (along < _LEGS) & (np.abs(across) < _LEGS)).any())
 
 
-def on_a_seat(solids: Sequence[Box | Mesh], position: np.ndarray, floor: float = 0.0) -> bool:
+@stepwise
+def on_a_seat(
+    solids: Sequence[Box | Mesh], position: np.ndarray, floor: float = 0.0
+) -> Generator[float, None, bool]:
     """Whether a root that rests at ``position`` (2,) has a seat under it: something between 22 and
     85 cm over ``floor``.
     """
-    points = surface_points(solids, _CELL, (position - _UNDER, position + _UNDER))
-    height = points[np.linalg.norm(points[:, :2] - position, axis=-1) < _UNDER, 2] - floor
-    return bool(((height > _LOWEST) & (height < _HIGHEST)).any())
+    parts = yield from parts_of_surfaces.steps(
+        solids, _CELL, (position - _UNDER, position + _UNDER)
+    )
+    for points in parts:
+        height = points[np.linalg.norm(points[:, :2] - position, axis=-1) < _UNDER, 2] - floor
+        if ((height > _LOWEST) & (height < _HIGHEST)).any():
+            return True
+        yield 1.0
+    return False
 
 
+@stepwise
 def seat_of(
     solids: Sequence[Box | Mesh],
     towards: np.ndarray,
@@ -188,7 +217,7 @@ def seat_of(
     name: str = "furniture",
     near: np.ndarray | None = None,
     size: float = 1.0,
-) -> SeatPlace:
+) -> Generator[float, None, SeatPlace]:
     """Where one sits on one piece of furniture, made of ``solids``; world, metres, people of 1.75
     m.
 
@@ -199,16 +228,27 @@ def seat_of(
     surface between 22 and 85 cm over ``floor``. ``size``: of the character, over 1.75 m, for what
     is said of the scene.
     """
-    points = surface_points(solids, 0.6 * _CELL)
-    points = points[(points[:, 2] < floor + _OVERHEAD) & (points[:, 2] > floor + 0.02)]
+    parts = yield from within(parts_of_surfaces.steps(solids, 0.6 * _CELL), 0.0, 0.5)
+    kept, corners = [], []
+    for part in parts:
+        part = part[(part[:, 2] < floor + _OVERHEAD) & (part[:, 2] > floor + 0.02)]
+        if len(part):
+            kept.append(part)
+            corners += [part[:, :2].min(0), part[:, :2].max(0)]
+        yield 0.5
     found = None
-    if len(points):
-        field = height_field(points, points[:, :2].min(0), points[:, :2].max(0), _CELL)
-        found = _seat_level(field, floor)
+    if kept:
+        low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+        cell = max(_CELL, float(np.sqrt((high - low).prod() / _MAX_CELLS)))
+        field = height_field(np.zeros((0, 3)), low, high, cell)
+        for k, part in enumerate(kept):
+            field.add(part)
+            yield 0.5 + 0.1 * k / len(kept)
+        found = yield from within(_seat_level(field, floor), 0.6, 1.0)
     if found is None:
         if not _SMALLEST < (across := extent(solids)) < _LARGEST:
             raise InputError(
-                f"'{name}' is {across * size:.2g} m across: is its unit right? Scale it to the "
+                f"'{name}' is {metres(across * size)} across: is its unit right? Scale it to the "
                 "character's size."
             )
         raise InputError(
@@ -218,7 +258,9 @@ def seat_of(
     level, cells = found
     places = field.middles(cells)
     middle = places.mean(0)
-    longer, shorter = _axes(places)
+    yield 1.0
+    longer, shorter = _axes(field.middles(_ends_of_rows(cells)))
+    yield 1.0
     up = field.middles(np.argwhere(field.top - floor > level + _BACK))
     side = up.mean(0) - middle if len(up) else np.zeros(2)
     back = bool(np.linalg.norm(side) > _ONE_SIDED)
@@ -236,6 +278,7 @@ def seat_of(
         square = np.ptp(places @ longer) < 1.3 * np.ptp(places @ shorter)
         ways = np.stack([longer, -longer, shorter, -shorter] if square else [shorter, -shorter])
         forward = _nearest(ways, towards - middle)
+    yield 1.0
     aside, room, low, high = _spot(places, forward, near)
     if back:
         at = min(low + _BEFORE_BACK, max(0.5 * (low + high), high - _ON_IT))

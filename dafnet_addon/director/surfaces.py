@@ -2,18 +2,21 @@
 cell of the floor.
 """
 
-from collections.abc import Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..core.nearby import bounds
+from ..core.progress import run_to_end, stepwise, within
 from ..core.rotations import rotate
 from ..core.solids import Box, Mesh
 
-__all__ = ["HeightField", "height_field", "surface_points"]
+__all__ = ["HeightField", "boxes_of", "height_field", "parts_of_surfaces", "surface_points"]
 
 _MAX_POINTS = 4_000_000  # points; larger furniture is sampled more coarsely
+_AT_ONCE = 100_000  # points between two steps of a job
+_SOLIDS_AT_ONCE = 100  # solids between two steps of a job
 _CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _FACES = np.array(
     [
@@ -49,48 +52,92 @@ def _corners(solid: Box | Mesh) -> np.ndarray:
 
 
 def _reach_over(
-    low: np.ndarray, high: np.ndarray, within: tuple[np.ndarray, np.ndarray]
+    low: np.ndarray, high: np.ndarray, between: tuple[np.ndarray, np.ndarray]
 ) -> np.ndarray:
     """Which boxes (N,) between corners (N, 3) reach over the floor between two corners (2,)."""
-    return np.asarray(((high[:, :2] >= within[0]) & (low[:, :2] <= within[1])).all(axis=1))
+    return np.asarray(((high[:, :2] >= between[0]) & (low[:, :2] <= between[1])).all(axis=1))
+
+
+@stepwise
+def boxes_of(solids: Sequence[Box | Mesh]) -> Generator[float, None, np.ndarray]:
+    """The lowest and the highest corner (N, 2, 3) of the upright box around each solid in the first
+    frame; NaN around one without triangles.
+    """
+    boxes = np.full((len(solids), 2, 3), np.nan)
+    for k, solid in enumerate(solids):
+        if isinstance(solid, Box) or len(solid.triangles):
+            boxes[k] = np.stack(bounds(solid)).reshape(2, -1, 3)[:, 0]
+        if k % _SOLIDS_AT_ONCE == 0:
+            yield k / len(solids)
+    return boxes
 
 
 def surface_points(
     solids: Sequence[Box | Mesh],
     spacing: float,
-    within: tuple[np.ndarray, np.ndarray] | None = None,
+    between: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> np.ndarray:
     """Points (N, 3) all over the surfaces, no two neighbours farther apart than about ``spacing``
     metres.
 
-    ``within``: two corners (2,) of the floor; only of triangles that reach over what is between
+    ``between``: two corners (2,) of the floor; only of triangles that reach over what is between
     them, if they are given.
     """
-    if within is not None:
-        solids = [solid for solid in solids if isinstance(solid, Box) or len(solid.triangles)]
-        boxes = [np.stack(bounds(solid)).reshape(2, -1, 3)[:, :1] for solid in solids]
-        solids = [
-            solid
-            for solid, (low, high) in zip(solids, boxes, strict=True)
-            if _reach_over(low, high, within).any()
-        ]
-    triangles = np.concatenate([np.zeros((0, 3, 3)), *(_corners(solid) for solid in solids)])
-    if within is not None:
-        triangles = triangles[_reach_over(triangles.min(axis=1), triangles.max(axis=1), within)]
+    return np.concatenate(
+        [np.zeros((0, 3)), *run_to_end(parts_of_surfaces.steps(solids, spacing, between))]
+    )
+
+
+@stepwise
+def parts_of_surfaces(
+    solids: Sequence[Box | Mesh],
+    spacing: float,
+    between: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Generator[float, None, list[np.ndarray]]:
+    """``surface_points`` in parts (N, 3) of at most about a hundred thousand."""
+    if between is not None:
+        boxes = yield from within(boxes_of.steps(solids), 0.0, 0.2)
+        near = _reach_over(boxes[:, 0], boxes[:, 1], between)
+        solids = [solid for solid, reaches in zip(solids, near, strict=True) if reaches]
+    corners = [np.zeros((0, 3, 3))]
+    for k, solid in enumerate(solids):
+        corners.append(_corners(solid))
+        if k % _SOLIDS_AT_ONCE == 0:
+            yield 0.2 + 0.2 * k / len(solids)
+    triangles = np.concatenate(corners)
+    if between is not None:
+        triangles = triangles[_reach_over(triangles.min(axis=1), triangles.max(axis=1), between)]
     if not len(triangles):
-        return np.zeros((0, 3))
+        return []
     longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(1)
     parts = np.maximum(1, np.ceil(longest / spacing)).astype(int)
     coarser = np.sqrt(max(1.0, float((parts.astype(float) ** 2 / 2).sum()) / _MAX_POINTS))
     parts = np.maximum(1, np.ceil(parts / coarser)).astype(int)
-    found = []
+    found, done = [], 0
     for n in np.unique(parts):
-        i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
+        alike = triangles[parts == n]
+        each = max(1, _AT_ONCE // ((n + 1) * (n + 2) // 2))  # triangles at once
+        for first in range(0, len(alike), each):
+            some = alike[first : first + each]
+            for weights in _weights(int(n)):
+                found.append(np.einsum("pk,fkc->fpc", weights, some).reshape(-1, 3))
+                yield 0.4 + 0.6 * done / len(triangles)
+            done += len(some)
+    return found
+
+
+def _weights(n: int) -> Iterator[np.ndarray]:
+    """Barycentric weights (P, 3) of points all over a triangle whose sides are cut into ``n``
+    parts, at most about a hundred thousand at a time.
+    """
+    rows = max(1, _AT_ONCE // (n + 1))
+    for first in range(0, n + 1, rows):
+        i, j = np.meshgrid(
+            np.arange(first, min(first + rows, n + 1)), np.arange(n + 1), indexing="ij"
+        )
         inside = i + j <= n
         u, v = i[inside] / n, j[inside] / n
-        weights = np.stack([1.0 - u - v, u, v], axis=-1)
-        found.append(np.einsum("pk,fkc->fpc", weights, triangles[parts == n]).reshape(-1, 3))
-    return np.concatenate(found)
+        yield np.stack([1.0 - u - v, u, v], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -111,12 +158,16 @@ class HeightField:
         """Points (…, 2) in the middle of cells (…, 2)."""
         return np.asarray(self.origin + self.cell * cells)
 
+    def add(self, points: np.ndarray) -> None:
+        """Raise the cells to the points (N, 3) over them."""
+        cells = self.index(points[:, :2])
+        inside = ((cells >= 0) & (cells < self.top.shape)).all(1)
+        np.maximum.at(self.top, tuple(cells[inside].T), points[inside, 2])
+
 
 def height_field(points: np.ndarray, low: np.ndarray, high: np.ndarray, cell: float) -> HeightField:
     """The height field of surface points (N, 3) between two corners (2,) of the floor."""
     size = np.maximum(1, np.ceil((high - low) / cell).astype(int) + 1)
     field = HeightField(np.asarray(low, float), cell, np.full(size, -np.inf))
-    cells = field.index(points[:, :2])
-    inside = ((cells >= 0) & (cells < size)).all(1)
-    np.maximum.at(field.top, tuple(cells[inside].T), points[inside, 2])
+    field.add(points)
     return field

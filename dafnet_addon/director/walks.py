@@ -3,19 +3,21 @@ stand.
 """
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.nearby import extent
 from ..core.paths import AFTER_SEAT, BEFORE_SEAT, Route, Stop, route
+from ..core.progress import stepwise, within
 from ..core.root import forward_of
 from ..core.series import MODEL_FPS
 from ..core.solids import Box, Mesh
-from .surfaces import HeightField, height_field, surface_points
+from ..core.text import metres
+from .surfaces import HeightField, boxes_of, height_field, parts_of_surfaces
 
-__all__ = ["around", "way_round", "walk_to"]
+__all__ = ["NoWay", "around", "doubted", "walk_to", "way_round", "ways"]
 
 _CELL = 0.08
 _KNEE_LOW = 0.07  # metres over the floor; what lies lower is stepped over
@@ -25,11 +27,19 @@ _AROUND = 2.0  # metres of floor beyond start and goal
 _FARTHEST = 100.0  # metres between start and goal; so many cells are searched in seconds
 _NEAREST = 0.3  # metres between start and goal, under which one is there already
 _TINY = 1.0  # metres across: no room is
+_SMALLEST = 0.15  # metres, of the longest side of furniture
+_TALLEST = 15.0  # metres over the floor, of furniture
+_LOW = 0.05  # height over length, of what is long and low
+_BESIDE = 10.0  # metres from a way within which furniture tells the scene's unit
+_SAMPLED = 0.3  # progress of a search when the furniture's points are made
+_CELLS_AT_ONCE = 5_000  # cells that are searched between two steps of the job
+_WAVES_AT_ONCE = 200  # waves between two steps of the job
+_ROWS_AT_ONCE = 100  # rows of cells between two steps of the job
 _AHEAD = 500  # cells within which a way is cut short
 _NEIGHBOURS = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
 
 
-def _blocked(field: HeightField, radius: float) -> np.ndarray:
+def _blocked(field: HeightField, radius: float) -> Generator[float, None, np.ndarray]:
     """Cells within ``radius`` of one that has something in it."""
     full = np.isfinite(field.top)
     reach = int(np.floor(radius / field.cell))
@@ -40,6 +50,7 @@ def _blocked(field: HeightField, radius: float) -> np.ndarray:
         for j in range(-reach, reach + 1):
             if (i * i + j * j) * field.cell**2 <= radius**2:
                 out |= padded[reach + i : reach + i + nx, reach + j : reach + j + ny]
+        yield (reach + i) / (2 * reach + 1)
     return out
 
 
@@ -53,23 +64,27 @@ def _nearest_free(blocked: np.ndarray, cell: np.ndarray) -> tuple[int, int] | No
 
 def _search(
     blocked: np.ndarray, start: tuple[int, int], goal: tuple[int, int]
-) -> list[tuple[int, int]] | None:
+) -> Generator[float, None, list[tuple[int, int]] | None]:
     """A* over eight neighbours; no corner is cut."""
     # One row of blocked cells around all, and plain lists over its cells: the same search over
     # pairs takes ten times as long.
     walls = np.pad(blocked, 1, constant_values=True)
     width = walls.shape[1]
-    i, j = np.indices(walls.shape)
-    left = np.hypot(goal[0] + 1 - i, goal[1] + 1 - j).ravel().tolist()
+    first, last = ((cell[0] + 1) * width + cell[1] + 1 for cell in (start, goal))
+    if not (yield from _connected(walls, first, last)):
+        return None
+    left: list[float] = []
+    down, across = goal[0] + 1 - np.arange(len(walls)), goal[1] + 1 - np.arange(width)
+    for k in range(0, len(walls), _ROWS_AT_ONCE):
+        left += np.hypot(down[k : k + _ROWS_AT_ONCE, None], across).ravel().tolist()
+        yield 0.0
     closed = bytearray(walls.tobytes())
     wall = bytes(closed)
-    first, last = ((cell[0] + 1) * width + cell[1] + 1 for cell in (start, goal))
     steps = [(i * width + j, i * width, j, float(np.hypot(i, j))) for i, j in _NEIGHBOURS]
-    if not _connected(walls, first, last):
-        return None
     cost: dict[int, float] = {first: 0.0}
     came: dict[int, int] = {}
     queue = [(0.0, first)]
+    tried, nearest = 0, left[first]
     while queue:
         _, at = heapq.heappop(queue)
         if at == last:
@@ -80,10 +95,14 @@ def _search(
         if closed[at]:
             continue
         closed[at] = 1
+        tried += 1
+        if tried % _CELLS_AT_ONCE == 0:
+            nearest = min(nearest, left[at])
+            yield 1.0 - nearest / left[first]
         here = cost[at]
-        for step, down, across, length in steps:
+        for step, down_by, across_by, length in steps:
             to = at + step
-            if wall[to] or (down and across and (wall[at + down] or wall[at + across])):
+            if wall[to] or (down_by and across_by and (wall[at + down_by] or wall[at + across_by])):
                 continue
             total = here + length
             if total < cost.get(to, np.inf):
@@ -92,16 +111,19 @@ def _search(
     return None
 
 
-def _connected(walls: np.ndarray, first: int, last: int) -> bool:
+def _connected(walls: np.ndarray, first: int, last: int) -> Generator[float, None, bool]:
     """Whether there is a way at all: a wave over the free cells finds out in no time, where the
     search would try them all.
     """
     free = ~walls.ravel()
-    front = np.array([first])
+    front, waves = np.array([first]), 0
     while len(front) and free[last]:
         free[front] = False
         front = (front[:, None] + np.array([1, -1, walls.shape[1], -walls.shape[1]])).ravel()
         front = np.unique(front[free[front]])
+        waves += 1
+        if waves % _WAVES_AT_ONCE == 0:
+            yield 0.0
     return not free[last]
 
 
@@ -112,16 +134,57 @@ def _clear(blocked: np.ndarray, a: np.ndarray, b: np.ndarray) -> bool:
     return not blocked[cells[:, 0], cells[:, 1]].any()
 
 
+@stepwise
 def way_round(
     points: np.ndarray, start: np.ndarray, goal: np.ndarray, size: float = 1.0
-) -> list[tuple[float, float]]:
+) -> Generator[float, None, list[tuple[float, float]]]:
     """Corners (x, y) of a short way from ``start`` (2,) to ``goal`` (2,) that keeps off what has
     ``points`` (N, 3), z over the floor; without the ends.
 
     Raises InputError where there is no way, or the goal is too far away. ``size``: of the
     character, over 1.75 m, for what is said of the scene.
     """
-    solid = points[(points[:, 2] > _KNEE_LOW) & (points[:, 2] < _HEAD_HIGH)]
+    return (yield from _way([points], start, goal, 0.0, size))
+
+
+@stepwise
+def ways(
+    solids: Sequence[Box | Mesh],
+    places: Sequence[np.ndarray],
+    *,
+    floor: float = 0.0,
+    size: float = 1.0,
+    spacing: float = 0.6 * _CELL,
+) -> Generator[float, None, list[list[tuple[float, float]]]]:
+    """``way_round`` the furniture from each of the ``places`` (2,) to the next.
+
+    ``spacing``: metres between points on the furniture. Raises InputError as ``way_round`` does, or
+    asks for the scene's unit where there is no way in a scene that is plainly of another one.
+    """
+    points = yield from within(
+        parts_of_surfaces.steps(solids, spacing, around(places)), 0.0, _SAMPLED
+    )
+    found, one = [], (1.0 - _SAMPLED) / max(1, len(places) - 1)
+    for k, (start, goal) in enumerate(pairwise(places)):
+        leg = _way(points, start, goal, floor, size)
+        done = _SAMPLED + k * one
+        try:
+            found.append((yield from within(leg, done, done + one)))
+        except NoWay as error:
+            if doubt := doubted(solids, places, floor, size):
+                raise InputError(doubt) from error
+            raise
+    return found
+
+
+class NoWay(InputError):
+    """Furniture stands all round the start or the goal."""
+
+
+def _way(
+    parts: Sequence[np.ndarray], start: np.ndarray, goal: np.ndarray, floor: float, size: float
+) -> Generator[float, None, list[tuple[float, float]]]:
+    """``way_round`` points in ``parts``, whose z is over the world's zero."""
     both = np.stack([start, goal])
     if not np.abs(goal - start).max() <= _FARTHEST:
         raise InputError(
@@ -129,18 +192,28 @@ def way_round(
             "right? "
             f"Choose one within {_FARTHEST * size:.0f} m, or walk there in parts."
         )
-    field = height_field(solid, *around(both), _CELL)
-    blocked = _blocked(field, _RADIUS)
-    ends = [_nearest_free(blocked, field.index(end)) for end in both]
-    path = None if None in ends else _search(blocked, ends[0], ends[1])  # type: ignore[arg-type]
+    field = height_field(np.zeros((0, 3)), *around(both), _CELL)
+    for k, part in enumerate(parts):
+        over = part - np.array([0.0, 0.0, floor])
+        field.add(over[(over[:, 2] > _KNEE_LOW) & (over[:, 2] < _HEAD_HIGH)])
+        yield 0.2 * k / len(parts)
+    blocked = yield from within(_blocked(field, _RADIUS), 0.2, 0.2)
+    ends = []
+    for end in both:
+        ends.append(_nearest_free(blocked, field.index(end)))
+        yield 0.2
+    path = (
+        None if None in ends else (yield from within(_search(blocked, *ends), 0.2, 0.9))  # type: ignore[arg-type]
+    )
     if path is None:
-        raise InputError(
+        raise NoWay(
             "There is no way between the furniture from the character to where it is to go; make "
             "room for it."
         )
     cells = np.array(path)
     corners, at = [], 0
     while at < len(cells) - 1:
+        yield 0.9 + 0.1 * at / len(cells)
         farthest = min(len(cells) - 1, at + _AHEAD)
         ahead = next(
             k
@@ -167,6 +240,7 @@ def _apart(points: np.ndarray, start: np.ndarray, goal: np.ndarray) -> list[np.n
     return kept
 
 
+@stepwise
 def walk_to(
     solids: Sequence[Box | Mesh],
     start: Stop,
@@ -175,7 +249,7 @@ def walk_to(
     fps: float = MODEL_FPS,
     floor: float = 0.0,
     size: float = 1.0,
-) -> Route:
+) -> Generator[float, None, Route]:
     """The root path from rest at ``start`` to rest at ``goal`` that goes round the furniture;
     metres, people of 1.75 m.
 
@@ -183,18 +257,47 @@ def walk_to(
     goal are the same or too far apart. ``size``: see ``way_round``.
     """
     if np.linalg.norm(np.subtract(start.position, goal.position)) < _NEAREST:
-        if solids and (across := extent(solids)) < _TINY:
-            raise InputError(
-                f"The scene is {across * size:.2g} m across: is its unit right? Scale it to the "
-                "character's size."
-            )
-        raise InputError("The character is there already; choose another place to go to.")
+        raise InputError(
+            doubted(solids, [np.array(start.position)], floor, size)
+            or "The character is there already; choose another place to go to."
+        )
     leaves, comes = _ahead(start, AFTER_SEAT), _ahead(goal, BEFORE_SEAT)
-    points = surface_points(solids, 0.6 * _CELL, around([leaves, comes])) - np.array(
-        [0.0, 0.0, floor]
-    )
-    return route(
-        start, *way_round(points, leaves, comes, size), goal, speed=speed, fps=fps, floor=floor
+    (corners,) = yield from ways.steps(solids, [leaves, comes], floor=floor, size=size)
+    return route(start, *corners, goal, speed=speed, fps=fps, floor=floor)
+
+
+@stepwise
+def doubted(
+    solids: Sequence[Box | Mesh],
+    places: Sequence[np.ndarray] | np.ndarray,
+    floor: float = 0.0,
+    size: float = 1.0,
+) -> Generator[float, None, str | None]:
+    """A sentence that asks for the scene's unit where furniture is plainly of another one than the
+    character that goes to the ``places`` (2,); None where it may be right.
+
+    It is too large where all that stands within 10 m of the places, or else all there is, is taller
+    than 15 m: a bench between towers is right, and a hall that nothing stands in. What is long and
+    low (ground, rugs, skirting) tells nothing. It is too small where no solid is 15 cm long and all
+    of them lie within a metre.
+    """
+    boxes = yield from boxes_of.steps(solids)
+    boxes = boxes[~np.isnan(boxes[:, 0, 0])]
+    if not len(boxes):
+        return None
+    extent = float((boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)).max())
+    longest = (boxes[:, 1] - boxes[:, 0]).max(axis=1)
+    rises = boxes[:, 1, 2] - floor
+    stands = (boxes[:, 0, 2] < floor + _HEAD_HIGH) & (rises > np.maximum(_KNEE_LOW, _LOW * longest))
+    low, high = np.min(places, axis=0) - _BESIDE, np.max(places, axis=0) + _BESIDE
+    near = stands & ((boxes[:, 1, :2] >= low) & (boxes[:, 0, :2] <= high)).all(axis=1)
+    told = rises[near if near.any() else stands]
+    too_small = extent < _TINY and longest.max() < _SMALLEST
+    if not too_small and not (len(told) and told.min() > _TALLEST):
+        return None
+    return (
+        f"The scene is {metres(extent * size)} across: is its unit right? Scale it to the "
+        "character's size."
     )
 
 

@@ -15,7 +15,7 @@ from dafnet_addon.core.rotations import rotate, yaw_matrix
 from dafnet_addon.core.skeleton import SEAT_TO_PELVIS
 from dafnet_addon.director.seats import on_a_seat, seat_of
 from dafnet_addon.director.surfaces import height_field, surface_points
-from dafnet_addon.director.walks import walk_to, way_round
+from dafnet_addon.director.walks import doubted, walk_to, way_round
 from kit.places import FURNITURE
 
 
@@ -76,6 +76,8 @@ def test_stools_and_benches_are_sat_on_from_where_one_comes():
     )
     beside = seat_of(bench, np.array([5.0, 2.0]), near=np.array([0.9, 0.0]))
     assert 0.6 < beside.position[0] < 0.75
+    stand = seat_of([_box((-60.0, -20.0, 0.0), (60.0, 20.0, 0.45))], np.array([0.0, 40.0]))
+    assert abs(stand.position[1] - 19.78) < 0.1 and abs(stand.yaw) < 0.05, "however wide"
     bed = [_box((-1.0, -0.8, 0.2), (1.0, 0.8, 0.5))]
     assert seat_of(bed, np.array([0.0, 4.0])).position[1] > 0.5, "on a bed's edge"
 
@@ -180,6 +182,59 @@ def test_far_ways_are_found_or_refused_in_seconds():
     room = [_box((-0.02, -0.02, 0.0), (0.02, 0.02, 0.01))]
     with pytest.raises(InputError, match=r"The scene is 0\.04 m across: is its unit right"):
         walk_to(room, Stop((0.0, 0.0), 0.0), Stop((0.03, 0.0), 0.0))
+
+
+def test_a_hard_search_is_a_job_of_short_steps():
+    """Over 100 m of floor full of furniture; of the processor's time, so whatever else runs."""
+    rng = np.random.default_rng(0)
+    places, sizes = rng.uniform(0.0, 100.0, (2600, 2)), rng.uniform(0.3, 1.6, (2600, 2))
+    room = [
+        _box((x - w / 2, y - d / 2, 0.0), (x + w / 2, y + d / 2, 1.0))
+        for (x, y), (w, d) in zip(places, sizes, strict=True)
+        if min(np.hypot(x, y), np.hypot(x - 97.0, y - 97.0)) > 2.5
+    ]
+    job = walk_to.steps(room, Stop((0.0, 0.0), 0.0), Stop((97.0, 97.0), 0.0, 1.0))
+    shares, seconds, found = [], [process_time()], None
+    while found is None:
+        try:
+            shares.append(next(job))
+        except StopIteration as done:
+            found = done.value
+        seconds.append(process_time())
+    assert shares == sorted(shares) and shares[0] >= 0.0 and shares[-1] <= 1.0
+    assert np.diff(seconds).max() < 0.1 * (seconds[-1] - seconds[0]), "no step is a tenth of it"
+    at_once = walk_to(room, Stop((0.0, 0.0), 0.0), Stop((97.0, 97.0), 0.0, 1.0))
+    assert np.array_equal(found.path.position, at_once.path.position)
+
+
+def _scaled(boxes: list[Box], factor: float) -> list[Box]:
+    return [Box(factor * box.center, factor * box.half_size) for box in boxes]
+
+
+def test_a_scene_of_another_unit_is_doubted_by_what_stands_near():
+    chair, table = _chair(), [_box((1.0, 1.0, 0.0), (2.0, 1.8, 0.75))]
+    rug, wall = [_box((-3, -3, 0.0), (3, 3, 0.01))], [_box((-3, 3.0, 0.0), (3, 3.1, 2.5))]
+    room, way = [*chair, *table, *rug, *wall], [np.zeros(2), np.array([3.0, 0.0])]
+    assert doubted(room, way) is None and doubted([], way) is None and doubted(rug, way) is None
+    assert "is 610 m across: is its unit right?" in str(doubted(_scaled(room, 100.0), way))
+    assert "is 1,220 m across" in str(doubted(_scaled(room, 100.0), way, size=2.0))
+    assert "is 0.061 m across: is its unit right?" in str(doubted(_scaled(room, 0.01), way))
+
+    towers = [_box((x, 4.0, 0.0), (x + 30.0, 40.0, 90.0)) for x in (-60.0, -20.0, 20.0)]
+    assert "is its unit right" in str(doubted(towers, way))
+    bench = [_box((1.0, 1.0, 0.0), (3.0, 1.4, 0.45))]
+    assert doubted([*towers, *bench], way) is None, "a city with a street bench"
+    far = [_box((900.0, 0.0, 0.0), (902.0, 0.4, 0.45))]
+    assert doubted(far, way) is None, "nothing stands near"
+    assert "is its unit right" in str(doubted([*towers, *far], way))
+    hall = [_box((-30.0, -30.0, -0.1), (30.0, 30.0, 8.0))]
+    assert doubted(hall, way) is None
+
+
+def test_where_there_is_no_way_in_a_scene_of_another_unit_that_is_said():
+    leg, goal = [_box((-1.0, -1.0, 0.0), (1.0, 1.0, 45.0))], Stop((5.0, 0.0), 0.0)
+    with pytest.raises(InputError, match="is 85 m across: is its unit right"):
+        walk_to([*_scaled(_chair(), 100.0), *leg], Stop((0.0, 0.0), 0.0), goal)
 
 
 def test_who_starts_inside_furniture_is_led_out_of_it():

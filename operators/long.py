@@ -1,0 +1,160 @@
+"""Operators whose work takes long: it is done between the user's events, and Esc ends it."""
+
+from collections.abc import Callable, Generator
+from time import perf_counter
+from typing import Any, ClassVar
+
+import bpy
+
+from ..dafnet_addon.blender.running import RunningJob, begin_job, end_job
+from ..dafnet_addon.core.progress import run_to_end
+from .base import DafnetOperator, reported
+
+__all__ = ["LongOperator"]
+
+_TICK = 0.02
+"""Seconds of work between two looks at the user's input."""
+_LOOKING = {
+    "MOUSEMOVE",
+    "INBETWEEN_MOUSEMOVE",
+    "MIDDLEMOUSE",
+    "WHEELUPMOUSE",
+    "WHEELDOWNMOUSE",
+    "NDOF_MOTION",
+    "TRACKPADPAN",
+    "TRACKPADZOOM",
+}
+"""Events that cannot change the scene."""
+
+
+class LongOperator(DafnetOperator):
+    """An operator that does a job of steps (``core.progress``), whose result it tells.
+
+    Mixed into ``bpy.types.Operator``, before it.
+    """
+
+    at_once: ClassVar[float] = 0.0
+    """Seconds of work before the first look at the user's input: what is done by then is done as
+    by any other operator, without a flicker.
+    """
+
+    report: Callable[[set[str], str], None]
+
+    _running: RunningJob
+    _share: float
+    _started: float
+    _steps: Generator[float, None, Any]
+    _timer: bpy.types.Timer
+
+    def steps(self, context: bpy.types.Context) -> Generator[float, None, Any]:
+        """The job; where it is closed the scene is as it was. Its result is never None."""
+        raise NotImplementedError
+
+    def tell(self, result: Any) -> None:
+        """Report what has come of it."""
+        raise NotImplementedError
+
+    def run(self, context: bpy.types.Context) -> None:
+        """Do the whole job without showing progress."""
+        self.tell(run_to_end(self.steps(context)))
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        """Start the job; ``modal`` goes on with it."""
+        with reported(self):
+            self._steps, self._started, self._share = self.steps(context), perf_counter(), 0.0
+            if (result := self._worked(self.at_once)) is not None:
+                self.tell(result)
+                return {"FINISHED"}
+            self._listen(context)
+            return {"RUNNING_MODAL"}
+        return {"CANCELLED"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Do a tick's work; Esc cancels.
+
+        Until the end only looking around is let through, so the scene stays as it was read.
+        """
+        if event.type == "ESC" or self._running.cancel_requested:
+            self.cancel(context)
+            self.report({"INFO"}, "Cancelled; the scene is as it was")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            allowed = event.type in _LOOKING or (
+                event.type == "LEFTMOUSE" and _over_sidebar(context, event)
+            )
+            return {"PASS_THROUGH"} if allowed else {"RUNNING_MODAL"}
+        result = None
+        running = False
+        try:
+            with reported(self):
+                result = self._worked(_TICK)
+                running = result is None
+        finally:
+            if not running:
+                self.cancel(context)
+        if running:
+            self._show(context)
+            return {"RUNNING_MODAL"}
+        if result is None:
+            return {"CANCELLED"}
+        self.tell(result)
+        return {"FINISHED"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """End the job, which leaves the scene untouched unless it has finished."""
+        self._steps.close()
+        end_job()
+        context.window_manager.event_timer_remove(self._timer)
+        context.window_manager.progress_end()
+        if context.workspace:
+            context.workspace.status_text_set(None)
+        _redraw(context)
+
+    def _listen(self, context: bpy.types.Context) -> None:
+        """Let ``modal`` have the user's events from now on, and a tick whenever there are none."""
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(0.01, window=context.window)
+        manager.progress_begin(0, 100)
+        manager.modal_handler_add(self)
+        self._running = begin_job()
+
+    def _worked(self, seconds: float) -> Any:
+        """Work for some ``seconds``; the result once it is there, else None."""
+        now = perf_counter()
+        until, step = now + seconds, 0.0
+        # after a long step another one is likely, which had better have its own tick
+        while now < until and step < seconds / 2:
+            try:
+                self._share = next(self._steps)
+            except StopIteration as done:
+                return done.value
+            step, now = perf_counter() - now, perf_counter()
+        return None
+
+    def _show(self, context: bpy.types.Context) -> None:
+        share, spent = self._share, perf_counter() - self._started
+        left = spent * (1.0 - share) / max(share, 0.01)
+        self._running.progress, self._running.seconds_left = share, left
+        context.window_manager.progress_update(100 * share)
+        context.workspace.status_text_set(
+            f"DAFNet: {100 * share:.0f} %, {left:.0f} s left. Esc cancels"
+        )
+        _redraw(context)
+
+
+def _over_sidebar(context: bpy.types.Context, event: bpy.types.Event) -> bool:
+    """Whether the mouse is over a 3D view's sidebar, where Cancel is."""
+    return any(
+        region.type == "UI"
+        and 0 <= event.mouse_x - region.x < region.width
+        and 0 <= event.mouse_y - region.y < region.height
+        for area in context.screen.areas
+        if area.type == "VIEW_3D"
+        for region in area.regions
+    )
+
+
+def _redraw(context: bpy.types.Context) -> None:
+    for area in context.screen.areas:
+        if area.type == "VIEW_3D":
+            area.tag_redraw()

@@ -1,0 +1,21 @@
+"""What the operators that send a character somewhere share."""
+
+from typing import ClassVar
+
+from ..dafnet_addon.blender.walking import Walk
+from .long import LongOperator
+
+__all__ = ["WalkOperator"]
+
+
+class WalkOperator(LongOperator):
+    """An operator that looks for a way and keys it on the character's root."""
+
+    at_once: ClassVar[float] = 0.1
+
+    def tell(self, result: Walk) -> None:
+        """Say where the root was keyed, and what is to be seen to."""
+        for warning in result.warnings:
+            self.report({"WARNING"}, warning)
+        ended = ", the range now ends there" if result.extended else ""
+        self.report({"INFO"}, f"Keyed the root from frame {result.first} to {result.last}{ended}.")
