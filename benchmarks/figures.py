@@ -2,10 +2,10 @@
 
     dafnet figures -o docs/figures [--weights FILE] [--other MoGlow=FILE …] [--only 10 11]
 
-All motion is the network's own at temperature 0, nothing done to it afterwards, so there is nothing
-to choose from. Numbers are those of the paper's figures; captions are in
-``docs/figures/README.md``. Colour says the mode: blue is FREE, orange EE, green FULL; poses grow
-darker with time; what was asked of head and hands is red.
+All motion is the network's own at temperature 0, nothing done to it afterwards (in figure 9, what
+training does to what was captured), so there is nothing to choose from. Numbers are those of the
+paper's figures; captions are in ``docs/figures/README.md``. Colour says the mode: blue is FREE,
+orange EE, green FULL; poses grow darker with time; what was asked of head and hands is red.
 """
 
 import sys
@@ -26,16 +26,18 @@ from dafnet_addon.core.files import whole_file
 from dafnet_addon.core.kinematics import fit, forward_kinematics
 from dafnet_addon.core.paths import Route, Stop, facing, route
 from dafnet_addon.core.progress import run_to_end
-from dafnet_addon.core.root import RootPath, to_world
+from dafnet_addon.core.root import RootPath, root_from_joints, to_world
 from dafnet_addon.core.sampler import Sampler
 from dafnet_addon.core.series import MODEL_FPS
 from dafnet_addon.core.skeleton import END_EFFECTORS, PELVIS, SEAT_TO_PELVIS, UPPER
 from dafnet_addon.core.weights import Weights
 from dafnet_addon.data.courses import AT_DESKS
+from dafnet_addon.data.retarget import at_seat_height, at_top_height
+from dafnet_addon.data.uses import working
 from dafnet_addon.demo import Place
 from dafnet_addon.model.systems import sampler_of
 
-__all__ = ["FIGURES", "HEIGHTS", "Motion", "draw", "seated_at"]
+__all__ = ["FIGURES", "HEIGHTS", "Motion", "draw", "moved_to", "seated_at", "typing"]
 
 HEIGHTS = (0.32, 0.38, 0.45, 0.52, 0.60, 0.70)
 """Seats of figure 11 (metres)."""
@@ -53,7 +55,7 @@ _INK, _FAINT = (45, 48, 54), (165, 168, 172)
 # pixels: between panels; height of what is written under one; height of letters
 _GAP, _STRIP, _LETTERS = 10, 54, 19
 _COLOURS = 240  # of a file
-_HANDWRITING, _HANDLING = 2, 3  # of AT_DESKS
+_TYPING, _HANDWRITING, _HANDLING = 0, 2, 3  # of AT_DESKS
 
 Piece = tuple[tuple[Part, ...], Place]
 _HERE = Place((0.0, 0.0), 0.0)
@@ -407,6 +409,53 @@ def _actions(studio: _Studio) -> Image.Image:
         for name, frame in moments.items()
     ]
     return studio.grid([panels[:4], panels[4:]])
+
+
+def typing(weights: Weights, seat: float, desk: float) -> np.ndarray:
+    """Joints (T, 22, 3) of one who sits on a chair and types at a desk of these heights, in EE."""
+    pieces = [(_chair(seat), _HERE), (_desk(desk, 0.22), _HERE)]
+    return _made(weights, pieces, _at_a_desk(partial(_made_up, _TYPING), desk)).joints
+
+
+def moved_to(joints: np.ndarray, seat: float, desk: float) -> np.ndarray:
+    """The motion (T, 22, 3) of figure 9, with its seat and its desk as much higher as is said
+    (metres): the seat first, which takes the hands along, then the top under them.
+    """
+    resting = float(np.median(joints[:, 0, 2]))
+    sits = at_seat_height(joints, resting, resting + seat)
+    (use, *_), (now, *_) = (working(j, root_from_joints(j)) for j in (joints, sits))
+    risen = float(np.median(now.points[:, 2]) - np.median(use.points[:, 2]))
+    return at_top_height(sits, now, desk - risen)
+
+
+def _augmented(studio: _Studio) -> Image.Image:
+    """Figure 9: how training moves one motion to chairs and desks of other heights."""
+    chairs, desks = {"hc": 0.50, "mc": 0.42}, {"hd": 0.80, "md": 0.72}
+    source = typing(studio.weights, chairs["hc"], desks["hd"])
+    panels = []
+    for chair, desk in (("hc", "hd"), ("hc", "md"), ("mc", "hd"), ("mc", "md")):
+        lower = chairs[chair] - chairs["hc"], desks[desk] - desks["hd"]
+        motion = _motion(moved_to(source, *lower) if any(lower) else source, np.zeros((0, 0)))
+        stage = Stage(62.0)
+        _furnish(stage, [(_chair(chairs[chair]), _HERE), (_desk(desks[desk], 0.22), _HERE)])
+        _put(stage, motion, 75, _MODE["FREE" if any(lower) else "EE"])
+        seen = np.array(
+            [(x, y, z) for x in (-0.65, 0.65) for y in (-0.3, 0.82) for z in (0.0, 1.65)]
+        )
+        picture = studio.photograph(stage, 390, 350, seen, margin=0.02)
+        hands = [END_EFFECTORS["hand_left"], END_EFFECTORS["hand_right"]]
+        keep = motion.joints[:, hands, 2] - desks[desk]
+        was = source[:, hands, 2] - desks["hd"]
+        panels.append(
+            studio.captioned(
+                picture,
+                f"{chair}, {desk}: chair {chairs[chair]:.2f}, desk {desks[desk]:.2f}",
+                f"hands {100.0 * np.abs(keep - was).mean():.1f} cm off their place to it"
+                if any(lower)
+                else "source, made by the network in EE",
+            )
+        )
+    return studio.grid([panels])
 
 
 def _pelvis(pelvis: float, seat: float) -> str:
@@ -787,6 +836,7 @@ def _compared_led(studio: _Studio) -> Image.Image:
 
 FIGURES: dict[str, Callable[[_Studio], Image.Image]] = {
     "3": _actions,
+    "9": _augmented,
     "10": _by_furniture,
     "11": _by_height,
     "12": _copied,

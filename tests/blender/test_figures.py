@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dafnet_addon.core.errors import InputError
-from dafnet_addon.core.skeleton import SEAT_TO_PELVIS
+from dafnet_addon.core.skeleton import SEAT_TO_PELVIS, joint
 from dafnet_addon.core.weights import load_weights
 from kit.places import ROOT
 
@@ -41,11 +41,28 @@ def test_figure_11_is_drawn_and_its_mannequins_end_at_different_heights(
     assert np.abs(pelvis - chosen - SEAT_TO_PELVIS).max() < 0.08
 
 
+def test_figure_9_moves_seat_and_desk_apart(blender: ModuleType, tmp_path: Path) -> None:
+    figures = runpy.run_path(str(SCRIPT))
+    files = figures["draw"](tmp_path, None, {}, ["9"], lambda _: None, scale=0.25)
+    with Image.open(files[0]) as picture:
+        pixels = np.asarray(picture.convert("RGB"), dtype=float)
+    panels = np.array_split(pixels[: len(pixels) * 3 // 4], 4, axis=1)
+    assert all(panel.std(axis=(0, 1)).max() > 10.0 for panel in panels)
+    orange = [(panel[..., 0] > panel[..., 2] + 90).sum() for panel in panels]
+    assert orange[0] > 3 * max(orange[1:]), "only the first is as the network made it"
+
+    source = figures["typing"](load_weights(), 0.50, 0.80)
+    for seat, desk in ((0.0, -0.08), (-0.08, 0.0), (-0.08, -0.08)):
+        moved = figures["moved_to"](source, seat, desk) - source
+        assert np.abs(moved[:, 0, 2] - seat).max() < 0.01
+        assert np.abs(moved[:, [joint("left_wrist"), joint("right_wrist")], 2] - desk).max() < 0.01
+
+
 def test_unknown_figures_are_refused_and_comparisons_without_others_left_out(
     blender: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     draw = runpy.run_path(str(SCRIPT))["draw"]
-    with pytest.raises(InputError, match="no figure 9"):
-        draw(tmp_path, None, {}, ["9"], lambda _: None)
+    with pytest.raises(InputError, match="no figure 4"):
+        draw(tmp_path, None, {}, ["4"], lambda _: None)
     assert draw(tmp_path, None, {}, ["15", "16"], lambda _: None) == []
     assert capsys.readouterr().err.count("\n") == 1
