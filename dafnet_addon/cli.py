@@ -719,6 +719,7 @@ def _evaluate_among_real(options: argparse.Namespace, bar: "_Bar") -> _Result:
     """The test among real furniture: seats by kind, maker and body."""
     from .core.weights import load_weights
     from .data.real_test import real_test
+    from .data.real_walks import real_walks
     from .training.real_report import real_report, real_text
 
     if options.save or options.sheets:
@@ -726,7 +727,12 @@ def _evaluate_among_real(options: argparse.Namespace, bar: "_Bar") -> _Result:
             "The test among real furniture makes tables only; leave out --save and --sheets."
         )
     weights = load_weights(options.weights)
-    found = real_report(weights, real_test(options.folder, options.furniture, options.role), bar)
+    found = real_report(
+        weights,
+        real_test(options.folder, options.furniture, options.role),
+        bar,
+        walks=real_walks(options.furniture, options.role),
+    )
     if options.output:
         save_text(options.output / f"real-{options.role}.json", json.dumps(found, indent=2))
         save_text(options.output / f"real-{options.role}.md", real_text(found))

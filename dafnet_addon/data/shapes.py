@@ -37,6 +37,7 @@ __all__ = [
     "ShapeBank",
     "bank_of",
     "shapes_of",
+    "surface_under",
 ]
 
 PELVIS_OVER = {
@@ -303,7 +304,7 @@ def _seats(piece: Piece, grid: DistanceGrid) -> list[Seat]:
         # A piece's front faces −y: a back that is elsewhere is none.
         misjudged = place.back and np.cos(place.yaw - np.pi) < _ASTRAY
         known = any(np.cos(place.yaw - seat.yaw) > _SAME_WAY for seat in found)
-        height = _surface_under(grid, place.position, place.yaw, place.height)
+        height = surface_under(grid, place.position, place.yaw, place.height)
         if not misjudged and not known and height is not None:
             found.append(
                 Seat(
@@ -318,7 +319,7 @@ def _seats(piece: Piece, grid: DistanceGrid) -> list[Seat]:
     return found
 
 
-def _surface_under(
+def surface_under(
     grid: DistanceGrid, position: np.ndarray, yaw: float, level: float
 ) -> float | None:
     """Height of what carries the hips of one that sits at ``position`` (2,) on about this level:

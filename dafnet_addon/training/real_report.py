@@ -1,5 +1,5 @@
 """How weights do among real furniture: body by body, maker by maker and kind by kind, beside the
-captured motion itself.
+captured motion itself; and where nobody was captured, but the director sends them to sit down.
 """
 
 from collections.abc import Callable, Sequence
@@ -7,6 +7,7 @@ from typing import Any
 
 from ..core.weights import Weights
 from ..data.held_out import HeldClip
+from ..data.real_walks import Walks
 from .evaluate import Measured, measured, rows_of, table
 
 __all__ = ["real_report", "real_text"]
@@ -36,6 +37,23 @@ _COLUMNS = (
     "descent_seconds",
     "lean_degrees",
 )
+_SENT_RUNS = ("free_t0", "free_t0_clean", "free_t1")
+_SENT = "sent by the director"
+_SENT_COLUMNS = (
+    "clips",
+    "refused",
+    "sits_within_2cm",
+    "sits_within_4cm",
+    "sits_within_8cm",
+    "seat_error_median",
+    "foot_sliding_per_frame",
+    "skate_cm",
+    "penetrates",
+    "penetration_deepest",
+    "descent_seconds",
+    "lean_degrees",
+    "sway",
+)
 _GROUPS: dict[str, Callable[[HeldClip], str]] = {
     "kind": lambda clip: clip.kind,
     "maker": lambda clip: clip.maker,
@@ -48,11 +66,16 @@ def real_report(
     clips: Sequence[HeldClip],
     progress: Callable[[float], None] = lambda share: None,
     seeds: int = 3,
+    walks: Walks | None = None,
 ) -> dict[str, Any]:
     """Rows (``evaluate.row``) over all clips of ``real_test``, and over those of each kind of
-    piece, maker and body.
+    piece, maker and body; where ``walks`` are given, over all that were sent to seats, and by kind
+    of piece, with the share that was refused.
     """
-    found = measured(weights, clips, progress, seeds=seeds, modes=("FREE", "EE"))
+    part = len(clips) / max(1, len(clips) + (len(walks.clips) if walks else 0))
+    found = measured(
+        weights, clips, lambda done: progress(part * done), seeds=seeds, modes=("FREE", "EE")
+    )
     seated = [each for each in found if each.clip.room != "bed"]
     lying = [each for each in found if each.clip.room == "bed"]
     report: dict[str, Any] = {"all seats": rows_of(seated, _RUNS), "lying": rows_of(lying, _RUNS)}
@@ -61,16 +84,38 @@ def real_report(
         for each in seated:
             parts.setdefault(of(each.clip), []).append(each)
         report[f"by {group}"] = {name: rows_of(each, _RUNS) for name, each in sorted(parts.items())}
+    if walks is None:
+        return report
+    sent = measured(
+        weights,
+        walks.clips,
+        lambda done: progress(part + (1.0 - part) * done),
+        seeds=seeds,
+        modes=("FREE",),
+    )
+    report[_SENT] = _sent(sent, sum(walks.refused.values()) / max(1, sum(walks.sent.values())))
+    report[f"by kind, {_SENT}"] = {
+        kind: _sent(
+            [each for each in sent if each.clip.kind == kind], walks.refused.get(kind, 0) / times
+        )
+        for kind, times in sorted(walks.sent.items())
+    }
     return report
+
+
+def _sent(found: Sequence[Measured], refused: float) -> dict[str, dict[str, Any]]:
+    """The rows of some that were sent to seats, and how often that was refused."""
+    return {run: row | {"refused": refused} for run, row in rows_of(found, _SENT_RUNS).items()}
 
 
 def real_text(report: dict[str, Any]) -> str:
     """The report as Markdown."""
     parts = []
     for title, rows in report.items():
+        columns = _SENT_COLUMNS if _SENT in title else _COLUMNS
         if title.startswith("by "):
             for name, own in rows.items():
-                parts.append(f"### {title[3:].capitalize()}: {name}\n\n{table(own, _COLUMNS)}")
+                parts.append(f"### {title[3:].capitalize()}: {name}\n\n{table(own, columns)}")
         elif rows:
-            parts.append(f"## {title.capitalize()}\n\n{table(rows, _COLUMNS)}")
+            parts.append(f"## {title.capitalize()}\n\n{table(rows, columns)}")
     return "\n\n".join(parts)
