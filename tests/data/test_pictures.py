@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from dafnet_addon.core.skeleton import REST
 from dafnet_addon.data.fit_sheet import fit_sheet
@@ -30,7 +31,7 @@ def _seen(room: Furnishing, body: bool = False, away: float = 0.0) -> np.ndarray
 
 
 def test_a_box_and_a_real_piece_of_its_size_look_alike() -> None:
-    trimesh = pytest.importorskip("trimesh")
+
     mesh = trimesh.creation.box((0.6, 0.6, 1.0))
     mesh.apply_translation((0.0, 0.0, 0.5))
     piece = Piece(
@@ -68,7 +69,7 @@ def test_furniture_hides_who_is_behind_it_and_lets_them_shine_through() -> None:
 
 def test_a_sheet_shows_every_kind_that_carries_a_body(tmp_path: Path) -> None:
     image = pytest.importorskip("PIL.Image")
-    trimesh = pytest.importorskip("trimesh")
+
     from dafnet_addon.core.skeleton import joint
     from dafnet_addon.data.retarget import at_seat_height
 

@@ -1,13 +1,13 @@
 """The test of who is sent to real seats: who is in it, and that each is asked what can be done."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from dafnet_addon.data.real_walks import FROZEN_WALKS, real_walks
 from dafnet_addon.data.splits import role_of_maker
-from dafnet_addon.training.real_report import real_report, real_text
 from kit.places import LIBRARY
 
 FROZEN = json.loads(FROZEN_WALKS.read_text(encoding="utf-8"))["clips"]
@@ -24,9 +24,8 @@ def test_pieces_of_makers_that_never_train_from_two_to_three_metres(role: str) -
     assert np.linalg.norm(around.mean(0)) < 1.0, "from all sides"
 
 
+@pytest.mark.furniture
 def test_they_come_to_rest_on_their_pieces_as_high_as_these_carry_them() -> None:
-    if not LIBRARY.is_dir():
-        pytest.skip(f"needs the furniture library at {LIBRARY}")
     walks = real_walks(LIBRARY, "choose")
     asked = [walk for walk in FROZEN if walk["role"] == "choose"]
     assert sum(walks.sent.values()) == len(asked)
@@ -42,12 +41,11 @@ def test_they_come_to_rest_on_their_pieces_as_high_as_these_carry_them() -> None
         assert 1.99 < begun < 3.01
 
 
+@pytest.mark.torch
+@pytest.mark.furniture
 def test_the_report_has_rows_of_those_that_are_sent() -> None:
-    if not LIBRARY.is_dir():
-        pytest.skip(f"needs the furniture library at {LIBRARY}")
-    from dataclasses import replace
-
     from dafnet_addon.core.weights import load_weights
+    from dafnet_addon.training.real_report import real_report, real_text
 
     walks = real_walks(LIBRARY, "choose")
     one = replace(walks, clips=walks.clips[:1], sent={walks.clips[0].kind: 2}, refused={})
