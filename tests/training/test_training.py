@@ -519,7 +519,7 @@ def test_running_on_is_the_likelihood_and_the_inverse(dataset):
             parameter += 0.05 * torch.randn_like(parameter)
         x, z, occupancy = torch.randn(2, 12, 42), torch.randn(2, 42), torch.rand(2, 12, 2640)
         condition = torch.randn(2, 12, TINY.condition_size - TINY.code)
-        density, made = flow.run_on(x, condition, occupancy, z, 5)
+        density, made = flow.free_run(x, condition, occupancy, z, 5)
         assert torch.allclose(density, flow.log_likelihood(x, condition, occupancy), atol=1e-3)
         again, _, _ = flow(torch.cat([x[:, :5], made], 1), condition, occupancy)
     assert (again[:, 5:] - z[:, None]).abs().max() < 1e-3
