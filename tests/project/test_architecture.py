@@ -100,6 +100,16 @@ def test_blender_classes_keep_real_annotations(file: Path) -> None:
         assert (0, "__future__") not in set(imports(file))
 
 
+@pytest.mark.parametrize("file", sources("operators"), ids=lambda file: file.stem)
+def test_operators_say_what_they_do_and_their_base_reports(file: Path) -> None:
+    """What they share is in one place: errors become reports, and the set is returned."""
+    if file.stem == "base":
+        return
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    methods = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+    assert "execute" not in methods
+
+
 def test_nothing_names_the_data_beside_the_repository() -> None:
     for file in [
         *sources(*FOLDERS),
