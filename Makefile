@@ -1,4 +1,5 @@
 # make demo: a character walks to a chair and sits, from nothing.   make test: everything, on three Blenders.
+# make quick: the tests of a minute.
 # The bpy modules of Blender 4.2 to 5.0 need Python 3.11.
 
 PYTHON ?= $(shell command -v python3.11 || echo python3)
@@ -6,7 +7,7 @@ PYTHON ?= $(shell command -v python3.11 || echo python3)
 TORCH ?= torch==2.13.0
 PIP := bin/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test lint zip window setup system clean
+.PHONY: demo test quick lint zip window setup system clean
 
 demo: setup
 	.venv/bin/python -m dafnet_addon demo -o out/demo
@@ -17,6 +18,10 @@ test: lint .venv-4.2/.test .venv-5.0/.test
 	.venv/bin/python -m pytest -q
 	.venv-4.2/bin/python -m pytest -q
 	.venv-5.0/bin/python -m pytest -q
+
+# What needs neither Blender, nor torch, nor data beside the repository; under a minute.
+quick: .venv/.test
+	.venv/bin/python -m pytest -q --ignore=tests/blender -m "not (torch or mocap or furniture or slow)"
 
 lint: .venv/.test
 	.venv/bin/python -m ruff check .

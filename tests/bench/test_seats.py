@@ -27,6 +27,7 @@ def test_the_benchmark_puts_its_seat_under_the_pelvis_and_nothing_in_the_way(bac
         assert distance[: way.rests[-1].start - 60].min() > 0.25, "the way leads through the seat"
 
 
+@pytest.mark.slow
 def test_sits_at_four_heights_from_three_sides_and_stands_elsewhere() -> None:
     report, summary = SEATS["measure"](
         None, lambda _: None, heights=[0.38, 0.45, 0.54, 0.63], noise=[(0.0, 0)]

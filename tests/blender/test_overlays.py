@@ -14,7 +14,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay_drawing import comp
 from bl_ext.user_default.dafnet.dafnet_addon.blender.takes import add_take
 from bl_ext.user_default.dafnet.dafnet_addon.core.generate import Draw
 from bl_ext.user_default.dafnet.dafnet_addon.core.root import RootPath
-from bl_ext.user_default.dafnet.dafnet_addon.core.sensor import RADIUS
+from bl_ext.user_default.dafnet.dafnet_addon.core.sensor import RADIUS, SPHERES
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import REST
 from bl_ext.user_default.dafnet.dafnet_addon.core.solids import box_distance
 from bl_ext.user_default.dafnet.dafnet_addon.core.take import Controls, Take
@@ -160,9 +160,6 @@ def test_unregistering_switches_off(shot: Shot) -> None:
 
 @pytest.mark.parametrize("unit", [1.0, 0.01])
 def test_a_box_occupies_the_spheres_that_it_covers(shot: Shot, unit: float) -> None:
-    from dafnet_addon.core.sensor import RADIUS, SPHERES
-    from dafnet_addon.core.solids import box_distance
-
     if unit != 1.0:
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
         shot = Shot(unit)

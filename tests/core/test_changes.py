@@ -44,6 +44,7 @@ def _modes(controls: Controls, at: int, before: str, after: str) -> list[str]:
     return [before] * at + [after] * (len(controls) - at)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clean_up", [CleanUp(), ALL], ids=["raw", "clean"])
 @pytest.mark.parametrize(("before", "after"), [("FREE", "EE"), ("EE", "FREE")])
 def test_a_change_of_mode_with_nothing_given_changes_nothing(weights, clean_up, before, after):
@@ -67,6 +68,7 @@ def test_a_change_of_mode_with_nothing_given_changes_nothing(weights, clean_up, 
             )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("name", ["hand_left", "head"])
 def test_a_foot_that_stands_where_the_mode_changes_stays(weights, name: str, seed: int):
@@ -86,6 +88,7 @@ def test_a_foot_that_stands_where_the_mode_changes_stays(weights, name: str, see
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clean_up", [CleanUp(), ALL], ids=["raw", "clean"])
 def test_what_a_change_of_mode_asks_is_come_to_and_left_without_a_pop(weights, clean_up):
     controls = _walk()
@@ -153,6 +156,7 @@ def _turned_by(take: Take, reference: Take) -> np.ndarray:
     return np.degrees(np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fps", [24.0, 30.0, 60.0])
 def test_rotations_count_by_mode_and_influence_and_come_over_softly(weights, fps):
     controls = _walk(fps)
@@ -182,6 +186,7 @@ def test_rotations_count_by_mode_and_influence_and_come_over_softly(weights, fps
     assert at_once[at - 1] < 1e-3 and np.isclose(at_once[at], whole[at], atol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fps", RATES)
 @pytest.mark.parametrize("scale", [1.0, 0.6])
 def test_targets_are_reached_at_the_scenes_own_frames(weights, fps, scale):

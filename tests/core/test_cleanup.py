@@ -189,6 +189,7 @@ def test_feet_hang_from_a_seat_that_is_too_high_for_them():
     assert np.abs(_lengths(out) - _lengths(sunk)).max() < 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fps", [24.0, 30.0, 60.0])
 def test_takes_are_cleaned_at_any_rate(fps):
     weights = load_weights()

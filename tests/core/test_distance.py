@@ -345,6 +345,7 @@ def test_scaled_scene_keeps_its_grids():
     np.testing.assert_allclose(after.solids[1].half_size, [0.08, 0.16, 0.24])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [100.0, 4000.0])
 def test_a_huge_slab_is_measured_coarsely_and_within_memory(side: float) -> None:
     corners = np.array([(x, y, z) for x in (0.0, side) for y in (0.0, side) for z in (0.0, 0.5)])
@@ -393,6 +394,7 @@ def _needles():
     return ends.reshape(-1, 3), np.arange(6000).reshape(3, 2000).T
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "mesh",
     [

@@ -40,6 +40,8 @@ from dafnet_addon.core.take import MODES
 from dafnet_addon.core.weights import FORMAT, Weights, read_safetensors, write_safetensors
 from kit.limits import bounded
 
+pytestmark = pytest.mark.slow
+
 hypothesis = pytest.importorskip("hypothesis")
 st = pytest.importorskip("hypothesis.strategies")
 

@@ -91,6 +91,7 @@ def test_boxes_hold_their_solids() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1.0, 0.8])
 def test_takes_are_the_same_to_the_last_bit_and_far_grids_are_not_built(
     monkeypatch, scale: float

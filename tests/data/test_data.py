@@ -320,6 +320,7 @@ def _count(out: Path) -> list[int]:
     return [len(archive["kinds"]) for archive in with_kinds]
 
 
+@pytest.mark.slow
 def test_a_dataset_has_as_many_windows_as_were_asked_for(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib", reason="previews are drawn with it")
     from dafnet_addon.data import prepare as p
@@ -356,6 +357,7 @@ def test_a_dataset_has_as_many_windows_as_were_asked_for(tmp_path, monkeypatch):
     assert _count(out) == [10, 10, 10, 2]
 
 
+@pytest.mark.slow
 def test_what_a_dataset_leaves_out_is_said_and_does_not_stop_it(tmp_path):
     pytest.importorskip("matplotlib", reason="previews are drawn with it")
     from dafnet_addon.data.prepare import prepare

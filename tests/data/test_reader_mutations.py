@@ -30,6 +30,8 @@ from kit.limits import bounded
 from kit.motion_files import walk, write_amc, write_asf, write_bvh, write_compact
 from kit.places import RAW
 
+pytestmark = pytest.mark.slow
+
 FRAMES = 12
 
 

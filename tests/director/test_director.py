@@ -62,6 +62,7 @@ def test_one_sits_before_a_back_and_looks_away_from_it(angle, arms):
     assert abs(local[0]) < 0.04 and -0.08 < local[1] < 0.05
 
 
+@pytest.mark.slow
 def test_stools_and_benches_are_sat_on_from_where_one_comes():
     stool = [_box((-0.2, -0.2, 0.55), (0.2, 0.2, 0.6))]
     for towards, yaw in (((3.0, 0.3), -np.pi / 2), ((0.2, 3.0), 0.0)):
@@ -165,6 +166,7 @@ def test_points_are_only_made_where_they_are_asked_for():
     ).shape == (0, 3)
 
 
+@pytest.mark.slow
 def test_far_ways_are_found_or_refused_in_seconds():
     start, goal = np.zeros(2), np.array([90.0, 60.0])
     started = process_time()
@@ -184,6 +186,7 @@ def test_far_ways_are_found_or_refused_in_seconds():
         walk_to(room, Stop((0.0, 0.0), 0.0), Stop((0.03, 0.0), 0.0))
 
 
+@pytest.mark.slow
 def test_a_hard_search_is_a_job_of_short_steps():
     """Over 100 m of floor full of furniture; of the processor's time, so whatever else runs."""
     rng = np.random.default_rng(0)

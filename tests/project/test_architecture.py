@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -15,9 +16,15 @@ PACKAGE = ROOT / "dafnet_addon"
 FOLDERS = ("dafnet_addon", "operators", "panels", "benchmarks")
 
 
+@cache
+def tree_of(file: Path) -> ast.Module:
+    """What a source file says, read once for all tests."""
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
 def imports(file: Path, top_level_only: bool = False) -> Iterator[tuple[int, str]]:
     """(level, module) of every import of a file; level counts the leading dots."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+    tree = tree_of(file)
     nodes = tree.body if top_level_only else list(ast.walk(tree))
     for node in nodes:
         if isinstance(node, ast.Import):
@@ -105,7 +112,7 @@ def test_operators_say_what_they_do_and_their_base_reports(file: Path) -> None:
     """What they share is in one place: errors become reports, and the set is returned."""
     if file.stem == "base":
         return
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+    tree = tree_of(file)
     methods = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
     assert "execute" not in methods
 
@@ -146,11 +153,7 @@ def _opens_text(call: ast.Call) -> bool:
     "file", sources(*FOLDERS, "tests"), ids=lambda file: file.relative_to(ROOT).as_posix()
 )
 def test_text_is_read_and_written_in_one_encoding_everywhere(file: Path) -> None:
-    calls = [
-        node
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call)
-    ]
+    calls = [node for node in ast.walk(tree_of(file)) if isinstance(node, ast.Call)]
     lines = [call.lineno for call in calls if _opens_text(call)]
     assert not lines, f'{file.name}: say encoding="utf-8" in line {lines}'
 
@@ -162,11 +165,7 @@ def test_what_users_keep_is_written_whole(file: Path) -> None:
     """That is, to the ``part`` of ``core.files.whole_file``, by which weights are written in
     ``training.export``.
     """
-    calls = [
-        node
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call)
-    ]
+    calls = [node for node in ast.walk(tree_of(file)) if isinstance(node, ast.Call)]
     written = {
         "write_text": lambda call: call.func.value,
         "write_bytes": lambda call: call.func.value,
@@ -223,7 +222,7 @@ LAYERS = {
 def imported_modules(file: Path) -> set[Path]:
     """The files of ``dafnet_addon`` that a file of it imports, also inside functions."""
     found = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(file)):
         if not isinstance(node, ast.ImportFrom) or not node.level:
             continue
         place = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
@@ -267,7 +266,7 @@ def numbers(node: ast.expr) -> list[int]:
 def test_joints_go_by_name(file: Path) -> None:
     """``joints[:, HEAD]``, not ``joints[:, 15]``: names are ``core.skeleton``'s."""
     bare = []
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(file)):
         if not isinstance(node, ast.Subscript):
             continue
         axes = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
