@@ -720,7 +720,7 @@ def _evaluate_among_real(options: argparse.Namespace, bar: "_Bar") -> _Result:
     from .core.weights import load_weights
     from .data.real_test import real_test
     from .data.real_walks import real_walks
-    from .training.real_report import real_report, real_text
+    from .training.real_report import real_page, real_report, real_text
 
     if options.save or options.sheets:
         raise InputError(
@@ -735,7 +735,8 @@ def _evaluate_among_real(options: argparse.Namespace, bar: "_Bar") -> _Result:
     )
     if options.output:
         save_text(options.output / f"real-{options.role}.json", json.dumps(found, indent=2))
-        save_text(options.output / f"real-{options.role}.md", real_text(found))
+        title = f"Bodies and makers that {options.role}"
+        save_text(options.output / f"real-{options.role}.md", real_page(found, title))
     return found, real_text(found)
 
 

@@ -10,7 +10,7 @@ from ..data.held_out import HeldClip
 from ..data.real_walks import Walks
 from .evaluate import Measured, measured, rows_of, table
 
-__all__ = ["real_report", "real_text"]
+__all__ = ["real_page", "real_report", "real_text"]
 
 _RUNS = ("ground_truth", "free_t0", "free_t0_clean", "free_t1", "ee_t0", "ee_t0_clean")
 _COLUMNS = (
@@ -119,3 +119,82 @@ def real_text(report: dict[str, Any]) -> str:
         elif rows:
             parts.append(f"## {title.capitalize()}\n\n{table(rows, columns)}")
     return "\n\n".join(parts)
+
+
+def real_page(report: dict[str, Any], title: str) -> str:
+    """The main figures as one Markdown table of captured motion and one of who was sent, a row for
+    each kind, maker and body, under ``title``: what docs/evaluation-real.md holds.
+    """
+    groups = {
+        "all seats": report["all seats"],
+        **{name: rows for group in _GROUPS for name, rows in report[f"by {group}"].items()},
+        "lying": report["lying"],
+    }
+    parts = [f"## {title}", _page_table(_CAPTURED_CELLS, groups)]
+    if report.get(_SENT):
+        sent = {"all": report[_SENT], **report[f"by kind, {_SENT}"]}
+        parts += [f"### {title}: {_SENT}", _page_table(_SENT_CELLS, sent)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _page_table(
+    cells: dict[str, Callable[[dict[str, Any]], str]], groups: dict[str, dict[str, Any]]
+) -> str:
+    lines = ["| | " + " | ".join(cells) + " |", "|---" * (len(cells) + 1) + "|"]
+    for number, (name, rows) in enumerate(groups.items()):
+        if rows:
+            label = name if number else f"**{name}**"
+            lines.append(f"| {label} | " + " | ".join(cell(rows) for cell in cells.values()) + " |")
+    return "\n".join(lines)
+
+
+def _within(run: str) -> Callable[[dict[str, Any]], str]:
+    """Shares within 2, 4 and 8 cm, with the interval of the last."""
+
+    def cell(rows: dict[str, Any]) -> str:
+        row = rows[run]
+        shares = " / ".join(f"{100 * row[f'sits_within_{cm}cm']:.0f}" for cm in (2, 4, 8))
+        low, high = row["intervals"]["sits_within_8cm"]
+        return f"{shares} ({100 * low:.0f} to {100 * high:.0f})"
+
+    return cell
+
+
+def _figure(name: str, run: str, shown: str, times: float = 1.0) -> Callable[[dict[str, Any]], str]:
+    """One figure of a run, with the captured motion's in brackets where there is one."""
+
+    def cell(rows: dict[str, Any]) -> str:
+        values = [rows[r].get(name) for r in (run, "ground_truth") if r in rows]
+        told = ["–" if v is None else format(times * v, shown) for v in values]
+        return told[0] if len(told) == 1 else f"{told[0]} ({told[1]})"
+
+    return cell
+
+
+def _clips(rows: dict[str, Any]) -> str:
+    return str(rows["free_t0"]["clips"])
+
+
+_LATER: dict[str, Callable[[dict[str, Any]], str]] = {
+    "flesh in furniture, % of frames": _figure("penetrates", "free_t0", ".0f", 100.0),
+    "how deep, mm": _figure("penetration_deepest", "free_t0", ".1f", 1000.0),
+    "skate, cm/s": _figure("skate_cm", "free_t0", ".1f", 30.0),
+    "way down, s": _figure("descent_seconds", "free_t0", ".2f"),
+    "lean, degrees": _figure("lean_degrees", "free_t0", "z.0f"),
+}
+_CAPTURED_CELLS: dict[str, Callable[[dict[str, Any]], str]] = {
+    "clips": _clips,
+    "FREE within 2 / 4 / 8 cm, %": _within("free_t0"),
+    "FREE, clean": _within("free_t0_clean"),
+    "EE": _within("ee_t0"),
+    "EED in EE": lambda rows: f"{rows['ee_t0']['end_effector_error']:.4f}",
+    **_LATER,
+    "wrists, m/s": _figure("speed_wrists", "free_t0", ".2f"),
+}
+_SENT_CELLS: dict[str, Callable[[dict[str, Any]], str]] = {
+    "sent, not refused": _clips,
+    "refused, %": _figure("refused", "free_t0", ".0f", 100.0),
+    "FREE within 2 / 4 / 8 cm, %": _within("free_t0"),
+    "FREE, clean": _within("free_t0_clean"),
+    **_LATER,
+}

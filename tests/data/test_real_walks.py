@@ -45,7 +45,7 @@ def test_they_come_to_rest_on_their_pieces_as_high_as_these_carry_them() -> None
 @pytest.mark.furniture
 def test_the_report_has_rows_of_those_that_are_sent() -> None:
     from dafnet_addon.core.weights import load_weights
-    from dafnet_addon.training.real_report import real_report, real_text
+    from dafnet_addon.training.real_report import real_page, real_report, real_text
 
     walks = real_walks(LIBRARY, "choose")
     one = replace(walks, clips=walks.clips[:1], sent={walks.clips[0].kind: 2}, refused={})
@@ -56,6 +56,9 @@ def test_the_report_has_rows_of_those_that_are_sent() -> None:
     assert rows["free_t0"]["clips"] == 1 and rows["free_t0"]["refused"] == 0.5
     assert 0.0 <= rows["free_t0"]["sits_within_8cm"] <= 1.0 and "lean_degrees" in rows["free_t0"]
     assert "refused" in real_text(report)
+    page = real_page(report, "Those that choose")
+    row = next(line for line in page.splitlines() if line.startswith("| **all** |"))
+    assert row.split(" | ")[1:3] == ["1", "50"], "one was sent, one of two refused"
     assert (
         real_report(load_weights(), [], seeds=1, walks=one)["sent by the director"]["free_t0"][
             "refused"
