@@ -421,7 +421,7 @@ def moved_to(joints: np.ndarray, seat: float, desk: float) -> np.ndarray:
     """The motion (T, 22, 3) of figure 9, with its seat and its desk as much higher as is said
     (metres): the seat first, which takes the hands along, then the top under them.
     """
-    resting = float(np.median(joints[:, 0, 2]))
+    resting = float(np.median(joints[:, PELVIS, 2]))
     sits = at_seat_height(joints, resting, resting + seat)
     (use, *_), (now, *_) = (working(j, root_from_joints(j)) for j in (joints, sits))
     risen = float(np.median(now.points[:, 2]) - np.median(use.points[:, 2]))

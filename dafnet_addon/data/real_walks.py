@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.files import save_text
 from ..core.paths import Stop
 from ..core.rotations import rotate
-from ..core.skeleton import REST
+from ..core.skeleton import PELVIS, REST
 from ..core.solids import Mesh
 from ..director.seats import seat_of
 from ..director.walks import walk_to
@@ -45,8 +46,8 @@ _SETTLES = 15  # frames from where the root rests, until the body has to
 
 @dataclass(frozen=True)
 class Walks:
-    """What came of being sent to seats: ``clips`` to be generated in FREE, whose joints are no
-    motion, but a body that stands along the way and rests as high as it should; and how often that
+    """What came of being sent to seats: ``clips`` to be generated in FREE, whose joints are not
+    captured: a body that stands along the way and rests as high as it should; and how often that
     was ``refused``, by kind of piece, of ``sent`` times, or led to a place that carries nobody.
     """
 
@@ -130,7 +131,7 @@ def _sent(
     first, last = rest.start + _SETTLES, rest.stop
     pelvis = height + PELVIS_OVER[piece.kind]
     joints = rotate(made.path.rotation[:, None], REST) + made.path.position[:, None]
-    joints[first:last, :, 2] += pelvis - REST[0, 2]
+    joints[first:last, :, 2] += pelvis - REST[PELVIS, 2]
     at = np.array([*spot.position, pelvis])
     return HeldClip(
         name=f"sent to {piece.name}, {k}",
@@ -164,7 +165,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
-    FROZEN_WALKS.write_text(frozen_text(frozen), encoding="utf-8")
+    save_text(FROZEN_WALKS, frozen_text(frozen))
     return 0
 
 
