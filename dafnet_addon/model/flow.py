@@ -151,7 +151,7 @@ class Coupling(nn.Module):
     def __init__(self, size: int, condition: int, width: int, layers: int) -> None:
         super().__init__()
         self.passes = size // 2
-        self.lstm = nn.LSTM(self.passes + condition, width, layers, batch_first=True)
+        self.lstm = nn.LSTM(self.passes + condition, width, layers)
         self.out = nn.Linear(width, 2 * (size - self.passes))
         nn.init.zeros_(self.out.weight)
         nn.init.zeros_(self.out.bias)
@@ -159,10 +159,13 @@ class Coupling(nn.Module):
     def _affine(
         self, passed: Tensor, condition: Tensor, state: LSTMState | None
     ) -> tuple[Tensor, Tensor, LSTMState]:
+        # An LSTM wants time first: joined in that order, nothing is put in another order again.
+        told = torch.cat(
+            [passed.transpose(0, 1).to(condition.dtype), condition.transpose(0, 1)], -1
+        )
         with torch.autocast(passed.device.type, torch.bfloat16, enabled=self.mixed):
-            hidden, state = self.lstm(torch.cat([passed, condition], dim=-1), state)
-            hidden = hidden.to(passed.dtype)
-        shift, raw = self.out(hidden).chunk(2, dim=-1)
+            hidden, state = self.lstm(told, state)
+        shift, raw = self.out(hidden.to(passed.dtype)).transpose(0, 1).chunk(2, dim=-1)
         return shift, torch.sigmoid(raw + 2.0) + 1e-6, state
 
     def forward(self, x: Tensor, condition: Tensor, state: LSTMState | None = None) -> Forward:
@@ -248,8 +251,15 @@ class PartFlow(nn.Module):
         return torch.cat(densities, dim=1), poses
 
     def _conditions(self, condition: Tensor, occupancy: Tensor) -> list[Tensor]:
-        """One condition for each step: with a shared encoder, the same one."""
-        each = [torch.cat([condition, encoder(occupancy)], dim=-1) for encoder in self.encoders]
+        """One condition for each step, with a shared encoder the same one; time first in memory,
+        and as wide as the couplings compute.
+        """
+        wide = torch.bfloat16 if self.couplings[0].mixed else condition.dtype
+        known = condition.transpose(0, 1).to(wide)
+        each = [
+            torch.cat([known, encoder(occupancy).transpose(0, 1).to(wide)], dim=-1).transpose(0, 1)
+            for encoder in self.encoders
+        ]
         return each * (len(self.norms) // len(each))
 
     def _to_noise(
@@ -301,7 +311,7 @@ class EnvironmentEncoder(nn.Module):
 
     def forward(self, occupancy: Tensor) -> Tensor:
         with torch.autocast(occupancy.device.type, torch.bfloat16, enabled=self.mixed):
-            return self.second(torch.relu(self.first(occupancy))).to(occupancy.dtype)
+            return self.second(torch.relu(self.first(occupancy)))
 
 
 class BodyFlow(nn.Module):

@@ -23,7 +23,13 @@ def _mlp(*sizes: int) -> nn.Sequential:
 
 
 class ActionPredictor(nn.Module):
-    """q_α: scene feature to K logits. ``past`` (…, 693) standardised, ``occupancy`` (…, 2640)."""
+    """q_α: scene feature to K logits. ``past`` (…, 693) standardised, ``occupancy`` (…, 2640).
+
+    ``mixed``: the environment's layer computes in bfloat16. The others do not: their logits are
+    large, and rounded so they would be other actions.
+    """
+
+    mixed = False
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
@@ -33,10 +39,11 @@ class ActionPredictor(nn.Module):
         self.layers = _mlp(config.scene_size + config.predictor_code, width, width, config.actions)
 
     def encode(self, occupancy: Tensor) -> Tensor:
-        return self.environment(occupancy)
+        with torch.autocast(occupancy.device.type, torch.bfloat16, enabled=self.mixed):
+            return self.environment(occupancy)
 
     def logits(self, past: Tensor, code: Tensor) -> Tensor:
-        return self.layers(torch.cat([past, code], dim=-1))
+        return self.layers(torch.cat([past, code.to(past.dtype)], dim=-1))
 
     def forward(self, past: Tensor, occupancy: Tensor) -> Tensor:
         """Action probabilities π (…, K), as the flow is given them."""

@@ -2,6 +2,7 @@
 modes drawn for each.
 """
 
+import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,7 +20,16 @@ from ..data.shapes import ShapeBank
 from ..model.config import ModelConfig
 from .placed_shapes import DeviceBank
 
-__all__ = ["Statistics", "Pool", "Batch", "past_of", "observation_for", "occupancy_of", "seen"]
+__all__ = [
+    "Statistics",
+    "Pool",
+    "Batch",
+    "past_of",
+    "chance",
+    "observation_for",
+    "occupancy_of",
+    "seen",
+]
 
 _EFFECTORS = [MODEL_ORDER.index(j) for j in END_EFFECTORS.values()]
 _PELVIS = MODEL_ORDER.index(0)
@@ -61,16 +71,22 @@ class Statistics:
 @dataclass(frozen=True)
 class Batch:
     """``past`` (B, T, 693); ``upper`` (B, T, 42), ``lower`` (B, T, 24); ``root`` (B, T, 3 [+ 18
-    [+ 1]]): velocity, way ahead, and 1, since it is known; all standardised; ``occupancy``
-    (B, T, 2640); ``step`` (B, T, 3): the velocity in metres and radians.
+    [+ 1]]): velocity, way ahead, and 1, since it is known; all standardised; ``seen``
+    (B, T, 2640): what the sensor sees in bytes, 255 of which are 1; ``step`` (B, T, 3): the
+    velocity in metres and radians.
     """
 
     past: Tensor
     upper: Tensor
     lower: Tensor
     root: Tensor
-    occupancy: Tensor
+    seen: Tensor
     step: Tensor
+
+    @property
+    def occupancy(self) -> Tensor:
+        """What the sensor sees (B, T, 2640), from 0 to 1."""
+        return self.seen.float() / 255.0
 
 
 def past_of(poses: Tensor, velocity: Tensor, history: int) -> Tensor:
@@ -98,13 +114,16 @@ def seen(file: Path, bank: DeviceBank) -> np.ndarray:
         out = np.lib.format.open_memmap(part, "w+", np.uint8, (*root.shape[:2], len(SPHERES)))
         for k in range(0, len(root), _AT_ONCE):
             some = slice(k, k + _AT_ONCE)
-            found = torch.maximum(
-                occupancy_of(boxes[some], root[some]), bank.occupancy(shapes[some], root[some])
-            )
-            out[some] = (255.0 * found).round().to(torch.uint8).numpy()
+            out[some] = _sensed(boxes[some], shapes[some], root[some], bank).numpy()
         out.flush()
         part.rename(kept)
     return np.load(kept, mmap_mode="r")
+
+
+def _sensed(boxes: Tensor, shapes: Tensor, root: Tensor, bank: DeviceBank) -> Tensor:
+    """What the sensor sees of boxes and shapes along root paths, in bytes (B, T, 2640)."""
+    found = torch.maximum(occupancy_of(boxes, root), bank.occupancy(shapes, root))
+    return (255.0 * found).round().to(torch.uint8)
 
 
 class Pool:
@@ -184,18 +203,15 @@ class Pool:
         way = ((a["ahead"] - a_mean) / a_std)[..., : config.ahead]
         known = torch.ones_like(way[..., : int(config.ahead_mask)])
         now = poses[:, history:]
-        if "seen" in a:
-            occupancy = a["seen"].float() / 255.0
-        else:
-            occupancy = torch.maximum(
-                occupancy_of(a["boxes"], a["root"]), self.bank.occupancy(a["shapes"], a["root"])
-            )
+        found = a.get("seen")
+        if found is None:
+            found = _sensed(a["boxes"], a["shapes"], a["root"], self.bank)
         return Batch(
             past_of(poses, velocity, history),
             now[..., :UPPER_SIZE],
             now[..., UPPER_SIZE:],
             torch.cat([velocity[:, history:], way, known], dim=-1),
-            occupancy,
+            found,
             step[:, history:],
         )
 
@@ -260,6 +276,17 @@ def _modes(windows: int, device: torch.device) -> Tensor:
     fourth = torch.randint(_FREE, _FULL, (windows, 1), device=device)
     shuffled = torch.where(order == 3, fourth, order)
     return torch.where(torch.rand(windows, 1, device=device) < 0.6, one, shuffled)
+
+
+def chance(shape: Sequence[int], share: float, device: torch.device) -> Tensor:
+    """True in a ``share`` of an array, to one in 256 (all or nothing where it is 1 or 0): a byte
+    is drawn for each, which costs a tenth of what a number does.
+    """
+    count = math.prod(shape)
+    words = torch.empty(count // 8 + 1, dtype=torch.int64, device=device).random_(-(1 << 63), None)
+    drawn = words.view(torch.uint8)[:count].view(shape)
+    least = round(256.0 * share)
+    return drawn <= least - 1 if least else torch.zeros_like(drawn, dtype=torch.bool)
 
 
 def observation_for(upper: Tensor) -> tuple[Tensor, Tensor]:

@@ -40,7 +40,7 @@ from ..model.flow import BodyFlow, Coupling, EnvironmentEncoder
 from ..model.predictor import GMVAE, ActionPredictor, gumbel_temperature
 from ..model.systems import system_named
 from . import precision, ranks
-from .batches import Batch, Pool, Statistics, observation_for
+from .batches import Batch, Pool, Statistics, chance, observation_for
 from .checkpoints import (
     Checkpoint,
     checkpoint_file,
@@ -199,8 +199,11 @@ class Run:
         for module in self.flow.modules():
             if isinstance(module, Coupling | EnvironmentEncoder):
                 module.mixed = self.config.mixed
+        self.gmvae.predictor.mixed = self.config.mixed and part != "predictor"
         self.network: nn.Module = self.gmvae if part == "predictor" else self.flow.parts()[part]
-        self.optimiser = torch.optim.Adam(self.network.parameters(), lr=config.peak)
+        self.optimiser = torch.optim.Adam(
+            self.network.parameters(), lr=config.peak, fused=self.device.type in ("cpu", "cuda")
+        )
         self.averaged = {name: p.detach().clone() for name, p in self.network.named_parameters()}
         """The parameters, averaged over the last steps."""
         self.step, self.seconds = 0, 0.0
@@ -329,17 +332,17 @@ class Run:
         kept.set_generators(run.device)
         return run
 
-    def hidden(self, occupancy: torch.Tensor) -> torch.Tensor:
-        """Occupancy (B, …, 2640) with a share of its values dropped (paper, Appendix A); nothing is
-        rescaled.
+    def hidden(self, seen: torch.Tensor) -> torch.Tensor:
+        """Occupancy (B, …, 2640) of what is ``seen``, in bytes, with a share of its values dropped
+        (paper, Appendix A); nothing is rescaled. As wide as what reads it computes.
         """
         spared = (
-            torch.rand(len(occupancy), *[1] * (occupancy.ndim - 1), device=self.device)
+            torch.rand(len(seen), *[1] * (seen.ndim - 1), device=self.device)
             >= self.config.dropout_windows
         )
-        return occupancy * (
-            spared | (torch.rand_like(occupancy) >= self.config.environment_dropout)
-        )
+        shown = seen * (spared | ~chance(seen.shape, self.config.environment_dropout, self.device))
+        wide = self.config.mixed and self.part != "predictor"
+        return shown.to(torch.bfloat16 if wide else torch.float32).div_(255.0)
 
     def loss(self, batch: Batch, initialise: bool = False) -> torch.Tensor:
         """The GMVAE's loss, or the part's negative log-likelihood a frame with the predictor
@@ -348,19 +351,16 @@ class Run:
         if self.part == "predictor":
             # Neighbouring frames say nearly the same: every fifth is plenty for a network without
             # memory.
-            past, occupancy = (
-                batch.past[:, ::5].flatten(0, 1),
-                batch.occupancy[:, ::5].flatten(0, 1),
-            )
+            past, sight = (a[:, ::5].flatten(0, 1) for a in (batch.past, batch.seen))
             poses = self.model.history * POSE_SIZE
             seen = past.clone()
             seen[:, :poses] *= (
                 torch.rand(len(past), poses, device=self.device) >= self.config.slot_dropout
             )
             return self.gmvae.losses(
-                past, seen, self.hidden(occupancy), gumbel_temperature(self.share)
+                past, seen, self.hidden(sight), gumbel_temperature(self.share)
             ).total
-        occupancy = self.hidden(batch.occupancy)
+        occupancy = self.hidden(batch.seen)
         observation, given = observation_for(batch.upper)
         x, condition = self._told(batch, occupancy, observation, given)
         part = self.flow.parts()[self.part]

@@ -33,10 +33,18 @@ from dafnet_addon.model.flow import (  # noqa: E402
     Coupling,
     EnvironmentEncoder,
 )
+from dafnet_addon.model.predictor import ActionPredictor  # noqa: E402
 from dafnet_addon.model.systems import sampler_of, system_named  # noqa: E402
 from dafnet_addon.training import precision  # noqa: E402
 from dafnet_addon.training import train as training  # noqa: E402
-from dafnet_addon.training.batches import Pool, Statistics, observation_for, occupancy_of, past_of  # noqa: E402
+from dafnet_addon.training.batches import (  # noqa: E402
+    Pool,
+    Statistics,
+    chance,
+    observation_for,
+    occupancy_of,
+    past_of,
+)
 from dafnet_addon.training.export import (  # noqa: E402
     adopt_predictor,
     adopted_statistics,
@@ -398,6 +406,84 @@ def test_mixed_precision_is_asked_for_only_where_it_is_there(
     assert capsys.readouterr().err.count("\n") == (0 if there else 1)
     precision.announce(False)
     assert capsys.readouterr().err == ""
+
+
+def test_a_step_is_what_its_parts_say_one_after_another(dataset):
+    """Conditions joined once and time first, against the plain sum over flow steps in double."""
+    torch.manual_seed(0)
+    run = Run("upper", dataset, TINY, _config(1), _pool(dataset).statistics())
+    flow = run.flow.upper.double()
+    with torch.no_grad():
+        for parameter in flow.parameters():
+            parameter += 0.05 * torch.randn_like(parameter)
+        x, occupancy = torch.randn(3, 9, 42).double(), torch.rand(3, 9, 2640).double()
+        condition = torch.randn(3, 9, TINY.condition_size - TINY.code).double()
+        expected, total = x, 0.0
+        for norm, linear, coupling in flow.steps():
+            expected = (expected + norm.bias) * norm.log_scale.exp() @ linear.weight().T
+            lstm = torch.nn.LSTM(
+                coupling.lstm.input_size, TINY.width, TINY.layers, batch_first=True
+            )
+            lstm.double().load_state_dict(coupling.lstm.state_dict())
+            passed, changed = expected[..., :21], expected[..., 21:]
+            told = torch.cat([passed, condition, flow.encoders[0](occupancy)], dim=-1)
+            shift, raw = coupling.out(lstm(told)[0]).chunk(2, dim=-1)
+            scale = torch.sigmoid(raw + 2.0) + 1e-6
+            expected = torch.cat([passed, (changed + shift) * scale], dim=-1)
+            total = total + norm.log_scale.sum() + linear.log_s.sum() + scale.log().sum(-1)
+        made, log_det, _ = flow(x, condition, occupancy)
+    assert (made - expected).abs().max() < 1e-12 and (log_det - total).abs().max() < 1e-12
+
+
+def test_a_frozen_predictor_that_reads_the_sensor_in_bfloat16_says_the_same(dataset):
+    weights = load_weights()
+    model = ModelConfig(**weights.config["model"])
+    predictor = ActionPredictor(model)
+    adopt_predictor(predictor, weights)
+    statistics = adopted_statistics(weights, _pool(dataset).statistics())
+    batch = _pool(dataset).batch(torch.arange(12), statistics, model)
+    with torch.no_grad():
+        exact = predictor(batch.past, batch.occupancy)
+        predictor.mixed = True
+        near = predictor(batch.past, batch.occupancy.bfloat16())
+    assert near.dtype == exact.dtype and 0.0 < (near - exact).abs().max() < 0.02
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 0.5, 1.0])
+def test_chance_hits_its_share_of_values_each_for_itself(share):
+    torch.manual_seed(0)
+    hit = chance((7, 300, 11), share, torch.device("cpu")).double()
+    spread = 4.0 * (share * (1.0 - share) / hit.numel()) ** 0.5
+    assert hit.shape == (7, 300, 11) and abs(hit.mean() - share) <= spread
+    neighbours = (hit[..., 1:] - share) * (hit[..., :-1] - share)
+    assert abs(neighbours.mean()) <= 4.0 * share * (1.0 - share) / neighbours.numel() ** 0.5
+
+
+@pytest.mark.parametrize("part", ["predictor", "upper"])
+def test_values_are_hidden_from_the_sensor_in_a_share_of_the_windows(part, dataset, tmp_path):
+    config = replace(_config(1), dropout_windows=0.5, environment_dropout=0.5, mixed=True)
+    run = Run(part, tmp_path, TINY, config, _pool(dataset).statistics())
+    seen = torch.randint(1, 256, (400, 3, 2640), dtype=torch.uint8)
+    shown = run.hidden(seen).float()
+    kept = (shown > 0).float().mean((1, 2))
+    assert (shown[kept == 1] - seen[kept == 1].float() / 255).abs().max() < 2e-3
+    assert abs((kept == 1).float().mean() - 0.5) < 0.1 and abs(kept[kept < 1].mean() - 0.5) < 0.005
+    assert ((shown == 0) | ((shown - seen.float() / 255).abs() < 2e-3)).all(), "none is rescaled"
+
+
+def test_the_optimiser_is_adam(dataset, tmp_path):
+    run = Run("upper", tmp_path, TINY, _config(1), _pool(dataset).statistics())
+    other = Run("upper", tmp_path, TINY, _config(1), run.statistics)
+    plain = torch.optim.Adam(other.network.parameters(), lr=run.config.peak)
+    batch = _pool(dataset).batch(torch.arange(12), run.statistics, TINY)
+    for _ in range(10):
+        for each, optimiser in ((run, run.optimiser), (other, plain)):
+            torch.manual_seed(2)
+            optimiser.zero_grad()
+            each.loss(batch).backward()
+            optimiser.step()
+    for a, b in zip(run.network.parameters(), other.network.parameters(), strict=True):
+        assert (a - b).abs().max() < 1e-4, "as plain Adam does, but for rounding"
 
 
 def test_the_probe_leaves_the_generators_alone():
