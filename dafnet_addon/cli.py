@@ -305,7 +305,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
         _train,
         "train a model, or resume a run, and write its weights",
         part="training",
-        needs=lambda _: ("torch", "tensorboard", "safetensors"),
+        needs=lambda _: ("torch",),
     )
     train.add_argument(
         "config", type=Path, metavar="CONFIG.toml", help="sizes and budgets; see configs/"
@@ -329,13 +329,36 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     train.add_argument(
         "--device", default="cpu", help="'cpu', or 'cuda'; several GPUs through torchrun"
     )
+    train.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a setting instead of the configuration's, as batch=256 or width=384",
+    )
+
+    carry = command(
+        "carry",
+        _carry,
+        "make a dataset or a run small enough for another machine, or a carried dataset whole",
+        part="training",
+        needs=lambda o: ("torch",) if any(o.folder.glob("*.checkpoint")) else (),
+    )
+    carry.add_argument("folder", type=Path, metavar="FOLDER", help="a dataset, or a run's folder")
+    carry.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER")
+    carry.add_argument(
+        "--mebibytes",
+        type=_number(float, 1.0),
+        default=60.0,
+        help="of a dataset: as many windows as go into so much",
+    )
 
     validate = command(
         "validate",
         _validate,
         "measure a run among real furniture while it trains, and keep its best weights",
         part="training",
-        needs=lambda _: ("torch", "tensorboard", "safetensors", "matplotlib"),
+        needs=lambda _: ("torch", "matplotlib"),
     )
     validate.add_argument("training", type=Path, metavar="RUN", help="folder of the run")
     validate.add_argument("dataset", type=Path, metavar="DATASET", help="that it trains with")
@@ -356,7 +379,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
         _cool,
         "train a copy of a run for some minutes in which its rate falls, and write its weights",
         part="training",
-        needs=lambda _: ("torch", "tensorboard", "safetensors"),
+        needs=lambda _: ("torch",),
     )
     cool.add_argument("training", type=Path, metavar="RUN", help="folder of the run, only read")
     cool.add_argument("dataset", type=Path, metavar="DATASET", help="that it trains with")
@@ -375,7 +398,6 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
         part="training",
         needs=lambda o: (
             "torch",
-            *(("safetensors",) if _is_samp(o.weights) else ()),
             *(("matplotlib",) if o.output or o.sheets else ()),
             *(("PIL",) if o.sheets else ()),
         ),
@@ -623,7 +645,7 @@ def _train(options: argparse.Namespace, bar: "_Bar") -> _Result:
     from .training.candidates import write_weights
     from .training.train import read_config, train
 
-    model, config = read_config(options.config)
+    model, config = read_config(options.config, options.set)
     if options.minutes is not None:
         config = replace(config, minutes_flow=options.minutes)
     device = ranks.device_of(options.device)
@@ -644,7 +666,7 @@ def _train(options: argparse.Namespace, bar: "_Bar") -> _Result:
     )
     if ranks.rank():
         return None
-    write_weights(options.output, options.dataset, file)
+    write_weights(options.output, options.dataset, file, device)
     return {"weights": str(file)}, f"Written to {file}"
 
 
@@ -678,6 +700,25 @@ def _cool(options: argparse.Namespace, _bar: "_Bar") -> _Result:
     require_writable(options.output / "weights")
     file = cooled(options.training, options.dataset, options.output, options.minutes, device)
     return {"weights": str(file)}, f"Written to {file}"
+
+
+def _carry(options: argparse.Namespace, bar: "_Bar") -> _Result:
+    from .data.packed import is_packed, pack, unpack
+
+    source, output = options.folder, options.output
+    if source.resolve() == output.resolve():
+        raise InputError("What is carried goes to another folder than its own; name another.")
+    require_writable(output / "dataset.json")
+    if any(source.glob("*.checkpoint")):
+        from .training.checkpoints import slim_run
+
+        files = [str(file) for file in slim_run(source, output)]
+        return {"files": files}, "\n".join(files)
+    if is_packed(source):
+        windows = unpack(source, output, bar)
+    else:
+        windows = pack(source, output, options.mebibytes, bar)
+    return {"windows": windows}, f"{windows} windows written to {output}"
 
 
 def _evaluate(options: argparse.Namespace, bar: "_Bar") -> _Result:

@@ -7,16 +7,17 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
+from lzma import LZMAError
 from math import prod
 from pathlib import Path
 from tokenize import TokenError
-from zipfile import ZIP_DEFLATED, ZIP_STORED, BadZipFile, ZipFile
+from zipfile import ZIP_DEFLATED, ZIP_LZMA, ZIP_STORED, BadZipFile, ZipFile
 
 import numpy as np
 
 from ..core.errors import InputError
 
-__all__ = ["names_in", "read_arrays"]
+__all__ = ["mapped_arrays", "names_in", "read_arrays"]
 
 _SPARE, _PACKED = 100_000_000, 20
 """An archive may unpack to so many bytes, and to so many times its own size; motion is packed to a
@@ -28,6 +29,7 @@ _DAMAGE = (
     BadZipFile,
     EOFError,
     KeyError,
+    LZMAError,
     NotImplementedError,
     OSError,
     OverflowError,
@@ -97,6 +99,29 @@ def read_arrays(file: Path, *names: str) -> list[np.ndarray]:
             raise ValueError(
                 f"it would unpack to {unpacked / 1e6:.0f} MB, which no motion of its size does"
             )
-        if any(info.compress_type not in (ZIP_STORED, ZIP_DEFLATED) for info in infos):
+        if any(info.compress_type not in (ZIP_STORED, ZIP_DEFLATED, ZIP_LZMA) for info in infos):
             raise ValueError("it is packed as no .npz is")
         return [_array(info.filename, archive.read(info)) for info in infos]
+
+
+def mapped_arrays(file: Path) -> dict[str, np.ndarray]:
+    """The arrays in an archive that is not compressed, where they lie on disk: no memory is taken
+    but for what is read of them, and that is given back when others need it. What is written into
+    them stays in memory. Raises InputError where it is compressed, or damaged.
+    """
+    arrays: dict[str, np.ndarray] = {}
+    with _opened(file) as archive, file.open("rb") as data:
+        for info in archive.infolist():
+            if info.compress_type != ZIP_STORED:
+                raise ValueError(f"'{info.filename}' is compressed")
+            data.seek(info.header_offset + 26)  # where the lengths of name and extra field stand
+            data.seek(sum(struct.unpack("<HH", data.read(4))), 1)
+            version = np.lib.format.read_magic(data)
+            if version != (1, 0):
+                raise ValueError(f"'{info.filename}' is an array of version {version}")
+            shape, _, dtype = np.lib.format.read_array_header_1_0(data)
+            if dtype.kind not in _KINDS:
+                raise ValueError(f"'{info.filename}' holds neither numbers nor text")
+            name = info.filename.removesuffix(".npy")
+            arrays[name] = np.memmap(file, dtype, "c", data.tell(), shape)
+    return arrays

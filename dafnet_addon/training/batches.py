@@ -4,7 +4,7 @@ modes drawn for each.
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from torch import Tensor
 
 from ..core.sensor import RADIUS, REACH, SPHERES
 from ..core.skeleton import END_EFFECTORS, MODEL_ORDER, UPPER, UPPER_SIZE, model_order
+from ..data.archive import mapped_arrays
 from ..data.flesh import NO_BANK
 from ..data.prepare import POSE_UNIT, load_pool
 from ..data.shapes import ShapeBank
@@ -36,7 +37,9 @@ _PELVIS = MODEL_ORDER.index(0)
 NOISE = 0.003
 """Dequantisation (metres): constant bone lengths would else make the likelihood unbounded."""
 _SEGMENTS = 4
+_ROOM = "boxes", "shapes", "root"  # what the sensor's sight is made of
 _AT_ONCE = 2  # windows: what is computed of them stays in a core's cache
+_AT_ONCE_ELSEWHERE = 50  # windows: enough to keep another device busy
 _FREE, _EE, _FULL = range(3)
 
 
@@ -54,18 +57,23 @@ class Statistics:
     ahead_std: np.ndarray
 
     @staticmethod
-    def of(poses: np.ndarray, velocity: np.ndarray, ahead: np.ndarray) -> "Statistics":
-        """Of poses (…, 66) in SMPL order, metres, velocities (…, 3) and ways ahead (…, 18)."""
-        flat = model_order(poses.reshape(-1, 66)).astype(float)
-        speed, way = (a.reshape(-1, a.shape[-1]).astype(float) for a in (velocity, ahead))
-        return Statistics(
-            flat.mean(0),
-            np.maximum(flat.std(0), 0.01),
-            speed.mean(0),
-            np.maximum(speed.std(0), 1e-3),
-            way.mean(0),
-            np.maximum(way.std(0), 1e-2),
-        )
+    def of(shards: Iterable[Mapping[str, np.ndarray]]) -> "Statistics":
+        """Of all windows of some shards, as they are stored; of one shard after another, so that
+        no more of them than one is in memory.
+        """
+        sums: dict[str, np.ndarray] = {}
+        for shard in shards:
+            for name, unit in (("poses", POSE_UNIT), ("velocity", 1.0), ("ahead", 1.0)):
+                values = unit * shard[name].reshape(-1, shard[name].shape[-1]).astype(float)
+                powers = np.stack([np.ones(values.shape[1]), values.mean(0), (values**2).mean(0)])
+                sums[name] = sums.get(name, 0.0) + len(values) * powers
+        found = []
+        for name, least in (("poses", 0.01), ("velocity", 1e-3), ("ahead", 1e-2)):
+            count, mean, square = sums[name]
+            spread = np.sqrt(np.maximum(square / count - (mean / count) ** 2, 0.0))
+            for values in (mean / count, np.maximum(spread, least)):
+                found.append(model_order(values) if name == "poses" else values)
+        return Statistics(*found)
 
 
 @dataclass(frozen=True)
@@ -107,29 +115,35 @@ def seen(file: Path, bank: DeviceBank) -> np.ndarray:
     kept = file.with_suffix(".seen.npy")
     if not kept.exists():
         shard = load_pool([file])
-        boxes, shapes, root = (
-            torch.from_numpy(shard[name]) for name in ("boxes", "shapes", "root")
-        )
+        boxes, shapes, root = (torch.from_numpy(shard[name]) for name in _ROOM)
         part = file.with_suffix(f".{os.getpid()}.npy")
         out = np.lib.format.open_memmap(part, "w+", np.uint8, (*root.shape[:2], len(SPHERES)))
         for k in range(0, len(root), _AT_ONCE):
             some = slice(k, k + _AT_ONCE)
-            out[some] = _sensed(boxes[some], shapes[some], root[some], bank).numpy()
+            out[some] = sensed([boxes[some], shapes[some], root[some]], bank).numpy()
         out.flush()
         part.rename(kept)
     return np.load(kept, mmap_mode="r")
 
 
-def _sensed(boxes: Tensor, shapes: Tensor, root: Tensor, bank: DeviceBank) -> Tensor:
-    """What the sensor sees of boxes and shapes along root paths, in bytes (B, T, 2640)."""
+def on_disk(device: torch.device) -> bool:
+    """Whether what the sensor sees is read from disk."""
+    return device.type == "cpu"
+
+
+def sensed(room: Sequence[Tensor], bank: DeviceBank) -> Tensor:
+    """What the sensor sees in bytes (B, T, 2640) of a window's ``_ROOM``."""
+    boxes, shapes, root = room
     found = torch.maximum(occupancy_of(boxes, root), bank.occupancy(shapes, root))
     return (255.0 * found).round().to(torch.uint8)
 
 
 class Pool:
     """Windows of a dataset, sent to a device batch by batch. New shards may be written while
-    training goes on: ``refresh`` takes them in. A CPU reads what the sensor sees from disk (see
-    ``seen``), since making it costs as much as a step of training; other devices make it.
+    training goes on: ``refresh`` takes them in. They stay on disk, in the system's cache while it
+    has room. What the sensor sees costs as much as a step of training: for a CPU it is made once
+    and lies on disk beside them (see ``seen``); other devices make it when they take in a shard
+    and keep it (185 kB a window) while half of their memory is free, else at every step.
     """
 
     def __init__(
@@ -137,6 +151,7 @@ class Pool:
     ) -> None:
         self.files, self.device, self.bank = files, device, DeviceBank(bank, device)
         self.shards: dict[Path, dict[str, np.ndarray]] = {}
+        self.sensed: dict[Path, Tensor] = {}
         self.refresh()
 
     def __len__(self) -> int:
@@ -146,36 +161,65 @@ class Pool:
         """Read the shards that were not there before."""
         for file in self.files():
             if file not in self.shards:
-                self.shards[file] = load_pool([file])
-                if self.device.type == "cpu":
+                self.shards[file] = mapped_arrays(file)
+                if on_disk(self.device):
                     self.shards[file]["seen"] = seen(file, self.bank)
+                elif self._has_room():
+                    self.sensed[file] = self._of_shard(self.shards[file])
         self.ends = np.cumsum([len(shard["poses"]) for shard in self.shards.values()])
 
     def statistics(self, most: int = 20) -> Statistics:
         """Means and deviations over the windows of the first shards."""
-        shards = list(self.shards.values())[:most]
-        poses, velocity, ahead = (
-            np.concatenate([shard[name] for shard in shards])
-            for name in ("poses", "velocity", "ahead")
-        )
-        return Statistics.of(poses * np.float32(POSE_UNIT), velocity, ahead)
+        return Statistics.of(list(self.shards.values())[:most])
 
     def windows(self, rows: Tensor, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Fields of windows ``rows`` (whole numbers, on the CPU) as they are stored (see
         ``data.prepare.load_pool``).
         """
-        shards = list(self.shards.values())
+        places = self._places(rows)
+        return {
+            name: np.stack([self.shards[file][name][row] for file, row in places]) for name in names
+        }
+
+    def _places(self, rows: Tensor) -> list[tuple[Path, int]]:
+        """The shard of each of these windows, and its row there."""
+        files = list(self.shards)
         which = np.searchsorted(self.ends, rows.numpy(), side="right")
         first = np.concatenate([[0], self.ends])[which]
-        places = list(zip(which, rows.numpy() - first, strict=True))
-        return {name: np.stack([shards[s][name][r] for s, r in places]) for name in names}
+        return [(files[s], int(r)) for s, r in zip(which, rows.numpy() - first, strict=True)]
 
     def _rows(self, rows: Tensor) -> dict[str, Tensor]:
         names = [name for name in next(iter(self.shards.values())) if name != "kinds"]
-        return {
+        fields = {
             name: torch.from_numpy(a).to(self.device)
             for name, a in self.windows(rows, names).items()
         }
+        if "seen" not in fields:
+            fields["seen"] = self._seen(rows, fields)
+        return fields
+
+    def _seen(self, rows: Tensor, fields: dict[str, Tensor]) -> Tensor:
+        """What the sensor sees of windows (B, T, 2640), in bytes: kept on the device, or made."""
+        places = self._places(rows)
+        kept = {k: self.sensed[f][row] for k, (f, row) in enumerate(places) if f in self.sensed}
+        rest = [k for k in range(len(places)) if k not in kept]
+        if rest:
+            made = sensed([fields[name][rest] for name in _ROOM], self.bank)
+            kept.update(zip(rest, made, strict=True))
+        return torch.stack([kept[k] for k in range(len(places))])
+
+    def _of_shard(self, shard: dict[str, np.ndarray]) -> Tensor:
+        """What the sensor sees of all windows of a shard (N, T, 2640), on the device."""
+        room = [torch.from_numpy(np.array(shard[name])).to(self.device) for name in _ROOM]
+        pieces = zip(*(values.split(_AT_ONCE_ELSEWHERE) for values in room), strict=True)
+        return torch.cat([sensed(some, self.bank) for some in pieces])
+
+    def _has_room(self) -> bool:
+        """Whether half of the device's memory is free."""
+        if self.device.type != "cuda":
+            return False
+        free, total = torch.cuda.mem_get_info(self.device)
+        return free > total // 2
 
     def batch(
         self, rows: Tensor, statistics: Statistics, config: ModelConfig, noise: float = NOISE
@@ -194,24 +238,21 @@ class Pool:
                 "ahead_std",
             )
         )
-        a, history = self._rows(rows), config.history
+        fields, history = self._rows(rows), config.history
         order = torch.as_tensor(model_order(np.arange(66)), device=self.device)
-        poses = a["poses"].float()[..., order] * POSE_UNIT
+        poses = fields["poses"].float()[..., order] * POSE_UNIT
         poses = (poses + noise * torch.randn_like(poses) - mean) / std
-        step = a["velocity"]
+        step = fields["velocity"]
         velocity = (step - v_mean) / v_std
-        way = ((a["ahead"] - a_mean) / a_std)[..., : config.ahead]
+        way = ((fields["ahead"] - a_mean) / a_std)[..., : config.ahead]
         known = torch.ones_like(way[..., : int(config.ahead_mask)])
         now = poses[:, history:]
-        found = a.get("seen")
-        if found is None:
-            found = _sensed(a["boxes"], a["shapes"], a["root"], self.bank)
         return Batch(
             past_of(poses, velocity, history),
             now[..., :UPPER_SIZE],
             now[..., UPPER_SIZE:],
             torch.cat([velocity[:, history:], way, known], dim=-1),
-            found,
+            fields["seen"],
             step[:, history:],
         )
 

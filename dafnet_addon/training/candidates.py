@@ -65,12 +65,17 @@ def _parts_there(folder: Path) -> tuple[str, ...]:
     return ()
 
 
-def write_weights(folder: Path, dataset: Path, file: Path) -> None:
+def write_weights(folder: Path, dataset: Path, file: Path, device: str = "cpu") -> None:
     """Write the averaged weights of a run's latest checkpoints, with what ``account`` says of
-    them.
+    them. How far takes differ is measured on ``device``.
     """
     flow, predictor, statistics = trained(folder)
-    noise = take_noise(flow, predictor, dataset_pool(dataset), statistics)
+    networks = [network for network in (flow, predictor) if network is not None]
+    for network in networks:
+        network.to(device)
+    noise = take_noise(flow, predictor, dataset_pool(dataset, device), statistics)
+    for network in networks:
+        network.cpu()
     export(file, flow, predictor, statistics, account(folder, dataset), noise)
 
 
@@ -92,7 +97,7 @@ def cooled(
     begun = Run.load(_parts(out)[-1], out)
     train(dataset, out, begun.model, begun.config, device=device)
     file = out / f"{begun.model.system}.safetensors"
-    write_weights(out, dataset, file)
+    write_weights(out, dataset, file, device)
     return file
 
 

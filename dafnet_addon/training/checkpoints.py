@@ -4,7 +4,8 @@ of it is executed.
 A checkpoint is a safetensors file: "network.NAME" and, of each parameter that has been moved, the
 optimiser's "optimiser.NAME.KEY"; "generator.DEVICE"; and what else its trainer keeps. The
 metadata's "state" is JSON with the numbers, words and settings beside them. Everything is checked
-against the network that the settings describe before it is used.
+against the network that the settings describe before it is used. A slim one (``slim``) holds the
+averaged weights alone, in half precision: a run goes on from it with an optimiser that begins anew.
 """
 
 import json
@@ -14,26 +15,32 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor, nn
 
-from ..core.errors import InputError
+from ..core.errors import InputError, WeightsError
 from ..core.files import whole_file
 from ..core.text import read_json
+from ..core.weights import read_safetensors, write_safetensors
 
 __all__ = [
+    "HELD",
     "Checkpoint",
     "checkpoint_file",
     "generators",
     "of_training",
     "set_generators",
+    "slim",
+    "slim_run",
     "typed",
     "write_checkpoint",
 ]
 
 _FORMAT, _PICKLED = "dafnet-training-1", ".pt"
+_AVERAGED = "averaged."
+HELD = "-held"
+"""Behind the name of a part: its checkpoint from before its rate fell."""
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
 
 Settings = TypeVar("Settings")
@@ -77,9 +84,9 @@ def of_training(network: nn.Module, optimiser: torch.optim.Optimizer) -> dict[st
 
 def write_checkpoint(file: Path, tensors: Mapping[str, Tensor], state: Mapping[str, Any]) -> None:
     """Write tensors, and a state that JSON can hold, whole or not at all."""
-    plain = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
+    plain = {name: tensor.detach().cpu().numpy() for name, tensor in tensors.items()}
     with whole_file(file) as part:
-        save_file(plain, part, {"format": _FORMAT, "state": json.dumps(state)})
+        write_safetensors(part, plain, {"format": _FORMAT, "state": json.dumps(state)})
 
 
 @dataclass(frozen=True)
@@ -100,16 +107,14 @@ class Checkpoint:
         if path.suffix == _PICKLED:
             raise _pickled(path)
         try:
-            with safe_open(path, "pt") as file:
-                words = file.metadata() or {}
-                if words.get("format") != _FORMAT:
-                    raise InputError(
-                        f"'{path}' is not a checkpoint of this version; "
-                        "train anew in another folder."
-                    )
-                tensors = {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
-        except (OSError, SafetensorError) as error:
-            raise _refused(path, f"it cannot be read: {error}") from None
+            arrays, words = read_safetensors(path)
+        except WeightsError as error:
+            raise _refused(path, f"it cannot be read: {str(error).split(';')[0]}") from None
+        if words.get("format") != _FORMAT:
+            raise InputError(
+                f"'{path}' is not a checkpoint of this version; train anew in another folder."
+            )
+        tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
         try:
             state = read_json(words.get("state", ""))
         except ValueError as error:
@@ -148,13 +153,19 @@ class Checkpoint:
         return text
 
     def tensor(self, name: str, like: Tensor) -> Tensor:
-        """A tensor of the same shape and type as ``like``. Raises InputError where it is missing or
-        another.
+        """A tensor of the same shape and type as ``like``, or half as wide and widened. Raises
+        InputError where it is missing or another.
         """
         tensor = self.tensors.get(name)
-        if tensor is None or tensor.shape != like.shape or tensor.dtype != like.dtype:
+        kinds = (like.dtype, torch.half) if like.dtype == torch.float else (like.dtype,)
+        if tensor is None or tensor.shape != like.shape or tensor.dtype not in kinds:
             raise self.refused(f"'{name}' is missing, or of another shape or type")
-        return tensor
+        return tensor.to(like.dtype)
+
+    @property
+    def is_slim(self) -> bool:
+        """Whether it holds the averaged weights alone."""
+        return not any(name.startswith(_AVERAGED) for name in self.tensors)
 
     def fits(self, network: nn.Module) -> None:
         """Raise InputError where the file's network is another than this one, whose tensors may be
@@ -200,6 +211,41 @@ class Checkpoint:
             set_generators(states, device)
         except (KeyError, RuntimeError, TypeError):
             raise self.refused("the state of its generators") from None
+
+
+def slim(kept: Checkpoint, file: Path) -> None:
+    """Write a run's checkpoint so that it travels: what it has learnt, averaged and in half
+    precision, without what the optimiser knows: an eighth of its size.
+    """
+    learnt = {
+        f"network.{name.removeprefix(_AVERAGED)}": tensor
+        for name, tensor in kept.tensors.items()
+        if name.startswith(_AVERAGED)
+    }
+    tensors = {
+        name: tensor.half() if name in learnt else tensor
+        for name, tensor in {**kept.tensors, **learnt}.items()
+        if name.split(".")[0] in ("network", "generator", "statistics")
+    }
+    write_checkpoint(file, tensors, kept.state)
+
+
+def slim_run(folder: Path, out: Path) -> list[Path]:
+    """Write what of a run's folder is worth carrying to ``out``: its checkpoints slim, its log and
+    the weights that it has given. The files that were written.
+    """
+    written = []
+    for file in sorted(folder.glob("*.checkpoint")):
+        # One from before the rate fell is of use where the optimiser is.
+        if not file.stem.endswith(HELD):
+            slim(Checkpoint.read(file), out / file.name)
+            written.append(out / file.name)
+    for file in [*sorted(folder.glob("*.safetensors")), folder / "log.jsonl"]:
+        if file.exists():
+            with whole_file(out / file.name) as part:
+                part.write_bytes(file.read_bytes())
+            written.append(out / file.name)
+    return written
 
 
 def generators(device: torch.device) -> dict[str, Tensor]:

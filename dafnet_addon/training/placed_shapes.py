@@ -11,7 +11,9 @@ from ..data.shapes import DEEPEST, FARTHEST, ShapeBank
 
 __all__ = ["DeviceBank"]
 
-_AT_ONCE = 256  # pairs of a root and a shape: what is computed of them is 2640 points each
+# Pairs of a root and a shape, of which 2640 points each are computed: what stays in a core's cache;
+# enough to keep another device busy.
+_AT_ONCE, _AT_ONCE_ELSEWHERE = 256, 4096
 _STEP = (FARTHEST - DEEPEST) / 255.0
 
 
@@ -59,7 +61,8 @@ class DeviceBank:
         numbers = placed[..., 0].long()
         apart = (placed[:, None, :, 1:3] - root[:, :, None, :2]).norm(dim=-1)
         near = (numbers >= 0)[:, None] & (apart < self.reaches[numbers.clamp_min(0)][:, None])
-        for some in torch.nonzero(near).split(_AT_ONCE):
+        at_once = _AT_ONCE if root.device.type == "cpu" else _AT_ONCE_ELSEWHERE
+        for some in torch.nonzero(near).split(at_once):
             window, frame, which = some.unbind(1)
             found = self._seen(placed[window, which], root[window, frame])
             # A frame that sees two shapes stands twice among the rows.

@@ -12,11 +12,11 @@ import math
 import multiprocessing
 import time
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,7 @@ from ..model.systems import system_named
 from . import precision, ranks
 from .batches import Batch, Pool, Statistics, chance, observation_for
 from .checkpoints import (
+    HELD,
     Checkpoint,
     checkpoint_file,
     generators,
@@ -69,7 +70,6 @@ __all__ = [
 ]
 
 _MAX_NUMBERS = 1 << 28
-_HELD = "-held"  # behind the name of a part: its checkpoint from before its rate fell
 """Of the networks that a checkpoint's settings describe: a GB; the paper's sizes are a seventh of
 it.
 """
@@ -80,11 +80,13 @@ class TrainingConfig:
     """``minutes_predictor``, ``minutes_flow``: time budgets; ``steps_flow``, where not 0, is the
     flow's instead. Learning rates rise over ``warmup`` steps to ``peak``, stay there, and fall
     straight to ``final`` over the last ``cool_down`` share of the budget: a run that gets a larger
-    budget goes on from before it cooled. What a run is worth are its weights averaged over about 1
-    / (1 - ``average``) steps. ``slot_dropout``: share of past-pose slots hidden from the predictor
-    while it learns, and of past poses hidden from MoGlow. ``environment_dropout``: share of sensor
-    values hidden from all, in a share ``dropout_windows`` of the windows (the paper hides them in
-    all; then only whole layers of spheres are told apart, and seats are met to 12 cm).
+    budget goes on from before it cooled. ``noam``: from ``peak`` they fall as one over the root of
+    the steps instead, to ``final``, as in the paper (Vaswani et al. 2017). What a run is worth are
+    its weights averaged over about 1 / (1 - ``average``) steps. ``slot_dropout``: share of past
+    poses hidden from the predictor while it learns, number by number, and from MoGlow.
+    ``environment_dropout``: share of sensor values hidden from all, in a share ``dropout_windows``
+    of the windows (the paper hides them in all; then only whole layers of spheres are told apart,
+    and seats are met to 12 cm).
     ``ahead_hidden``: share of windows in which the way ahead is hidden, as it is from a live root.
     ``clip_norm``: largest gradient norm. ``free_run``: weight of the losses of motion that the flow
     makes by itself (see ``free_run``; 0 as in the paper), which begins after ``captured`` frames of
@@ -101,6 +103,7 @@ class TrainingConfig:
     peak: float = 2e-3
     final: float = 1e-4
     cool_down: float = 0.3
+    noam: bool = False
     average: float = 0.99
     slot_dropout: float = 0.95
     environment_dropout: float = 0.5
@@ -134,14 +137,17 @@ class TrainingConfig:
 
     def rate(self, step: int, share: float) -> float:
         """Learning rate of the step after ``step`` steps, ``share`` of the budget being spent."""
+        rising = (step + 1) / self.warmup
+        if self.noam:
+            return max(self.final, self.peak * min(rising, rising**-0.5))
         left = (1.0 - share) / self.cool_down if self.cool_down else 1.0
         rate = self.final + (self.peak - self.final) * min(1.0, left)
-        return rate * min(1.0, (step + 1) / self.warmup)
+        return rate * min(1.0, rising)
 
 
-def read_config(file: Path) -> tuple[ModelConfig, TrainingConfig]:
+def read_config(file: Path, changes: Sequence[str] = ()) -> tuple[ModelConfig, TrainingConfig]:
     """Model and training configuration of a TOML file: ``preset``, ``[model]`` and ``[training]``
-    override the defaults.
+    override the defaults, and ``changes``, as "width=384", what the file says.
 
     Raises InputError where the file cannot be read, or a setting is unknown, of another type or out
     of range.
@@ -165,6 +171,9 @@ def read_config(file: Path) -> tuple[ModelConfig, TrainingConfig]:
             raise ValueError(
                 f"unknown setting '{min(table, default='model')}' outside of [model] and [training]"
             )
+        sizes = {field.name for field in fields(ModelConfig)}
+        for name, value in tomllib.loads("\n".join(changes)).items():
+            (given if name in sizes else training)[name] = value
         return typed(ModelConfig, {**presets[preset], **given}), typed(TrainingConfig, training)
     except ValueError as error:
         raise InputError(
@@ -323,8 +332,9 @@ class Run:
         settings = config or kept.settings(TrainingConfig, "config")
         run = Run(part, folder, model, settings, _statistics_of(kept), device)
         kept.restore(run.network, run.optimiser)
+        learnt = "network" if kept.is_slim else "averaged"
         run.averaged = {
-            key: kept.tensor(f"averaged.{key}", like).to(run.device)
+            key: kept.tensor(f"{learnt}.{key}", like).to(run.device)
             for key, like in run.averaged.items()
         }
         run.step, run.seconds = kept.progress()
@@ -531,8 +541,6 @@ def train_part(
     smaller sizes. A loss that is not a number stops the run with the last good checkpoint kept.
     Shards that 'prepare' is still writing are taken in as they come.
     """
-    from torch.utils.tensorboard import SummaryWriter
-
     if threads is not None:
         torch.set_num_threads(threads)
     device = ranks.device_of(device)
@@ -574,7 +582,8 @@ def train_part(
             run.gmvae.load_state_dict(network.state_dict())
         run.gmvae.requires_grad_(False)
     recent: list[torch.Tensor] = []
-    writer = SummaryWriter(str(folder / "tensorboard" / part)) if ranks.rank() == 0 else None
+    leads = ranks.rank() == 0
+    curves = _curves(folder / "tensorboard" / part) if leads else None
     clock = clock_of(run.device)
     while run.share < 1.0:
         begin, held_its_rate = clock(), not run.cools
@@ -590,8 +599,8 @@ def train_part(
         if run.step % config.save_every == 0:
             torch.stack(recent).mean().item()  # what a device still has to do is counted too
         run.seconds = ranks.mean(run.seconds + clock() - begin, run.device)
-        if held_its_rate and run.cools and writer is not None:
-            run.save(f"{part}{_HELD}")
+        if held_its_rate and run.cools and leads:
+            run.save(f"{part}{HELD}")
         if run.step % config.save_every == 0 or run.share >= 1.0:
             mean = ranks.mean(float(torch.stack(recent).mean()), run.device)
             if not math.isfinite(mean):
@@ -601,7 +610,7 @@ def train_part(
                 )
             with run.with_average():
                 held_out = run.held_loss(held)
-            if writer is not None:
+            if leads:
                 values = {
                     "part": part,
                     "step": run.step,
@@ -616,8 +625,9 @@ def train_part(
                 # once, by the next one.
                 with (folder / "log.jsonl").open("a", encoding="utf-8") as f:
                     f.write(json.dumps(values) + "\n")
-                for name in ("loss", "held_out", "windows"):
-                    writer.add_scalar(name, values[name], run.step)
+                if curves is not None:
+                    for name in ("loss", "held_out", "windows"):
+                        curves.add_scalar(name, values[name], run.step)
             recent.clear()
             pool.refresh()
     return run
@@ -625,15 +635,24 @@ def train_part(
 
 def before_it_cooled(part: str, folder: Path) -> Run:
     """The saved run as it is; where its rate has begun to fall, as it was before that."""
-    run, name = Run.load(part, folder), f"{part}{_HELD}"
+    run, name = Run.load(part, folder), f"{part}{HELD}"
     if run.cools and checkpoint_file(folder, name).exists():
         return Run.load(part, folder, name=name)
     return run
 
 
+def _curves(folder: Path) -> Any:
+    """What writes a run's curves for TensorBoard; None where that is not installed."""
+    try:
+        from torch.utils.tensorboard import SummaryWriter
+    except ImportError:
+        return None
+    return SummaryWriter(str(folder))
+
+
 def _resumed(part: str, folder: Path, config: TrainingConfig, device: str) -> Run:
     """The saved run; where its budget has grown since its rate fell, as it was before that."""
-    name = f"{part}{_HELD}"
+    name = f"{part}{HELD}"
     if checkpoint_file(folder, name).exists():
         run = Run.load(part, folder, config, device, name)
         # A share of the old budget in which the rate fell is less of a new one.

@@ -264,10 +264,10 @@ _BESIDES_NUMPY = {
 @pytest.mark.parametrize(
     ("arguments", "lacks"),
     [
-        (["train", "config.toml", "data", "-o", "new"], "torch and tensorboard and safetensors"),
+        (["train", "config.toml", "data", "-o", "new"], "torch"),
         (["evaluate", "folder", "-o", "new"], "torch and matplotlib"),
         (["evaluate", "folder"], "torch"),
-        (["evaluate", "folder", "--weights", "samp.checkpoint"], "torch and safetensors"),
+        (["evaluate", "folder", "--weights", "samp.checkpoint"], "torch"),
         (["evaluate", "folder", "--sheets", "new"], "torch and matplotlib and pillow"),
         (["prepare", "folder", "-o", "new"], "matplotlib"),
         (["bench", "speed"], "torch"),

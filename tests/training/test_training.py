@@ -24,9 +24,10 @@ from dafnet_addon.core.errors import InputError, WeightsError  # noqa: E402
 from dafnet_addon.core.progress import run_to_end  # noqa: E402
 from dafnet_addon.core.root import RootPath  # noqa: E402
 from dafnet_addon.core.sampler import Conditions, Sampler  # noqa: E402
-from dafnet_addon.core.skeleton import MODEL_ORDER  # noqa: E402
+from dafnet_addon.core.skeleton import MODEL_ORDER, model_order  # noqa: E402
 from dafnet_addon.core.weights import load_weights  # noqa: E402
 from dafnet_addon.data import boxes as boxes_module  # noqa: E402
+from dafnet_addon.data.prepare import POSE_UNIT  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.model.flow import (  # noqa: E402
     BodyFlow,
@@ -35,7 +36,7 @@ from dafnet_addon.model.flow import (  # noqa: E402
 )
 from dafnet_addon.model.predictor import ActionPredictor  # noqa: E402
 from dafnet_addon.model.systems import sampler_of, system_named  # noqa: E402
-from dafnet_addon.training import precision  # noqa: E402
+from dafnet_addon.training import batches, precision  # noqa: E402
 from dafnet_addon.training import train as training  # noqa: E402
 from dafnet_addon.training.batches import (  # noqa: E402
     Pool,
@@ -213,6 +214,15 @@ def test_a_rate_holds_then_falls_and_a_larger_budget_goes_on_from_before_it_fell
         assert torch.equal(value, once.averaged[name])
 
 
+def test_the_papers_rate_rises_to_its_peak_and_falls_as_one_over_the_root_of_the_steps():
+    _, config = read_config(ROOT / "configs" / "paper.toml")
+    rates = {step: config.rate(step - 1, 0.99) for step in (1, 100, 500, 1000, 4000, 10**6)}
+    # init · √W · min(step · W^-1.5, step^-0.5) with W = 1000 and init = 1e-3, never below 1e-4
+    expected = {1: 1e-4, 100: 1e-4, 500: 5e-4, 1000: 1e-3, 4000: 5e-4, 10**6: 1e-4}
+    assert all(abs(rates[step] - rate) < 1e-12 for step, rate in expected.items())
+    assert not config.cool_down and config.batch == 50
+
+
 def test_what_is_exported_is_the_average(dataset, tmp_path):
     model = replace(TINY, system="moglow", steps_whole=1)
     config = replace(_config(1), steps_flow=6, average=0.9)
@@ -238,7 +248,7 @@ def test_a_loss_that_is_no_number_stops_with_the_last_good_state(dataset, tmp_pa
         pool = {name: z[name] for name in z.files}
     pool["velocity"] = pool["velocity"] * np.nan
     np.savez(dataset / "pool-0000.npz", **pool)
-    with pytest.raises(InputError, match="no number"):
+    with pytest.raises(InputError, match="not a number"):
         train_part("predictor", dataset, folder, TINY, _config(2))
     assert (folder / "predictor.checkpoint").read_bytes() == before
 
@@ -498,6 +508,45 @@ def test_what_a_cpu_reads_of_the_sensor_is_what_other_devices_make(dataset):
     made = occupancy_of(rows["boxes"], rows["root"])
     assert made.max() > 0.5 and (rows["seen"].float() / 255 - made).abs().max() < 0.5 / 255 + 1e-6
     assert (dataset / "pool-0000.seen.npy").exists() and len(_pool(dataset)) == 12
+
+
+@pytest.mark.parametrize("has_room", [False, True])
+def test_other_devices_make_it_once_where_there_is_room_and_else_at_every_step(
+    dataset, monkeypatch, has_room
+):
+    (dataset / "pool-0001.npz").write_bytes((dataset / "pool-0000.npz").read_bytes())
+    rows = torch.tensor([3, 15, 23, 0])
+    read = _pool(dataset)._rows(rows)["seen"]
+    pool = Pool(list, torch.device("cpu"))
+    pool.files = lambda: sorted(dataset.glob("pool-????.npz"))
+    monkeypatch.setattr(batches, "on_disk", lambda device: False)
+    # room for the first shard alone: the windows of a batch are then of both kinds
+    monkeypatch.setattr(pool, "_has_room", lambda: has_room and not pool.sensed)
+    pool.refresh()
+    assert len(pool.sensed) == has_room and "seen" not in pool.shards[dataset / "pool-0000.npz"]
+    assert torch.equal(pool._rows(rows)["seen"], read)
+
+
+def test_windows_stay_on_disk_and_what_is_read_of_them_is_what_was_written(dataset):
+    pool = _pool(dataset)
+    with np.load(dataset / "pool-0000.npz") as written:
+        (shard,) = pool.shards.values()
+        for name in written.files:
+            assert isinstance(shard[name], np.memmap) and (shard[name] == written[name]).all()
+
+
+def test_statistics_are_mean_and_deviation_of_all_shards_at_once(dataset):
+    with np.load(dataset / "pool-0000.npz") as shard:
+        one = {name: shard[name] for name in ("poses", "velocity", "ahead")}
+    two = {name: values[::2] + np.ones((), values.dtype) for name, values in one.items()}
+    found = Statistics.of([one, two])
+    poses, velocity = (
+        np.concatenate([one[name], two[name]]).astype(float) for name in ("poses", "velocity")
+    )
+    poses = model_order(poses.reshape(-1, 66) * POSE_UNIT)
+    assert np.allclose(found.pose_mean, poses.mean(0), atol=1e-12)
+    assert np.allclose(found.pose_std, np.maximum(poses.std(0), 0.01), atol=1e-9)
+    assert np.allclose(found.velocity_std, velocity.std((0, 1)), atol=1e-9)
 
 
 def test_configurations_are_read_and_bad_ones_refused(tmp_path):
