@@ -87,7 +87,7 @@ def pack(
     """
     shards = sorted(dataset.glob("pool-????.npz"))
     if not shards or not (dataset / _RECORD).exists():
-        raise InputError(f"'{dataset}' is no dataset; make one with 'dafnet prepare'.")
+        raise InputError(f"'{dataset}' is not a dataset; make one with 'dafnet prepare'.")
     left = int(mebibytes * 2**20)
     left -= _save(out / _RECORD, (dataset / _RECORD).read_bytes())
     left -= _save(out / f"{_PACKED}{_HELD}.npz", _windows(load_pool([dataset / "held.npz"])))

@@ -78,7 +78,7 @@ def test_so_many_windows_are_packed_as_there_is_room_for(dataset, tmp_path):
     assert unpack(tmp_path / "some", tmp_path / "whole") == packed
     with pytest.raises(InputError, match="allow more"):
         pack(dataset, tmp_path / "none", 1e-3)
-    with pytest.raises(InputError, match="is no dataset"):
+    with pytest.raises(InputError, match="is not a dataset"):
         pack(tmp_path / "all", tmp_path / "none")
 
 
@@ -164,7 +164,7 @@ def test_one_command_trains_on_a_machine_without_a_network_and_goes_on_on_anothe
     pack(_described(dataset), tmp_path / "packed")
     out, again = tmp_path / "out", tmp_path / "again"
     # Nothing but torch and NumPy is there.
-    (tmp_path / "sitecustomize.py").write_text(HIDDEN)
+    (tmp_path / "sitecustomize.py").write_text(HIDDEN, encoding="utf-8")
     common = (tmp_path / "packed", "--device", "cpu", "--minutes", "0.05")
     done = _on_gpu(*common, "-o", out, "--set", "steps_flow=20", without=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -180,7 +180,9 @@ def test_one_command_trains_on_a_machine_without_a_network_and_goes_on_on_anothe
         *common, "-o", again, "--set", "steps_flow=24", "--resume", out, without=tmp_path
     )
     assert done.returncode == 0, done.stderr
-    lines = [json.loads(line) for line in (again / "log.jsonl").read_text().splitlines()]
+    lines = [
+        json.loads(line) for line in (again / "log.jsonl").read_text(encoding="utf-8").splitlines()
+    ]
     steps = [line["step"] for line in lines if line["part"] == "upper"]
     assert steps == [10, 20, 24], "it went on from where it was, and tells of all"
 
