@@ -1,7 +1,7 @@
 """What each addition to the paper's model gives: narrow models, trained alike but for one thing,
 measured on held-out clips.
 
-    python benchmarks/ablation.py DATASET FOLDER -o RUNS --minutes 5 [--from WEIGHTS]
+    dafnet bench ablation DATASET FOLDER -o RUNS --minutes 5 [--from WEIGHTS]
 
 ``DATASET`` is made by ``dafnet prepare``, ``FOLDER`` holds its motion files. Every variant gets the
 same minutes, seeds and predictor; what is finished is kept. Writes ``ablation.md`` and
@@ -9,7 +9,7 @@ same minutes, seeds and predictor; what is finished is kept. Writes ``ablation.m
 earn it. With ``--from`` all begin with what those weights have learnt, and the variants that need
 other sizes are left out.
 
-    python benchmarks/ablation.py DATASET FOLDER -o RUNS --from WEIGHTS --furniture LIBRARY
+    dafnet bench ablation DATASET FOLDER -o RUNS --from WEIGHTS --furniture LIBRARY
 
 What real pieces of furniture give: ``DATASET`` was made with ``--furniture``; one of as many
 windows and the same seed is made of boxes alone. Weights trained on each from ``WEIGHTS`` on, in
@@ -20,7 +20,6 @@ Writes ``furniture.md`` and ``furniture.json``; the differences are paired, clip
 import argparse
 import json
 import shutil
-import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -30,7 +29,7 @@ from typing import Any
 
 import numpy as np
 
-from dafnet_addon.core.errors import DafnetError, InputError
+from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.files import save_text
 from dafnet_addon.core.threads import cores
 from dafnet_addon.core.weights import Weights, load_weights
@@ -264,9 +263,12 @@ def furniture(
     return text
 
 
-def main() -> int:
+def main(arguments: Sequence[str]) -> str:
+    """Run what the arguments ask for; the table as text."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        "dafnet bench ablation",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("dataset", type=Path)
     parser.add_argument("folder", type=Path)
@@ -279,27 +281,21 @@ def main() -> int:
     parser.add_argument(
         "--furniture", type=Path, metavar="LIBRARY", help="measure what its real pieces give"
     )
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     begin_with = load_weights(options.begin_with) if options.begin_with else None
     precision.announce(TRAINING.mixed)
     if options.furniture:
         if begin_with is None:
             parser.error("--furniture needs --from")
-        try:
-            print(
-                furniture(
-                    dataset=options.dataset,
-                    folder=options.folder,
-                    library=options.furniture,
-                    out=options.output,
-                    minutes=options.minutes,
-                    begin_with=begin_with,
-                )
-            )
-        except DafnetError as error:
-            print(f"ablation: {error}", file=sys.stderr)
-            return 1
-        return 0
+        return furniture(
+            dataset=options.dataset,
+            folder=options.folder,
+            library=options.furniture,
+            out=options.output,
+            minutes=options.minutes,
+            begin_with=begin_with,
+        )
+
     clips = captured(held_out(options.folder))[:: options.every]
     first = options.output / "predictor"
     if not checkpoint_file(first, "predictor").exists():
@@ -318,9 +314,4 @@ def main() -> int:
             json.dumps(results, indent=1), encoding="utf-8"
         )
         (options.output / "ablation.md").write_text(table(results) + "\n", encoding="utf-8")
-    print(table(results))
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return table(results)

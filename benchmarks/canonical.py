@@ -1,12 +1,14 @@
 """What fitting to the canonical body does to each source of motion: a table of distances and a
 picture of poses.
 
-Run as ``PYTHONPATH=. python benchmarks/canonical.py FOLDER PICTURE.png``; FOLDER holds motion
-capture, as ``dafnet_addon.data.mocap`` reads it.
+    dafnet bench canonical FOLDER PICTURE.png
+
+``FOLDER`` holds motion capture, as ``dafnet_addon.data.mocap`` reads it.
 """
 
-import sys
+import argparse
 from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -212,16 +214,21 @@ def picture(sources: dict[str, list[Pair]], file: Path) -> None:
     figure.savefig(file)
 
 
-def main(folder: Path, file: Path) -> None:
-    """Print the table and draw the picture of the compact sources in ``folder``."""
+def main(arguments: Sequence[str]) -> str:
+    """Draw the picture of the compact sources in a folder; the table as text."""
+    parser = argparse.ArgumentParser(
+        "dafnet bench canonical",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("picture", type=Path)
+    options = parser.parse_args(arguments)
+
     clips: dict[str, list[Clip]] = defaultdict(list)
-    for clip in read_clips(folder):
+    for clip in read_clips(options.folder):
         if clip.split:
             clips[clip.source].append(clip)
     sources = {source: pairs(own) for source, own in clips.items()}
-    print(table(sources))
-    picture(sources, file)
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]))
+    picture(sources, options.picture)
+    return table(sources)

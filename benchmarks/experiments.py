@@ -1,10 +1,10 @@
 """The paper's comparisons on open data: every system trained alike from nothing, then Tables 1 and
 2 (docs/experiments.md).
 
-    python benchmarks/experiments.py train DATASET -o RUNS --minutes 20
-    python benchmarks/experiments.py table1 FOLDER -o RUNS
-    python benchmarks/experiments.py table2 FOLDER -o RUNS
-    python benchmarks/experiments.py paired FOLDER -o RUNS
+    dafnet bench tables train DATASET -o RUNS --minutes 20
+    dafnet bench tables table1 FOLDER -o RUNS
+    dafnet bench tables table2 FOLDER -o RUNS
+    dafnet bench tables paired FOLDER -o RUNS
 
 ``DATASET`` is made by ``dafnet prepare``, ``FOLDER`` holds its motion files. All systems have the
 width of the weights that ship, the same windows, batches, learning rates, modes and sensor dropout,
@@ -19,7 +19,6 @@ than the two systems do, so that the tables' intervals cannot tell them apart.
 import argparse
 import json
 import shutil
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -363,9 +362,12 @@ def markdown(table: str, found: Mapping[str, Any]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def main() -> int:
+def main(arguments: Sequence[str]) -> str:
+    """Run what the arguments ask for; the table as text, nothing after a training."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        "dafnet bench tables",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     commands = parser.add_subparsers(dest="command", required=True)
     training = commands.add_parser("train")
@@ -378,26 +380,18 @@ def main() -> int:
         commands.add_parser(name).add_argument("folder", type=Path)
     for command in commands.choices.values():
         command.add_argument("-o", "--output", type=Path, required=True, metavar="RUNS")
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
+
     if options.command == "train":
         precision.announce(TRAINING.mixed)
         train(options.dataset, options.output, options.minutes, options.processes)
-        return 0
+        return f"Written to {options.output}"
+
     clips = {
         "The paper's kinds of furniture (composed)": paper_test(options.folder),
         "Every second captured clip of unseen bodies": captured(held_out(options.folder))[::2],
     }
     if options.command == "paired":
-        print(paired(clips, options.output, options.output))
-        return 0
-    try:
-        measure(options.command, clips, options.output, options.output)
-    except InputError as error:
-        print(f"experiments: {error}", file=sys.stderr)
-        return 1
-    print((options.output / f"{options.command}.md").read_text(encoding="utf-8"))
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+        return paired(clips, options.output, options.output)
+    measure(options.command, clips, options.output, options.output)
+    return (options.output / f"{options.command}.md").read_text(encoding="utf-8")

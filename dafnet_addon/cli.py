@@ -13,13 +13,13 @@ import io
 import json
 import math
 import os
-import runpy
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, TextIO
 
 from .core.checks import MAX_SEED
@@ -44,6 +44,10 @@ _PACKAGES = {"PIL": "pillow"}
 """The packages to install for modules that have other names than their package."""
 _MAX_SHOWN = 2000
 """Characters of a text from a file that are printed; --json gives all of it."""
+_MEASURES = ("seats", "speed")
+"""What ``bench`` measures of the weights."""
+_RESEARCH = {"ablation": "ablation", "canonical": "canonical", "tables": "experiments"}
+"""What ``bench`` runs for docs/training.md and docs/experiments.md, and the scripts that do it."""
 
 
 def main(
@@ -444,16 +448,22 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     bench = command(
         "bench",
         _bench,
-        "measure: 'seats' sits on ten heights from three sides; 'speed' times every system",
+        "measure: 'seats' sits on ten heights from three sides; 'speed' times every system; "
+        "'canonical' fits bodies to the skeleton; 'ablation' and 'tables' train and compare",
         part="../benchmarks",
-        needs=lambda o: ("torch",) if o.name == "speed" else (),
+        needs=lambda o: () if o.name in ("seats", "canonical") else ("torch",),
     )
-    bench.add_argument("name", choices=["seats", "speed"])
+    bench.add_argument("name", choices=[*_MEASURES, *_RESEARCH])
     bench.add_argument(
         "--weights",
         type=Path,
         metavar="FILE",
         help="trained weights; the ones that ship if left out",
+    )
+    bench.add_argument(
+        "arguments",
+        nargs=argparse.REMAINDER,
+        help="of 'ablation', 'canonical' and 'tables'; they say which with '-- --help'",
     )
 
     figures = command(
@@ -799,8 +809,14 @@ def _evaluate_samp(options: argparse.Namespace, clips: "list[HeldClip]", bar: "_
 
 
 def _bench(options: argparse.Namespace, bar: "_Bar") -> _Result:
-    found: _Result = _benchmark(options.name)["measure"](options.weights, bar)
-    return found
+    module = _benchmark(_RESEARCH.get(options.name, options.name))
+    if options.name in _MEASURES:
+        found: _Result = module.measure(options.weights, bar)
+        return found
+
+    arguments = options.arguments[options.arguments[:1] == ["--"] :]
+    text: str = module.main(arguments)
+    return text, text
 
 
 def _figures(options: argparse.Namespace, bar: "_Bar") -> _Result:
@@ -813,16 +829,19 @@ def _figures(options: argparse.Namespace, bar: "_Bar") -> _Result:
     require_writable(options.output / "figure.png")
     files = [
         str(file)
-        for file in _benchmark("figures")["draw"](
+        for file in _benchmark("figures").draw(
             options.output, options.weights, others, options.only, bar
         )
     ]
     return files, "\n".join(files)
 
 
-def _benchmark(name: str) -> dict[str, Any]:
-    """The names that a script in the folder of benchmarks defines."""
-    return runpy.run_path(str(Path(__file__).parents[1] / "benchmarks" / f"{name}.py"))
+def _benchmark(name: str) -> ModuleType:
+    """A script in the folder of benchmarks, as a module that its processes can import as well."""
+    checkout = str(Path(__file__).absolute().parents[1])
+    if checkout not in sys.path:
+        sys.path.insert(0, checkout)
+    return importlib.import_module(f"benchmarks.{name}")
 
 
 def _require(options: argparse.Namespace) -> None:
