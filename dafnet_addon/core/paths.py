@@ -251,6 +251,13 @@ def route(
     """Root path that rests at ``start``, passes the points and rests at every ``Stop``; it must end
     at a stop.
 
+    >>> start, goal = Stop((0.0, 0.0), yaw=0.0, seconds=1.0), Stop((1.0, 3.0), yaw=0.0)
+    >>> walked = route(start, (0.0, 2.0), goal)
+    >>> [(rest.start, rest.stop) for rest in walked.rests][0]
+    (0, 30)
+    >>> walked.path.position[-1].round(6).tolist()
+    [1.0, 3.0, 0.0]
+
     ``speed``: of walking, metres a second. ``floor``: height of the floor (metres). Raises
     InputError where points coincide or the path does not end at a stop.
     """
