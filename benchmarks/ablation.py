@@ -13,8 +13,9 @@ other sizes are left out.
 
 What real pieces of furniture give: ``DATASET`` was made with ``--furniture``; one of as many
 windows and the same seed is made of boxes alone. Weights trained on each from ``WEIGHTS`` on, in
-equal time, are measured beside those, on the bodies and makers that choose (``data/real_test.py``).
-Writes ``furniture.md`` and ``furniture.json``; the differences are paired, clip by clip.
+equal time, are measured beside those, on the bodies and makers that choose
+(``data/held_out/real.py``). Writes ``furniture.md`` and ``furniture.json``; the differences are
+paired, clip by clip.
 """
 
 import argparse
@@ -33,9 +34,9 @@ from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.files import save_text
 from dafnet_addon.core.threads import cores
 from dafnet_addon.core.weights import Weights, load_weights
-from dafnet_addon.data.held_out import HeldClip, held_out
-from dafnet_addon.data.prepare import prepare
-from dafnet_addon.data.real_test import real_test
+from dafnet_addon.data.dataset.prepare import prepare
+from dafnet_addon.data.held_out.captured import HeldClip, held_out
+from dafnet_addon.data.held_out.real import real_test
 from dafnet_addon.model.config import SMALL, ModelConfig
 from dafnet_addon.training import precision
 from dafnet_addon.training.checkpoints import checkpoint_file

@@ -3,7 +3,7 @@ picture of poses.
 
     dafnet bench canonical FOLDER PICTURE.png
 
-``FOLDER`` holds motion capture, as ``dafnet_addon.data.mocap`` reads it.
+``FOLDER`` holds motion capture, as ``dafnet_addon.data.capture.mocap`` reads it.
 """
 
 import argparse
@@ -18,9 +18,9 @@ from dafnet_addon.core.root import root_from_joints
 from dafnet_addon.core.rotations import rotate, transpose
 from dafnet_addon.core.series import MODEL_FPS, runs
 from dafnet_addon.core.skeleton import FEET, JOINTS, PARENTS, PELVIS, TOE_HEIGHT, WRISTS, joint
-from dafnet_addon.data.canonical import Calibration, calibrate, canonical
-from dafnet_addon.data.cuts import bad_frames
-from dafnet_addon.data.mocap import Clip, read_clips
+from dafnet_addon.data.capture.cuts import bad_frames
+from dafnet_addon.data.capture.mocap import Clip, read_clips
+from dafnet_addon.data.motion.canonical import Calibration, calibrate, canonical
 
 _PLANTED, _STILL = 0.25, 0.04  # metres a second: of a toe on the floor, of a hand that rests
 _TOES, _WRISTS = (

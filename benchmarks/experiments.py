@@ -33,8 +33,8 @@ from dafnet_addon.baselines.samp_evaluate import measured_samp
 from dafnet_addon.baselines.train import train_samp
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.weights import load_weights
-from dafnet_addon.data.held_out import HeldClip, held_out
-from dafnet_addon.data.paper_test import paper_test
+from dafnet_addon.data.held_out.captured import HeldClip, held_out
+from dafnet_addon.data.held_out.paper import paper_test
 from dafnet_addon.model.config import SMALL, ModelConfig
 from dafnet_addon.model.systems import system_named
 from dafnet_addon.training import precision

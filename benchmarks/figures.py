@@ -31,9 +31,9 @@ from dafnet_addon.core.sampler import Sampler
 from dafnet_addon.core.series import MODEL_FPS
 from dafnet_addon.core.skeleton import END_EFFECTORS, PELVIS, SEAT_TO_PELVIS, UPPER
 from dafnet_addon.core.weights import Weights
-from dafnet_addon.data.courses import AT_DESKS
-from dafnet_addon.data.retarget import at_seat_height, at_top_height
-from dafnet_addon.data.uses import working
+from dafnet_addon.data.motion.retarget import at_seat_height, at_top_height
+from dafnet_addon.data.motion.uses import working
+from dafnet_addon.data.synthesis.courses import AT_DESKS
 from dafnet_addon.demo import Place
 from dafnet_addon.model.systems import sampler_of
 

@@ -6,8 +6,8 @@ only, without Blender.
 >>> from dafnet_addon.core.paths import Stop, route
 >>> stool = Box(center=np.array([0.0, 0.0, 0.225]), half_size=np.array([0.2, 0.2, 0.225]))
 >>> seat = Stop((0.0, 0.0), yaw=0.0, seconds=2.0, seated=True)
->>> walked = route(Stop((1.5, 1.5), yaw=3.1, seconds=0.5), seat)
->>> take = generate(Scene([stool]), Controls(fps=30, root=walked.path.matrices()), load_weights())
+>>> walked = route(Stop((1.5, 1.5), yaw=3.1, seconds=0.5), seat, fps=24)
+>>> take = generate(Scene([stool]), Controls(fps=24, root=walked.path.matrices()), load_weights())
 >>> take.joints.shape == (len(walked.path), 22, 3)
 True
 >>> bool(abs(take.joints[-1, 0, 2] - 0.59) < 0.05)  # the pelvis, 14 cm over a stool of 45 cm

@@ -31,7 +31,7 @@ from .core.text import printable
 from .core.threads import cores
 
 if TYPE_CHECKING:
-    from .data.held_out import HeldClip
+    from .data.held_out.captured import HeldClip
 
 __all__ = ["main", "run"]
 
@@ -629,7 +629,7 @@ def _info(options: argparse.Namespace, _bar: "_Bar") -> _Result:
 
 
 def _prepare(options: argparse.Namespace, bar: "_Bar") -> _Result:
-    from .data.prepare import prepare
+    from .data.dataset.prepare import prepare
 
     require_writable(options.output / "dataset.json")
     prepare(
@@ -683,7 +683,7 @@ def _train(options: argparse.Namespace, bar: "_Bar") -> _Result:
 def _validate(options: argparse.Namespace, bar: "_Bar") -> _Result:
     import torch
 
-    from .data.real_test import real_test
+    from .data.held_out.real import real_test
     from .training.validation import BEST, recorded, said, validations
 
     torch.set_num_threads(options.processes)
@@ -713,7 +713,7 @@ def _cool(options: argparse.Namespace, _bar: "_Bar") -> _Result:
 
 
 def _carry(options: argparse.Namespace, bar: "_Bar") -> _Result:
-    from .data.packed import is_packed, pack, unpack
+    from .data.dataset.packed import is_packed, pack, unpack
 
     source, output = options.folder, options.output
     if source.resolve() == output.resolve():
@@ -733,7 +733,7 @@ def _carry(options: argparse.Namespace, bar: "_Bar") -> _Result:
 
 def _evaluate(options: argparse.Namespace, bar: "_Bar") -> _Result:
     from .core.weights import load_weights
-    from .data.held_out import held_out
+    from .data.held_out.captured import held_out
     from .training.export import annotate
     from .training.plots import plot
     from .training.report import contact_sheets, report, text
@@ -769,8 +769,8 @@ def _is_samp(weights: Path | None) -> bool:
 def _evaluate_among_real(options: argparse.Namespace, bar: "_Bar") -> _Result:
     """The test among real furniture: seats by kind, maker and body."""
     from .core.weights import load_weights
-    from .data.real_test import real_test
-    from .data.real_walks import real_walks
+    from .data.held_out.real import real_test
+    from .data.held_out.walks import real_walks
     from .training.real_report import real_page, real_report, real_text
 
     if options.save or options.sheets:

@@ -23,7 +23,7 @@ from ..core.kinematics import on_bones
 from ..core.root import RootPath, to_world
 from ..core.sampler import Conditions
 from ..core.skeleton import POSE_SIZE, smpl_order
-from ..data.held_out import HeldClip
+from ..data.held_out.captured import HeldClip
 from ..model.config import SENSOR_SIZE, ModelConfig
 from ..training import precision
 from ..training.batches import Pool, Statistics, observation_for

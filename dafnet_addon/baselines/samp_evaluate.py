@@ -7,7 +7,7 @@ from pathlib import Path
 import torch
 
 from ..core.threads import one_thread
-from ..data.held_out import HeldClip
+from ..data.held_out.captured import HeldClip
 from ..training.evaluate import SEEDS, Figures, Measured, figures, shot_of
 from ..training.processes import spread_out
 from .samp import takes

@@ -17,10 +17,10 @@ from ..core.root import RootPath
 from ..core.rotations import rotate, yaw_matrix
 from ..core.series import MODEL_FPS, runs
 from ..core.skeleton import SEAT_TO_PELVIS, joint
-from ..data.boxes import distances
-from ..data.contacts import CONTACTS, contacts
-from ..data.held_out import HeldClip
-from ..data.prepare import POSE_UNIT
+from ..data.dataset.prepare import POSE_UNIT
+from ..data.furnish.boxes import distances
+from ..data.held_out.captured import HeldClip
+from ..data.motion.contacts import CONTACTS, contacts
 from .samp_state import ACTIONS, CELL, OFFSETS, VOXELS, Parts, pose_seen, seen_from
 
 __all__ = ["FIELDS", "Track", "goals_seen", "of_clip", "of_windows", "parts_of"]

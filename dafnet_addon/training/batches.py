@@ -14,10 +14,10 @@ from torch import Tensor
 
 from ..core.sensor import RADIUS, REACH, SPHERES
 from ..core.skeleton import END_EFFECTORS, MODEL_ORDER, UPPER, UPPER_SIZE, model_order
-from ..data.archive import mapped_arrays
-from ..data.flesh import NO_BANK
-from ..data.prepare import POSE_UNIT, load_pool
-from ..data.shapes import ShapeBank
+from ..data.capture.archive import mapped_arrays
+from ..data.dataset.prepare import POSE_UNIT, load_pool
+from ..data.furnish.flesh import NO_BANK
+from ..data.furnish.shapes import ShapeBank
 from ..model.config import ModelConfig
 from .placed_shapes import DeviceBank
 

@@ -41,7 +41,7 @@ from ..core.solids import Scene
 from ..core.take import MODES, Controls
 from ..core.threads import one_thread
 from ..core.weights import Weights
-from ..data.held_out import HeldClip
+from ..data.held_out.captured import HeldClip
 from ..model.systems import sampler_of
 from .processes import spread_out
 

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from ..core.sensor import RADIUS, REACH, SPHERES
-from ..data.shapes import DEEPEST, FARTHEST, ShapeBank
+from ..data.furnish.shapes import DEEPEST, FARTHEST, ShapeBank
 
 __all__ = ["DeviceBank"]
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from ..core.weights import Weights
-from ..data.held_out import HeldClip
-from ..data.real_walks import Walks
+from ..data.held_out.captured import HeldClip
+from ..data.held_out.walks import Walks
 from .evaluate import Measured, measured, rows_of, table
 
 __all__ = ["real_page", "real_report", "real_text"]

@@ -38,10 +38,10 @@ from ..core.series import MODEL_FPS
 from ..core.skeleton import POSE_SIZE, SEAT_TO_PELVIS
 from ..core.take import Controls
 from ..core.weights import Weights
-from ..data.boxes import box, placed
-from ..data.flesh import Furnishing
-from ..data.held_out import ACTIVITIES, HeldClip
-from ..data.sheet import Row, sheet
+from ..data.dataset.sheet import Row, sheet
+from ..data.furnish.boxes import box, placed
+from ..data.furnish.flesh import Furnishing
+from ..data.held_out.captured import ACTIVITIES, HeldClip
 from .batches import NOISE
 from .evaluate import (
     SEEDS,

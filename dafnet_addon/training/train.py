@@ -28,7 +28,7 @@ from ..core.errors import InputError
 from ..core.skeleton import LOWER_SIZE, POSE_SIZE, UPPER_SIZE
 from ..core.threads import cores
 from ..core.weights import Weights
-from ..data.prepare import bank_in
+from ..data.dataset.prepare import bank_in
 from ..model.config import (
     AHEAD_SIZE,
     PAPER,

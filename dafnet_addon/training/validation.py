@@ -23,8 +23,8 @@ from ..core.files import save_text, whole_file
 from ..core.skeleton import STATURE
 from ..core.text import read_json
 from ..core.weights import Weights, load_weights
-from ..data.held_out import HeldClip
-from ..data.prepare import bank_in
+from ..data.dataset.prepare import bank_in
+from ..data.held_out.captured import HeldClip
 from .batches import Pool
 from .candidates import has_weights, snapshot, write_weights
 from .evaluate import Measured, measured, row

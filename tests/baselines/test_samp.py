@@ -23,10 +23,10 @@ from dafnet_addon.core.conditions import Shot  # noqa: E402
 from dafnet_addon.core.root import RootPath, ahead, velocities  # noqa: E402
 from dafnet_addon.core.rotations import rotate, yaw_matrix  # noqa: E402
 from dafnet_addon.core.skeleton import OFFSETS, PARENTS, REST, SEAT_TO_PELVIS, joint  # noqa: E402
-from dafnet_addon.data.boxes import ABSENT, MOST, NO_BOXES, box  # noqa: E402
-from dafnet_addon.data.held_out import HeldClip  # noqa: E402
-from dafnet_addon.data.prepare import POSE_UNIT  # noqa: E402
-from dafnet_addon.data.shapes import ABSENT_SHAPE, SHAPES  # noqa: E402
+from dafnet_addon.data.dataset.prepare import POSE_UNIT  # noqa: E402
+from dafnet_addon.data.furnish.boxes import ABSENT, MOST, NO_BOXES, box  # noqa: E402
+from dafnet_addon.data.furnish.shapes import ABSENT_SHAPE, SHAPES  # noqa: E402
+from dafnet_addon.data.held_out.captured import HeldClip  # noqa: E402
 from dafnet_addon.training import precision  # noqa: E402
 from dafnet_addon.training.batches import Pool  # noqa: E402
 from dafnet_addon.training.evaluate import shot_of  # noqa: E402

@@ -18,9 +18,9 @@ torch = pytest.importorskip("torch", reason="the comparisons need torch")
 from dafnet_addon.baselines.samp import SampConfig  # noqa: E402
 from dafnet_addon.core.root import raw_root_from_joints  # noqa: E402
 from dafnet_addon.core.skeleton import REST  # noqa: E402
-from dafnet_addon.data.boxes import box  # noqa: E402
-from dafnet_addon.data.held_out import HeldClip  # noqa: E402
-from dafnet_addon.data.rests import Rest  # noqa: E402
+from dafnet_addon.data.furnish.boxes import box  # noqa: E402
+from dafnet_addon.data.held_out.captured import HeldClip  # noqa: E402
+from dafnet_addon.data.motion.rests import Rest  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training.train import Run, TrainingConfig  # noqa: E402
 

@@ -8,13 +8,13 @@ import pytest
 from dafnet_addon.core.kinematics import two_bone
 from dafnet_addon.core.rotations import yaw_matrix
 from dafnet_addon.core.skeleton import LOWER, OFFSETS, PARENTS, REST, joint
-from dafnet_addon.data import compose
-from dafnet_addon.data.canonical import pose_legs
-from dafnet_addon.data.compose import composed
-from dafnet_addon.data.joins import handed, joined, lent
-from dafnet_addon.data.pieces import entrance
-from dafnet_addon.data.uses import stroking, working
-from dafnet_addon.data.windows import Motion, motion_of
+from dafnet_addon.data.motion.canonical import pose_legs
+from dafnet_addon.data.motion.motion import Motion, motion_of
+from dafnet_addon.data.motion.uses import stroking, working
+from dafnet_addon.data.synthesis import compose
+from dafnet_addon.data.synthesis.compose import composed
+from dafnet_addon.data.synthesis.joins import handed, joined, lent
+from dafnet_addon.data.synthesis.pieces import entrance
 from kit.places import MOCAP
 
 BONES = np.linalg.norm(OFFSETS[1:], axis=1)
@@ -125,7 +125,7 @@ def test_nothing_is_composed_of_nothing():
 
 @pytest.fixture(scope="module")
 def captured(tmp_path_factory) -> list[Motion]:
-    from dafnet_addon.data.prepare import load_motions
+    from dafnet_addon.data.dataset.prepare import load_motions
 
     folder = tmp_path_factory.mktemp("mocap")
     for name in ("rocketbox", "cmu69"):

@@ -5,13 +5,13 @@ import pytest
 
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.skeleton import REST, joint
-from dafnet_addon.data.boxes import box
-from dafnet_addon.data.canonical import calibrate
-from dafnet_addon.data.cuts import bad_frames, cuts
-from dafnet_addon.data.flesh import Furnishing
-from dafnet_addon.data.mocap import Clip, read_clips
-from dafnet_addon.data.sheet import sheet
-from dafnet_addon.data.summary import summary
+from dafnet_addon.data.capture.cuts import bad_frames, cuts
+from dafnet_addon.data.capture.mocap import Clip, read_clips
+from dafnet_addon.data.capture.summary import summary
+from dafnet_addon.data.dataset.sheet import sheet
+from dafnet_addon.data.furnish.boxes import box
+from dafnet_addon.data.furnish.flesh import Furnishing
+from dafnet_addon.data.motion.canonical import calibrate
 from kit.messages import one_sentence
 from kit.motion_files import (
     walk,

@@ -12,7 +12,7 @@ import pytest
 
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.skeleton import REST
-from dafnet_addon.data.mocap import UNSTATED, read_clips
+from dafnet_addon.data.capture.mocap import UNSTATED, read_clips
 from kit.messages import one_sentence
 from kit.motion_files import (
     walk,

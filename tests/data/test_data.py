@@ -14,12 +14,13 @@ from dafnet_addon.core.root import RootPath, ahead, root_from_joints, velocities
 from dafnet_addon.core.rotations import yaw_matrix
 from dafnet_addon.core.skeleton import OFFSETS, PARENTS, REST, TOE_HEIGHT, joint
 from dafnet_addon.core.solids import Box, Scene
-from dafnet_addon.data import boxes as b
-from dafnet_addon.data.canonical import LEG, calibrate, canonical, pose_legs
-from dafnet_addon.data.mocap import Clip, read_clips
-from dafnet_addon.data.motions import read_motions, write_motions
-from dafnet_addon.data.rests import resting
-from dafnet_addon.data.windows import draw, mirrored, motion_of
+from dafnet_addon.data.capture.mocap import Clip, read_clips
+from dafnet_addon.data.dataset.motions import read_motions, write_motions
+from dafnet_addon.data.dataset.windows import draw
+from dafnet_addon.data.furnish import boxes as b
+from dafnet_addon.data.motion.canonical import LEG, calibrate, canonical, pose_legs
+from dafnet_addon.data.motion.motion import mirrored, motion_of
+from dafnet_addon.data.motion.rests import resting
 from kit.motion_files import write_compact
 from kit.places import MOCAP
 
@@ -198,14 +199,14 @@ def test_a_seat_that_is_used_later_is_there_before():
 @pytest.fixture(scope="module")
 def real_motions():
     """All motions that are used, by split."""
-    from dafnet_addon.data.prepare import load_motions
+    from dafnet_addon.data.dataset.prepare import load_motions
 
     return {"train": load_motions(MOCAP, "train"), "test": load_motions(MOCAP, "choose", "tell")}
 
 
 @pytest.mark.mocap
 def test_the_split_is_by_body(real_motions):
-    from dafnet_addon.data.splits import TRAINED_ON_PARTLY
+    from dafnet_addon.data.dataset.splits import TRAINED_ON_PARTLY
 
     train, test = (
         {f"{m.source}/{m.subject}" for m in real_motions[split]} for split in ("train", "test")
@@ -221,7 +222,7 @@ def test_the_split_is_by_body(real_motions):
 @pytest.mark.mocap
 def test_a_dataset_is_made_and_gone_on_with(tmp_path):
     pytest.importorskip("matplotlib", reason="previews are drawn with it")
-    from dafnet_addon.data.prepare import load_pool, prepare
+    from dafnet_addon.data.dataset.prepare import load_pool, prepare
 
     folder, out = tmp_path / "mocap", tmp_path / "dataset"
     folder.mkdir()
@@ -251,7 +252,7 @@ def test_a_dataset_is_made_and_gone_on_with(tmp_path):
 def test_a_dataset_of_raw_files_needs_a_licence_and_a_held_out_body(tmp_path):
     raw = MOCAP / "raw_samples"
     pytest.importorskip("matplotlib", reason="previews are drawn with it")
-    from dafnet_addon.data.prepare import prepare
+    from dafnet_addon.data.dataset.prepare import prepare
 
     folder, out = tmp_path / "mocap", tmp_path / "dataset"
     folder.mkdir()
@@ -331,7 +332,7 @@ def _count(out: Path) -> list[int]:
 @pytest.mark.slow
 def test_a_dataset_has_as_many_windows_as_were_asked_for(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib", reason="previews are drawn with it")
-    from dafnet_addon.data import prepare as p
+    from dafnet_addon.data.dataset import prepare as p
 
     monkeypatch.setattr(p, "_SHARD", 10)
     folder, out = _made_up_folder(tmp_path / "mocap"), tmp_path / "dataset"
@@ -368,7 +369,7 @@ def test_a_dataset_has_as_many_windows_as_were_asked_for(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_what_a_dataset_leaves_out_is_said_and_does_not_stop_it(tmp_path):
     pytest.importorskip("matplotlib", reason="previews are drawn with it")
-    from dafnet_addon.data.prepare import prepare
+    from dafnet_addon.data.dataset.prepare import prepare
 
     known = {"licence": "CC0", "split": "train"}
     lying = _sit_down()[..., [0, 2, 1]] * (1, -1, 1)
@@ -408,7 +409,7 @@ def test_what_a_dataset_leaves_out_is_said_and_does_not_stop_it(tmp_path):
 
 
 def test_motion_that_is_too_short_for_a_window_is_no_endless_search(tmp_path):
-    from dafnet_addon.data.prepare import prepare
+    from dafnet_addon.data.dataset.prepare import prepare
 
     known = {"licence": "CC0", "subject": "a", "category": "standing"}
     standing = np.repeat(_sit_down()[:1], 20, axis=0) + np.linspace(0, 0.8, 20)[:, None, None] * (

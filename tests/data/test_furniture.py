@@ -8,17 +8,18 @@ import pytest
 from dafnet_addon.core.root import root_from_joints
 from dafnet_addon.core.rotations import rotate, yaw_matrix
 from dafnet_addon.core.skeleton import REST, SEAT_TO_PELVIS, joint
-from dafnet_addon.data.boxes import distances
-from dafnet_addon.data.canonical import pose_legs
-from dafnet_addon.data.contacts import CONTACTS, contacts
-from dafnet_addon.data.fits import fit_report
-from dafnet_addon.data.flesh import probes
-from dafnet_addon.data.furniture import fitted, furnished, scattered, seat_for
-from dafnet_addon.data.real_pieces import LIES_OVER
-from dafnet_addon.data.rests import resting
-from dafnet_addon.data.shapes import PELVIS_OVER
-from dafnet_addon.data.uses import lying, reaching, stroking, working
-from dafnet_addon.data.windows import at_another_desk, motion_of
+from dafnet_addon.data.dataset.windows import at_another_desk
+from dafnet_addon.data.furnish.boxes import distances
+from dafnet_addon.data.furnish.fits import fit_report
+from dafnet_addon.data.furnish.flesh import probes
+from dafnet_addon.data.furnish.furniture import fitted, furnished, scattered, seat_for
+from dafnet_addon.data.furnish.real_pieces import LIES_OVER
+from dafnet_addon.data.furnish.shapes import PELVIS_OVER
+from dafnet_addon.data.motion.canonical import pose_legs
+from dafnet_addon.data.motion.contacts import CONTACTS, contacts
+from dafnet_addon.data.motion.motion import motion_of
+from dafnet_addon.data.motion.rests import resting
+from dafnet_addon.data.motion.uses import lying, reaching, stroking, working
 
 FEET = [joint(side + part) for side in ("left_", "right_") for part in ("ankle", "foot")]
 TORSO = [

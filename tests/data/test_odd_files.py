@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from dafnet_addon.core.errors import InputError
-from dafnet_addon.data.bvh import read_bvh
-from dafnet_addon.data.mocap import read_clips
-from dafnet_addon.data.rigs import mapped
+from dafnet_addon.data.capture.bvh import read_bvh
+from dafnet_addon.data.capture.mocap import read_clips
+from dafnet_addon.data.capture.rigs import mapped
 from kit.motion_files import (
     MIXAMO,
     walk,

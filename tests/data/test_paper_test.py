@@ -16,12 +16,12 @@ from dafnet_addon.core.metrics import body_points
 from dafnet_addon.core.occupancy import distance
 from dafnet_addon.core.root import RootPath
 from dafnet_addon.core.skeleton import REST, SEAT_TO_PELVIS, joint
-from dafnet_addon.data import paper_test as p
-from dafnet_addon.data.boxes import box, distances
-from dafnet_addon.data.contacts import contacts
-from dafnet_addon.data.held_out import HeldClip, frozen_text
-from dafnet_addon.data.mocap import read_clips
-from dafnet_addon.data.windows import Motion
+from dafnet_addon.data.capture.mocap import read_clips
+from dafnet_addon.data.furnish.boxes import box, distances
+from dafnet_addon.data.held_out import paper as p
+from dafnet_addon.data.held_out.captured import HeldClip, frozen_text
+from dafnet_addon.data.motion.contacts import contacts
+from dafnet_addon.data.motion.motion import Motion
 from kit.places import MOCAP
 
 pytestmark = pytest.mark.mocap

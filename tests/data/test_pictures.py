@@ -7,12 +7,12 @@ import pytest
 import trimesh
 
 from dafnet_addon.core.skeleton import REST
-from dafnet_addon.data.fit_sheet import fit_sheet
-from dafnet_addon.data.flesh import Furnishing
-from dafnet_addon.data.library import Piece
-from dafnet_addon.data.picture import body_of, picture
-from dafnet_addon.data.shapes import bank_of
-from dafnet_addon.data.windows import motion_of
+from dafnet_addon.data.dataset.fit_sheet import fit_sheet
+from dafnet_addon.data.dataset.picture import body_of, picture
+from dafnet_addon.data.furnish.flesh import Furnishing
+from dafnet_addon.data.furnish.library import Piece
+from dafnet_addon.data.furnish.shapes import bank_of
+from dafnet_addon.data.motion.motion import motion_of
 
 FROM_THE_FRONT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 CUBE = np.array([[0.0, 0.0, 0.5, 0.3, 0.3, 0.5, 0.0]])
@@ -71,7 +71,7 @@ def test_a_sheet_shows_every_kind_that_carries_a_body(tmp_path: Path) -> None:
     image = pytest.importorskip("PIL.Image")
 
     from dafnet_addon.core.skeleton import joint
-    from dafnet_addon.data.retarget import at_seat_height
+    from dafnet_addon.data.motion.retarget import at_seat_height
 
     seated = REST.copy()
     seated += np.array([0.0, 0.0, 0.58 - REST[0, 2]])

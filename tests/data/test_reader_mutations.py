@@ -22,10 +22,10 @@ from hypothesis import strategies as st
 
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.skeleton import JOINTS
-from dafnet_addon.data.canonical import calibrate, canonical
-from dafnet_addon.data.mocap import Clip, read_clips
-from dafnet_addon.data.stated import Stated
-from dafnet_addon.data.windows import motion_of
+from dafnet_addon.data.capture.mocap import Clip, read_clips
+from dafnet_addon.data.capture.stated import Stated
+from dafnet_addon.data.motion.canonical import calibrate, canonical
+from dafnet_addon.data.motion.motion import motion_of
 from kit.limits import bounded
 from kit.motion_files import walk, write_amc, write_asf, write_bvh, write_compact
 from kit.places import RAW

@@ -10,13 +10,13 @@ import pytest
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.rotations import rotate
 from dafnet_addon.core.skeleton import JOINTS, PARENTS, REST, TOE_HEIGHT, joint
-from dafnet_addon.data.acclaim import read_amc, read_asf
-from dafnet_addon.data.amass import read_amass
-from dafnet_addon.data.bvh import read_bvh
-from dafnet_addon.data.mocap import read_clips
-from dafnet_addon.data.recording import posed, rotation_about
-from dafnet_addon.data.rigs import mapped
-from dafnet_addon.data.world import at_model_rate, floor_height, unit_of
+from dafnet_addon.data.capture.acclaim import read_amc, read_asf
+from dafnet_addon.data.capture.amass import read_amass
+from dafnet_addon.data.capture.bvh import read_bvh
+from dafnet_addon.data.capture.mocap import read_clips
+from dafnet_addon.data.capture.recording import posed, rotation_about
+from dafnet_addon.data.capture.rigs import mapped
+from dafnet_addon.data.capture.world import at_model_rate, floor_height, unit_of
 from kit.motion_files import (
     VICON,
     Y_UP,

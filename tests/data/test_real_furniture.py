@@ -13,16 +13,15 @@ from dafnet_addon.core.occupancy import distance, occupancy
 from dafnet_addon.core.root import RootPath
 from dafnet_addon.core.skeleton import SEAT_TO_PELVIS
 from dafnet_addon.core.solids import Scene
-from dafnet_addon.data.flesh import GIVES, PROBES, Furnishing, clearance, sunk
-from dafnet_addon.data.library import Piece, kind_of, read_library
-from dafnet_addon.data.real_pieces import (
+from dafnet_addon.data.furnish.flesh import GIVES, PROBES, Furnishing, clearance, sunk
+from dafnet_addon.data.furnish.library import Piece, kind_of, read_library
+from dafnet_addon.data.furnish.real_pieces import (
     LIES_OVER,
     bed_shape_for,
     desk_shape_for,
     seat_shape_for,
 )
-from dafnet_addon.data.rests import Rest
-from dafnet_addon.data.shapes import (
+from dafnet_addon.data.furnish.shapes import (
     FARTHEST,
     PELVIS_OVER,
     STRETCH,
@@ -30,7 +29,8 @@ from dafnet_addon.data.shapes import (
     bank_of,
     shapes_of,
 )
-from dafnet_addon.data.uses import Use
+from dafnet_addon.data.motion.rests import Rest
+from dafnet_addon.data.motion.uses import Use
 from kit.places import LIBRARY
 
 trimesh = pytest.importorskip("trimesh")
@@ -266,7 +266,7 @@ def test_the_sensor_sees_placed_shapes_as_the_core_sees_their_meshes(bank: Shape
 def test_other_devices_see_the_same(bank: ShapeBank) -> None:
     import torch
 
-    from dafnet_addon.data.shapes import ABSENT_SHAPE
+    from dafnet_addon.data.furnish.shapes import ABSENT_SHAPE
     from dafnet_addon.training.placed_shapes import DeviceBank
 
     rows = np.stack(

@@ -10,9 +10,9 @@ import pytest
 from dafnet_addon.core.conditions import shot_steps
 from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.take import Controls
-from dafnet_addon.data.flesh import probes
-from dafnet_addon.data.real_test import FROZEN_REAL, real_test
-from dafnet_addon.data.splits import role_of_body, role_of_maker
+from dafnet_addon.data.dataset.splits import role_of_body, role_of_maker
+from dafnet_addon.data.furnish.flesh import probes
+from dafnet_addon.data.held_out.real import FROZEN_REAL, real_test
 from kit.places import SHARED
 
 FROZEN = json.loads(FROZEN_REAL.read_text(encoding="utf-8"))["clips"]

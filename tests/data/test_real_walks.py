@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dafnet_addon.data.real_walks import FROZEN_WALKS, real_walks
-from dafnet_addon.data.splits import role_of_maker
+from dafnet_addon.data.dataset.splits import role_of_maker
+from dafnet_addon.data.held_out.walks import FROZEN_WALKS, real_walks
 from kit.places import LIBRARY
 
 FROZEN = json.loads(FROZEN_WALKS.read_text(encoding="utf-8"))["clips"]

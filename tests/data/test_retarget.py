@@ -8,10 +8,10 @@ import pytest
 from dafnet_addon.core.kinematics import two_bone
 from dafnet_addon.core.metrics import foot_sliding, jerk
 from dafnet_addon.core.skeleton import MIRROR, OFFSETS, PARENTS, REST, TOE_HEIGHT, joint
-from dafnet_addon.data.canonical import calibrate, canonical, pose_legs
-from dafnet_addon.data.mocap import read_clips
-from dafnet_addon.data.retarget import at_seat_height, at_top_height
-from dafnet_addon.data.uses import Use
+from dafnet_addon.data.capture.mocap import read_clips
+from dafnet_addon.data.motion.canonical import calibrate, canonical, pose_legs
+from dafnet_addon.data.motion.retarget import at_seat_height, at_top_height
+from dafnet_addon.data.motion.uses import Use
 from kit.places import MOCAP
 
 BONES = np.linalg.norm(OFFSETS[1:], axis=1)

@@ -7,9 +7,9 @@ import pytest
 
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.skeleton import JOINTS, PARENTS, REST, joint
-from dafnet_addon.data.mocap import read_clips
-from dafnet_addon.data.recording import Recording
-from dafnet_addon.data.rigs import mapped, rigs
+from dafnet_addon.data.capture.mocap import read_clips
+from dafnet_addon.data.capture.recording import Recording
+from dafnet_addon.data.capture.rigs import mapped, rigs
 from kit.messages import one_sentence
 from kit.motion_files import (
     MIXAMO,

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dafnet_addon.data import boxes as boxes_module
-from dafnet_addon.data.prepare import POSE_UNIT
-from dafnet_addon.data.shapes import ABSENT_SHAPE, SHAPES
+from dafnet_addon.data.dataset.prepare import POSE_UNIT
+from dafnet_addon.data.furnish import boxes as boxes_module
+from dafnet_addon.data.furnish.shapes import ABSENT_SHAPE, SHAPES
 
 __all__ = ["small_dataset"]
 

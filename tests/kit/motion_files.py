@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dafnet_addon.core.skeleton import JOINTS, PARENTS, REST
-from dafnet_addon.data.recording import rotation_about
+from dafnet_addon.data.capture.recording import rotation_about
 
 MIXAMO = dict(
     zip(

@@ -19,8 +19,8 @@ torch = pytest.importorskip("torch", reason="training needs torch")
 from dafnet_addon import cli  # noqa: E402
 from dafnet_addon.core.errors import InputError  # noqa: E402
 from dafnet_addon.core.weights import load_weights  # noqa: E402
-from dafnet_addon.data.packed import is_packed, pack, unpack  # noqa: E402
-from dafnet_addon.data.prepare import load_pool  # noqa: E402
+from dafnet_addon.data.dataset.packed import is_packed, pack, unpack  # noqa: E402
+from dafnet_addon.data.dataset.prepare import load_pool  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training.checkpoints import Checkpoint, slim_run  # noqa: E402
 from dafnet_addon.training.train import Run, TrainingConfig, read_config, train_part  # noqa: E402

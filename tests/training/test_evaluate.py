@@ -17,10 +17,10 @@ from dafnet_addon.core.sampler import Sampler
 from dafnet_addon.core.skeleton import REST, SEAT_TO_PELVIS, STATURE, UPPER
 from dafnet_addon.core.take import Controls
 from dafnet_addon.core.weights import load_weights
-from dafnet_addon.data import held_out as h
-from dafnet_addon.data.boxes import box
-from dafnet_addon.data.mocap import read_clips
-from dafnet_addon.data.rests import Rest
+from dafnet_addon.data.capture.mocap import read_clips
+from dafnet_addon.data.furnish.boxes import box
+from dafnet_addon.data.held_out import captured as h
+from dafnet_addon.data.motion.rests import Rest
 from dafnet_addon.training import evaluate as e
 from kit.places import MOCAP
 

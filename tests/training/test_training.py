@@ -26,8 +26,8 @@ from dafnet_addon.core.root import RootPath  # noqa: E402
 from dafnet_addon.core.sampler import Conditions, Sampler  # noqa: E402
 from dafnet_addon.core.skeleton import MODEL_ORDER, model_order  # noqa: E402
 from dafnet_addon.core.weights import load_weights  # noqa: E402
-from dafnet_addon.data import boxes as boxes_module  # noqa: E402
-from dafnet_addon.data.prepare import POSE_UNIT  # noqa: E402
+from dafnet_addon.data.dataset.prepare import POSE_UNIT  # noqa: E402
+from dafnet_addon.data.furnish import boxes as boxes_module  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.model.flow import (  # noqa: E402
     BodyFlow,

@@ -18,9 +18,9 @@ from dafnet_addon.core.errors import InputError  # noqa: E402
 from dafnet_addon.core.root import raw_root_from_joints  # noqa: E402
 from dafnet_addon.core.skeleton import REST, STATURE  # noqa: E402
 from dafnet_addon.core.weights import load_weights  # noqa: E402
-from dafnet_addon.data.boxes import box  # noqa: E402
-from dafnet_addon.data.held_out import HeldClip  # noqa: E402
-from dafnet_addon.data.rests import Rest  # noqa: E402
+from dafnet_addon.data.furnish.boxes import box  # noqa: E402
+from dafnet_addon.data.held_out.captured import HeldClip  # noqa: E402
+from dafnet_addon.data.motion.rests import Rest  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training import candidates, validation  # noqa: E402
 from dafnet_addon.training.evaluate import Measured, figures  # noqa: E402
@@ -286,7 +286,7 @@ def test_a_run_that_cools_itself_is_cooled_from_before(described: Path, tmp_path
 
 
 def test_the_commands(described: Path, tmp_path: Path, monkeypatch, capsys):
-    from dafnet_addon.data import real_test
+    from dafnet_addon.data.held_out import real as real_test
 
     monkeypatch.setattr(real_test, "real_test", lambda *_: CLIPS)
     run = tmp_path / "run"

@@ -1,0 +1,186 @@
+"""Draws training windows: a captured piece of motion, augmented, with furniture fitted to it and
+the sensor read.
+
+Paper, section 5.2. Each draw picks a clip, may move a seat's height, mirror, reverse or re-time it,
+may roughen or smooth its root path as an animator would, and furnishes the room anew.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.root import RootPath, ahead, root_from_joints, smoothed, to_root, velocities
+from ...core.skeleton import PELVIS
+from ..furnish.boxes import near
+from ..furnish.flesh import NO_BANK
+from ..furnish.furniture import furnished
+from ..furnish.shapes import ABSENT_SHAPE, SHAPES, ShapeBank
+from ..motion.motion import Motion, mirrored
+from ..motion.retarget import at_seat_height, at_top_height
+from ..motion.uses import working
+
+__all__ = [
+    "HIGHEST",
+    "HISTORY",
+    "LENGTH",
+    "LOWEST",
+    "Window",
+    "at_another_desk",
+    "draw",
+    "lowest_pelvis",
+]
+
+HISTORY, LENGTH = 10, 70
+_FRAMES = HISTORY + LENGTH
+_MARGIN = 32  # the root is smoothed over 24 frames and known 30 ahead
+_AROUND = 100  # frames before and after that, in which the body shows what furniture there is
+LOWEST, HIGHEST = 0.36, 0.95
+"""Metres over the floor at which a pelvis may rest: from a step of 0.22 to a bar stool of 0.81."""
+_USUAL = 0.38, 0.66  # metres: the pelvis on sofas and chairs
+_TOPS = 0.62, 0.82  # metres over the floor, of the desks that people sit at
+# metres that a top moves, down more than up (paper, section 5.2), and that its wrists are over a
+# pelvis at least: thighs are between; how often it moves at all
+_TOP_MOVES, _OVER_PELVIS, _MOVES_TOP = (-0.14, 0.08), 0.10, 0.6
+_LOWERED = 0.3  # metres; from a high stool further down, every wave of the pelvis would grow
+
+
+@dataclass(frozen=True)
+class Window:
+    """``poses`` (80, 66) in each frame's root, ``velocity`` (80, 3); of the last 70 frames:
+    ``ahead`` (70, 18) and ``root`` (70, 3), its place x, y and yaw in the world of ``boxes``
+    (``boxes.MOST``, 7) and ``shapes`` (``shapes.SHAPES``, 5). Metres, radians.
+    """
+
+    poses: np.ndarray
+    velocity: np.ndarray
+    ahead: np.ndarray
+    root: np.ndarray
+    boxes: np.ndarray
+    shapes: np.ndarray
+
+
+def _retimed(joints: np.ndarray, speed: float) -> np.ndarray:
+    times = np.arange(0.0, len(joints) - 1, speed)
+    low = times.astype(int)
+    share = (times - low)[:, None, None]
+    return joints[low] * (1 - share) + joints[low + 1] * share
+
+
+def _animated_by_hand(rng: np.random.Generator, path: RootPath) -> RootPath:
+    """The root as an animator's curves give it: without the gait's sway, or smoothly a little
+    wrong.
+    """
+    if rng.random() < 0.5:
+        path = smoothed(path, rng.uniform(4, 12), rng.uniform(4, 12))
+    if rng.random() < 0.5:
+        wobble = smoothed(
+            RootPath(rng.normal(size=path.position.shape), rng.normal(size=len(path))), 12.0, 12.0
+        )
+        position = path.position + wobble.position * (1, 1, 0) * rng.uniform(0, 0.09)
+        path = RootPath(position, path.yaw + wobble.yaw * rng.uniform(0, 0.25))
+    return path
+
+
+def _farthest(valid: np.ndarray, frame: int, step: int) -> int:
+    """The last valid frame within ``_AROUND`` of a valid one, in the direction of ``step``."""
+    for _ in range(_AROUND):
+        if not (0 <= frame + step < len(valid) and valid[frame + step]):
+            break
+        frame += step
+    return frame
+
+
+def lowest_pelvis(height: float) -> float:
+    """How low (metres) a pelvis that was captured at rest at this height may be moved."""
+    return max(LOWEST, height - _LOWERED)
+
+
+def _seat_height(rng: np.random.Generator, height: float) -> float:
+    """Where a pelvis that was captured at rest at this height (metres) shall rest: mostly where
+    furniture carries one.
+    """
+    if rng.random() < 0.2:
+        wanted = height + rng.normal(0, 0.02)
+    else:
+        wanted = rng.uniform(*(_USUAL if rng.random() < 0.6 else (LOWEST, HIGHEST)))
+    return float(np.clip(wanted, lowest_pelvis(height), HIGHEST))
+
+
+def at_another_desk(rng: np.random.Generator, joints: np.ndarray) -> np.ndarray:
+    """The motion (T, 22, 3) of one that sits with the top that it works at moved, now and then, to
+    a height of its own: chairs and desks are of any combination (paper, figure 9).
+    """
+    uses = working(joints, root_from_joints(joints))
+    if not uses or rng.random() > _MOVES_TOP:
+        return joints
+    use = uses[0]
+    wrists = float(use.points[:, 2].min())
+    pelvis = float(np.median(joints[use.start : use.end, PELVIS, 2]))
+    wanted = max(rng.uniform(*_TOPS), pelvis + _OVER_PELVIS)
+    return at_top_height(joints, use, float(np.clip(wanted - wrists, *_TOP_MOVES)))
+
+
+def _near_shapes(placed: np.ndarray, path: RootPath) -> np.ndarray:
+    """The placed shapes nearest to a path, filled up or cut to (SHAPES, 5)."""
+    gap = np.linalg.norm(path.position[None, :, :2] - placed[:, None, 1:3], axis=-1).min(
+        1, initial=np.inf
+    )
+    kept = placed[np.argsort(gap)[:SHAPES]]
+    return np.concatenate([kept, np.tile(ABSENT_SHAPE, (SHAPES - len(kept), 1))])
+
+
+def draw(
+    rng: np.random.Generator, motion: Motion, focus: int | None = None, bank: ShapeBank = NO_BANK
+) -> Window | None:
+    """One augmented, furnished window, around frame ``focus`` where given; None where this draw
+    cannot be used.
+
+    Real pieces of ``bank`` stand among the furniture, where one is given.
+    """
+    total = len(motion.joints)
+    speed = rng.uniform(0.85, 1.2) if rng.random() < 0.4 else 1.0
+    span = int(np.ceil(_FRAMES * speed)) + 2
+    if total < span:
+        return None
+    if focus is None:
+        start = int(rng.integers(0, max(1, total - span)))
+    else:
+        start = int(np.clip(focus - rng.integers(HISTORY, span - 10), 0, max(0, total - span)))
+    low, high = max(0, start - _MARGIN), min(total, start + span + _MARGIN)
+    if not motion.valid[low:high].all():
+        return None
+    # What is used a few seconds earlier or later is there meanwhile.
+    low, high = _farthest(motion.valid, low, -1), _farthest(motion.valid, high - 1, 1) + 1
+    joints = motion.joints[low:high]
+    rests = [r for r in motion.rests if r.start < high and r.end > low]
+    if rests:
+        height = float(rests[0].position[2])
+        joints = at_seat_height(joints, height, _seat_height(rng, height))
+        joints = at_another_desk(rng, joints)
+    if speed != 1.0:
+        joints = _retimed(joints, speed)
+    first = min(round((start - low) / speed), len(joints) - _FRAMES)
+    seated = bool(rests)
+    if rng.random() < (0.4 if seated else 0.08):
+        joints, first = joints[::-1], len(joints) - _FRAMES - first
+    if rng.random() < 0.5:
+        joints = mirrored(joints)
+    path = root_from_joints(joints)
+    seen = slice(max(0, first - _MARGIN), first + _FRAMES + _MARGIN)
+    room, _ = furnished(rng, joints, path, bank, seen)
+    if room is None:
+        return None
+    if rng.random() < 0.5:
+        path = _animated_by_hand(rng, path)
+    cut = slice(first, first + _FRAMES)
+    poses = to_root(path, joints)[cut].reshape(_FRAMES, -1)
+    recent = RootPath(path.position[cut][HISTORY:], path.yaw[cut][HISTORY:])
+    root = np.concatenate([recent.position[:, :2], recent.yaw[:, None]], axis=1)
+    return Window(
+        poses,
+        velocities(path)[cut],
+        ahead(path)[cut][HISTORY:],
+        root,
+        near(room.boxes, recent),
+        _near_shapes(room.shapes, recent),
+    )

@@ -1,0 +1,1 @@
+"""Furniture, made of boxes or real, and how it is fitted to motion."""

@@ -1,0 +1,1 @@
+"""Motion on the canonical body, and what is read off it: contacts, rests, uses of furniture."""

@@ -1,0 +1,1 @@
+"""Motion that nobody recorded in one go, composed of captured pieces."""
