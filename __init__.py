@@ -27,6 +27,7 @@ def register() -> None:
     translations.register()
     for cls in operators.CLASSES + panels.CLASSES:
         bpy.utils.register_class(cls)
+
     bpy.types.VIEW3D_MT_add.append(panels.add_menu)
     _commands.append(
         bpy.utils.register_cli_command(
@@ -44,9 +45,11 @@ def unregister() -> None:
 
     while _commands:
         bpy.utils.unregister_cli_command(_commands.pop())
+
     bpy.types.VIEW3D_MT_add.remove(panels.add_menu)
     for cls in reversed(operators.CLASSES + panels.CLASSES):
         bpy.utils.unregister_class(cls)
+
     translations.unregister()
     bpy.utils.unregister_preset_path(_FILES)
     overlays.unregister()

@@ -105,12 +105,14 @@ def variant(
     folder.mkdir(parents=True, exist_ok=True)
     if not checkpoint_file(folder, "predictor").exists():
         shutil.copy(predictor, folder)
+
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
         for job in [
             pool.submit(_train, p, dataset, folder, model, training, begin_with)
             for p in ("upper", "lower")
         ]:
             job.result()
+
     file = folder / "weights.safetensors"
     export(file, *trained(folder), {})
     found = rows_of(
@@ -141,6 +143,7 @@ def table(results: dict[str, dict[str, Any]]) -> str:
         ]
         steps = f"{found['steps']['upper']} + {found['steps']['lower']}"
         lines.append("| " + " | ".join([name, steps, f"{found['nll']:.1f}", *cells]) + " |")
+
     return "\n".join(lines)
 
 
@@ -235,6 +238,7 @@ def furniture_table(found: dict[str, list[Measured]]) -> str:
                     f"{free['skate_cm']:.2f}",
                 ]
                 lines.append("| " + " | ".join(cells) + " |")
+
     return "\n".join(lines)
 
 
@@ -248,6 +252,7 @@ def furniture(
     files = {BEGUN: begin_with.path}
     for name, windows in ((BOXES, boxes), (REAL, dataset)):
         files[name] = trained_on(windows, out / name.replace(" ", "_"), minutes, begin_with)
+
     found = {
         name: measured(load_weights(file), clips, seeds=1, modes=("FREE", "EE"), clean=False)
         for name, file in files.items()
@@ -258,6 +263,7 @@ def furniture(
     for name, file in files.items():
         if name != BEGUN:
             rows[name]["steps"] = {p: Run.load(p, file.parent).step for p in ("upper", "lower")}
+
     save_text(out / "furniture.json", json.dumps(rows, indent=1))
     text = furniture_table(found)
     save_text(out / "furniture.md", text)
@@ -303,10 +309,12 @@ def main(arguments: Sequence[str]) -> str:
         train_part(
             "predictor", options.dataset, first, MODEL, replace(TRAINING, minutes_predictor=2.0)
         )
+
     results: dict[str, dict[str, Any]] = {}
     for name, (changed, _) in VARIANTS.items():
         if begin_with is not None and changed.keys() & {"shared_encoder", "mask"}:
             continue
+
         predictor = checkpoint_file(first, "predictor")
         results[name] = variant(
             name, options.dataset, options.output, options.minutes, predictor, clips, begin_with
@@ -315,4 +323,5 @@ def main(arguments: Sequence[str]) -> str:
             json.dumps(results, indent=1), encoding="utf-8"
         )
         (options.output / "ablation.md").write_text(table(results) + "\n", encoding="utf-8")
+
     return table(results)

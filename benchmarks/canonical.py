@@ -45,12 +45,14 @@ def bodies(clips: list[Clip]) -> list[tuple[Calibration, list[Clip]]]:
     by_subject: dict[str, list[Clip]] = defaultdict(list)
     for clip in clips:
         by_subject[clip.subject].append(clip)
+
     fitted = []
     for own in by_subject.values():
         try:
             fitted.append((calibrate(own), own))
         except InputError:
             fitted.append((calibrate(clips), own))
+
     return fitted
 
 
@@ -64,6 +66,7 @@ def pairs(clips: list[Clip]) -> list[Pair]:
             toes = before[:, _TOES, 2].min(1)
             before = before - (0.0, 0.0, float(np.percentile(toes, 8)) - TOE_HEIGHT)
             out.append((before, after))
+
     return out
 
 
@@ -87,6 +90,7 @@ def measured(found: list[Pair]) -> dict[str, tuple[float, float, int]]:
     for before, after in found:
         if len(before) < 3:
             continue
+
         for toe in _TOES:
             planted = (before[:-1, toe, 2] < 0.05) & (_speed(before[:, toe]) < _PLANTED)
             steps = [
@@ -100,6 +104,7 @@ def measured(found: list[Pair]) -> dict[str, tuple[float, float, int]]:
             values[_ANKLE] += [
                 (0.0, d) for d in np.linalg.norm(after[:, toe - 3] - before[:, toe - 3], axis=-1)
             ]
+
         for wrist in _WRISTS:
             for a, b in runs(_speed(before[:, wrist]) < _STILL, 20):
                 if _wander(before[a:b, joint("spine3")]) > 0.04:
@@ -108,6 +113,7 @@ def measured(found: list[Pair]) -> dict[str, tuple[float, float, int]]:
             (_speed(before[:, 0]) < 0.1) & (before[:-1, 0, 2] < 0.7) & (before[:-1, 0, 2] > 0.3), 20
         ):
             values[_SEAT].append((_wander(before[a:b, 0]), _wander(after[a:b, 0])))
+
     return {name: (*(1000 * np.array(v).mean(0)).tolist(), len(v)) for name, v in values.items()}
 
 
@@ -130,10 +136,13 @@ def table(sources: dict[str, list[Pair]]) -> str:
             if name not in figures:
                 cells.append("-")
                 continue
+
             before, after, count = figures[name]
             text = f"{after:.1f}" if name in (_TOE, _ANKLE) else f"{before:.2f} → {after:.2f}"
             cells.append(f"{text} ({count})" if name in (_WRIST, _SEAT) else text)
+
         rows.append(tuple(cells))
+
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join(
         "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
@@ -174,7 +183,9 @@ def _poses(found: list[Pair]) -> list[Pair]:
             turn = np.radians(60)
             across = local[:, 1] * np.sin(turn) - local[:, 0] * np.cos(turn)
             seen.append(np.stack([across, local[:, 2]], -1))
+
         shown.append((seen[0], seen[1]))
+
     return shown
 
 
@@ -192,6 +203,7 @@ def picture(sources: dict[str, list[Pair]], file: Path) -> None:
     axes = figure.subplots(lines, columns).ravel()
     for ax in axes:
         ax.axis("off")
+
     for ax, (source, found) in zip(axes, sources.items(), strict=False):
         ax.set(xlim=(-0.6, 2.9), ylim=(-0.1, 1.85), aspect="equal")
         ax.axhline(0.0, color="#c8c8c8", lw=0.8)
@@ -209,6 +221,7 @@ def picture(sources: dict[str, list[Pair]], file: Path) -> None:
                         lw=1.4 if fitted else 3.0,
                         solid_capstyle="round",
                     )
+
     key = "grey: as captured,\nscaled to our legs\ncoloured: fitted\n(blue left, orange right)"
     axes[-1].text(0.02, 0.5, key, fontsize=8, va="center")
     figure.savefig(file)
@@ -229,6 +242,7 @@ def main(arguments: Sequence[str]) -> str:
     for clip in read_clips(options.folder):
         if clip.split:
             clips[clip.source].append(clip)
+
     sources = {source: pairs(own) for source, own in clips.items()}
     picture(sources, options.picture)
     return table(sources)

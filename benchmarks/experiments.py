@@ -125,10 +125,12 @@ def _jobs(runs: Path, budget: str, model: ModelConfig, training: TrainingConfig)
         of_it = replace(model, **changed)
         if budget != BUDGETS[0] and name not in STEPPED:
             continue
+
         parts = system_named(of_it.system).partition
         for part in parts:
             shared = replace(training, minutes_flow=training.minutes_flow / len(parts))
             yield Job(_at(runs, budget) / of_it.system, part, of_it, shared)
+
     if budget == BUDGETS[0]:
         for kind in NETWORKS:
             yield Job(_at(runs, budget) / kind, kind, model, training)
@@ -149,6 +151,7 @@ def train(
     first = runs / "predictor"
     if not checkpoint_file(first, "predictor").exists():
         train_part("predictor", dataset, first, model, training)
+
     for budget in BUDGETS:
         spent = replace(training, minutes_flow=minutes)
         if budget == "equal steps":
@@ -157,11 +160,13 @@ def train(
             )
         elif budget == "triple time":
             spent = replace(spent, minutes_flow=3.0 * minutes)
+
         jobs = list(_jobs(runs, budget, model, spent))
         for job in jobs:
             job.folder.mkdir(parents=True, exist_ok=True)
             if job.model.predicts and not checkpoint_file(job.folder, "predictor").exists():
                 shutil.copy(checkpoint_file(first, "predictor"), job.folder)
+
         list(spread_out(partial(_train, dataset, samp), jobs, processes))
         for folder in {job.folder for job in jobs if job.part not in NETWORKS}:
             flow, predictor, statistics = trained(folder)
@@ -207,6 +212,7 @@ def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
             # MoGlow's run with equal time is that with equal steps too.
             folder = (_at(runs, BUDGETS[0]) if name == "MoGlow" else at) / changed["system"]
             out[f"{name}, {budget}"] = steps_of(folder), flow(folder / "weights.safetensors")
+
     out[f"DAFNet, {SHIPPED}"] = "–", flow(None)
     return out
 
@@ -226,6 +232,7 @@ def measure(
         if name == f"MoGlow, {BUDGETS[1]}":
             known[name] = known[f"MoGlow, {BUDGETS[0]}"]  # the same run
             continue
+
         every = [clip for group in clips.values() for clip in group]
         results, at = measuring(every), 0
         known[name] = {"steps": steps, "groups": {}}
@@ -235,8 +242,10 @@ def measure(
             known[name]["groups"][group] = {
                 key: row([each.runs[key] for each in chosen]) for key in settings
             }
+
         output.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(known, indent=1), encoding="utf-8")
+
     found = {name: known[name] for name in systems}
     (output / f"{table}.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
     (output / f"{table}.md").write_text(markdown(table, found), encoding="utf-8")
@@ -294,6 +303,7 @@ def paired(
                 count = f"{int((worse > better).sum())} of {len(members)}"
                 cells.append(f"×{_ratio(*pair):.2f} ({low:.2f} to {high:.2f}), {count}")
             rows.append(f"| {budget} | {group} | " + " | ".join(cells) + " |")
+
     text = "\n".join(rows) + "\n"
     (output / "paired.md").write_text(text, encoding="utf-8")
     return text
@@ -329,7 +339,9 @@ def _row(
         theirs = None
         if name in paper and compared:
             theirs = paper[name][printed.index(column)] / paper["DAFNet"][printed.index(column)]
+
         cells.append(_cell(values, figure, ours.get(figure) if compared else None, theirs))
+
     return f"| {system} | {found[system]['steps']} | " + " | ".join(cells) + " |"
 
 
@@ -359,6 +371,7 @@ def markdown(table: str, found: Mapping[str, Any]) -> str:
                 ]
             ),
         ]
+
     return "\n\n".join(parts) + "\n"
 
 
@@ -380,6 +393,7 @@ def main(arguments: Sequence[str]) -> str:
         commands.add_parser(name).add_argument("folder", type=Path)
     for command in commands.choices.values():
         command.add_argument("-o", "--output", type=Path, required=True, metavar="RUNS")
+
     options = parser.parse_args(arguments)
 
     if options.command == "train":
@@ -393,5 +407,6 @@ def main(arguments: Sequence[str]) -> str:
     }
     if options.command == "paired":
         return paired(clips, options.output, options.output)
+
     measure(options.command, clips, options.output, options.output)
     return (options.output / f"{options.command}.md").read_text(encoding="utf-8")

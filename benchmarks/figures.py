@@ -80,6 +80,7 @@ def _raised(parts: Iterable[Part], now: float, height: float) -> tuple[Part, ...
                     part, center=(x, y, z * height / now), size=(width, depth, tall * height / now)
                 )
             )
+
     return tuple(out)
 
 
@@ -258,6 +259,7 @@ class _Studio:
                 self.font,
                 anchor="mm",
             )
+
         return out
 
     def grid(self, rows: Sequence[Sequence[Image.Image]]) -> Image.Image:
@@ -271,6 +273,7 @@ class _Studio:
         for r, row in enumerate(rows):
             for c, picture in enumerate(row):
                 out.paste(picture, (c * (width + gap), r * (height + gap)))
+
         return out
 
     def with_circle(self, picture: Image.Image, action: np.ndarray) -> Image.Image:
@@ -308,6 +311,7 @@ class _Studio:
                 font,
                 anchor="mm",
             )
+
         disc = disc.resize((size, size), Image.Resampling.LANCZOS)
         out = picture.copy()
         edge = self.pixels(6)
@@ -455,6 +459,7 @@ def _augmented(studio: _Studio) -> Image.Image:
                 else "source, made by the network in EE",
             )
         )
+
     return studio.grid([panels])
 
 
@@ -508,6 +513,7 @@ def _by_furniture(studio: _Studio) -> Image.Image:
         panels.append(
             studio.captioned(studio.photograph(stage, 525, 300, seen, margin=0.02), title, words)
         )
+
     return studio.grid([panels[:3], panels[3:]])
 
 
@@ -532,6 +538,7 @@ def _by_height(studio: _Studio) -> Image.Image:
                 _pelvis(float(motion.joints[len(motion) - 15, PELVIS, 2]), height),
             )
         )
+
     picture = studio.captioned(studio.photograph(stage, 1600, 430, margin=0.03))
     pen = ImageDraw.Draw(picture)
     for at, lines in zip(stage.pixels(np.array(feet)), words, strict=True):
@@ -540,6 +547,7 @@ def _by_height(studio: _Studio) -> Image.Image:
             pen.text(
                 (at[0], down), line, _INK if row == 0 else (110, 114, 120), studio.font, anchor="mm"
             )
+
     return picture
 
 
@@ -602,7 +610,9 @@ def _copied(studio: _Studio) -> Image.Image:
             panels.append(
                 studio.captioned(picture, f"{task}: {name}", f"upper body {gap:.1f} cm off")
             )
+
         rows.append(panels)
+
     return studio.grid(rows)
 
 
@@ -688,18 +698,21 @@ def _led(studio: _Studio) -> Image.Image:
         _furnish(stage, told[0])
         if len(at) > 3:
             _floor_line(stage, path)
+
         _strobe(stage, motion, at, _MODE["EE"])
         _asked(stage, motion, told[1], at)
         picture = studio.photograph(stage, width, height, margin=0.03)
         panels.append(
             studio.captioned(picture, name, f"head and hands {_error(motion, told[1]):.1f} cm off")
         )
+
     gap = studio.pixels(_GAP)
     out = Image.new("RGB", (sum(p.width for p in panels) + 2 * gap, panels[0].height), "white")
     left = 0
     for panel in panels:
         out.paste(panel, (left, 0))
         left += panel.width + gap
+
     return out
 
 
@@ -742,6 +755,7 @@ def _through_a_room(studio: _Studio) -> Image.Image:
             walked.path, (before.stop - 1) + (55 if picked else 0), after.start - 30, 0.90
         )
         picked.append((after.start + after.stop - 1) // 2)
+
     for k, frame in enumerate(picked):
         _put(
             stage,
@@ -749,12 +763,14 @@ def _through_a_room(studio: _Studio) -> Image.Image:
             frame,
             mixed(_PALE, _MODE[modes[frame]], 0.40 + 0.60 * k / (len(picked) - 1)),
         )
+
     seen = np.concatenate(stage.seen)
     for wall in (
         Part("Wall", (9.9, 0.08, 2.3), (0.15, 2.15, 1.15)),
         Part("Wall", (0.08, 3.2, 2.3), (-4.75, 0.55, 1.15)),
     ):
         stage.furnish((wall,), _HERE)
+
     words = (
         "blue: FREE; orange: EE, from half a second on the hand is "
         f"{_error(motion, controls, 15):.1f} cm off the red line"
@@ -804,6 +820,7 @@ def _compared_free(studio: _Studio) -> Image.Image:
                 for name, frame in moments.items()
             ]
         )
+
     return studio.grid(rows)
 
 
@@ -830,7 +847,9 @@ def _compared_led(studio: _Studio) -> Image.Image:
             panels.append(
                 studio.captioned(picture, system, f"{_error(motion, controls):.1f} cm off")
             )
+
         rows.append(panels)
+
     return studio.grid(rows)
 
 
@@ -868,12 +887,14 @@ def draw(
     for number in chosen:
         if number not in FIGURES:
             raise InputError(f"There is no figure {number}; choose among {', '.join(FIGURES)}.")
+
     if not others and any(number in _OF_SEVERAL for number in chosen):
         print(
             "Figures 15 and 16 compare systems and no other system's weights were given: left out.",
             file=sys.stderr,
         )
         chosen = [number for number in chosen if number not in _OF_SEVERAL]
+
     studio = _Studio(
         load_weights(weights), {name: load_weights(file) for name, file in others.items()}, scale
     )
@@ -885,5 +906,6 @@ def draw(
         flat = picture.quantize(_COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
         with whole_file(files[-1]) as part:
             flat.save(part, format="PNG", optimize=True)
+
     progress(1.0)
     return files

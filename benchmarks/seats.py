@@ -50,8 +50,10 @@ def seat(height: float, back: bool) -> Scene:
     for x in (-0.22, 0.18):
         for y in (-0.21, 0.19):
             solids.append(box((x, y, 0.0), (x + 0.04, y + 0.04, height - 0.05)))
+
     if back:
         solids.append(box((-0.22, -0.25, height - 0.05), (0.22, -0.21, height + 0.42)))
+
     return Scene(tuple(solids))
 
 
@@ -95,6 +97,7 @@ def measure(
                     "error": None if error is None else round(float(error), 4),
                 }
             )
+
     empty: list[dict[str, Any]] = []
     for done, way in enumerate(ways):
         progress((len(situations) + done) / count)
@@ -108,6 +111,7 @@ def measure(
             empty.append(
                 {"approach": way, "temperature": temperature, "drop": round(float(drop), 4)}
             )
+
     progress(1.0)
 
     def share(**chosen: Any) -> float:
@@ -142,6 +146,7 @@ def measure(
             f"  by {key}: "
             + ", ".join(f"{name} {100 * value:.0f} %" for name, value in table.items())
         )
+
     lines.append(
         f"Without a seat the pelvis drops by {100 * report['largest_drop_without_seat']:.0f} cm "
         "at most"

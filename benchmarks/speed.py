@@ -77,6 +77,7 @@ def recurrent_bytes(sampler: Sampler) -> int:
     ]
     if (predictor := sampler.network.predictor) is not None:
         arrays += [predictor.past, predictor.second.matrix, predictor.out.matrix]
+
     return sum(int(a.nbytes) for a in arrays)
 
 
@@ -95,6 +96,7 @@ def per_pose(sampler: Sampler, batch: int, frames: int) -> float:
             for t in range(frames):
                 sampler.decode(t, noise)
             best = min(best, perf_counter() - begin)
+
     return 1000.0 * best / (frames * batch)
 
 
@@ -118,7 +120,9 @@ def samp_row(config: SampConfig, frames: int, speed: float) -> dict[str, Any]:
                 for _ in range(frames):
                     network.decode(z, state, sensor)
                 best = min(best, perf_counter() - begin)
+
         row[f"ms_{batch}"] = round(1000.0 * best / (frames * batch), 3)
+
     row["over_floor"] = round(row["ms_1"] / row["floor_ms"], 2)
     return row
 
@@ -145,6 +149,7 @@ def measure(
     for name, model in models.items():
         weights = random_weights(model)
         timed += [(name, "NumPy", weights, None), (name, "torch", weights, "cpu")]
+
     timed.append(("DAFNet, these weights", "NumPy", load_weights(file), None))
     rows = []
     for done, (name, library, weights, device) in enumerate(timed):
@@ -161,8 +166,10 @@ def measure(
             row[f"ms_{batch}"] = round(
                 per_pose(sampler, batch, frames if batch == 1 else max(frames // 4, 2)), 3
             )
+
         row["over_floor"] = round(row["ms_1"] / row["floor_ms"], 2)
         rows.append(row)
+
     rows.insert(-1, samp_row(samp, frames, speed))
     torch.set_num_threads(threads)
     progress(1.0)

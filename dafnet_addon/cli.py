@@ -66,6 +66,7 @@ def main(
     try:
         if loading:
             loading.now()
+
         options = _parser(in_blender).parse_args(argv)
         _require(options)
         with ExitStack() as stack:
@@ -75,6 +76,7 @@ def main(
                 found = options.run(options, bar)
             if found is not None:
                 _say(json.dumps(found[0], indent=2) if options.json else found[1])
+
         return 0
     except SystemExit as stop:  # argparse has said why
         _say("")
@@ -102,10 +104,12 @@ def run(loading: Stop | None = None) -> None:
             stream.flush()
         except OSError:
             _discard(stream)
+
     if "bpy" in sys.modules:
         # The module of Blender 4.2 crashes at exit once a property with a poll function was
         # registered, unregistered or not.
         os._exit(code)
+
     sys.exit(code)
 
 
@@ -229,6 +233,7 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     )
     for name in ("root", "furniture", "head", "hand-left", "hand-right", "upper-body"):
         bake.add_argument(f"--{name}", metavar="NAME", help="overrides the character's own setting")
+
     bake.add_argument("--mode", choices=MODES, help="one mode for all frames")
     bake.add_argument(
         "--frames",
@@ -603,6 +608,7 @@ def _bake(options: argparse.Namespace, bar: "_Bar") -> _Result:
         lines.append(
             f"{printable(take['action'])}: {take['frames']} frames, seed {take['seed']}, {slides}"
         )
+
     lines.append(
         ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in report["seconds"].items())
     )
@@ -658,6 +664,7 @@ def _train(options: argparse.Namespace, bar: "_Bar") -> _Result:
     model, config = read_config(options.config, options.set)
     if options.minutes is not None:
         config = replace(config, minutes_flow=options.minutes)
+
     device = ranks.device_of(options.device)
     begin_with = load_weights(options.begin_with) if options.begin_with else None
     file = options.output / f"{model.system}.safetensors"
@@ -676,6 +683,7 @@ def _train(options: argparse.Namespace, bar: "_Bar") -> _Result:
     )
     if ranks.rank():
         return None
+
     write_weights(options.output, options.dataset, file, device)
     return {"weights": str(file)}, f"Written to {file}"
 
@@ -698,6 +706,7 @@ def _validate(options: argparse.Namespace, bar: "_Bar") -> _Result:
     ):
         if options.every is not None:
             _complain(said(found))
+
     rows = recorded(options.training)
     return rows, "\n".join(said(each) for each in rows)
 
@@ -718,16 +727,19 @@ def _carry(options: argparse.Namespace, bar: "_Bar") -> _Result:
     source, output = options.folder, options.output
     if source.resolve() == output.resolve():
         raise InputError("What is carried goes to another folder than its own; name another.")
+
     require_writable(output / "dataset.json")
     if any(source.glob("*.checkpoint")):
         from .training.checkpoints import slim_run
 
         files = [str(file) for file in slim_run(source, output)]
         return {"files": files}, "\n".join(files)
+
     if is_packed(source):
         windows = unpack(source, output, bar)
     else:
         windows = pack(source, output, options.mebibytes, bar)
+
     return {"windows": windows}, f"{windows} windows written to {output}"
 
 
@@ -740,11 +752,14 @@ def _evaluate(options: argparse.Namespace, bar: "_Bar") -> _Result:
 
     for folder in filter(None, (options.output, options.sheets)):
         require_writable(folder / "evaluation.json")
+
     if options.furniture:
         return _evaluate_among_real(options, bar)
+
     clips = held_out(options.folder)
     if _is_samp(options.weights):
         return _evaluate_samp(options, clips, bar)
+
     weights = load_weights(options.weights)
     found = report(weights, clips, bar)
     if options.save:
@@ -753,12 +768,14 @@ def _evaluate(options: argparse.Namespace, bar: "_Bar") -> _Result:
             weights.path,
             {"ground_truth": json.dumps(rows["ground_truth"]), "held_out": json.dumps(rows)},
         )
+
     if options.output:
         save_text(options.output / "evaluation.json", json.dumps(found, indent=2))
         save_text(options.output / "evaluation.md", text(found))
         plot(found, options.output / "evaluation.png")
     if options.sheets:
         contact_sheets(weights, clips, options.sheets)
+
     return found, text(found)
 
 
@@ -777,6 +794,7 @@ def _evaluate_among_real(options: argparse.Namespace, bar: "_Bar") -> _Result:
         raise InputError(
             "The test among real furniture makes tables only; leave out --save and --sheets."
         )
+
     weights = load_weights(options.weights)
     found = real_report(
         weights,
@@ -788,6 +806,7 @@ def _evaluate_among_real(options: argparse.Namespace, bar: "_Bar") -> _Result:
         save_text(options.output / f"real-{options.role}.json", json.dumps(found, indent=2))
         title = f"Bodies and makers that {options.role}"
         save_text(options.output / f"real-{options.role}.md", real_page(found, title))
+
     return found, real_text(found)
 
 
@@ -801,10 +820,12 @@ def _evaluate_samp(options: argparse.Namespace, clips: "list[HeldClip]", bar: "_
         raise InputError(
             "A checkpoint of SAMP gives a table only; leave out --save, --sheets and --output."
         )
+
     kind, _ = load_samp(options.weights)
     found = {}
     for each in ("samp", "samp-a") if kind == "samp" else (kind,):
         found[each] = rows(measured_samp(options.weights, each, clips, bar))
+
     return found, "\n\n".join(f"## {name}\n\n{table(r)}" for name, r in found.items())
 
 
@@ -826,6 +847,7 @@ def _figures(options: argparse.Namespace, bar: "_Bar") -> _Result:
         if not file:
             raise InputError(f"'{each}' names no weights file; write it as NAME=FILE.")
         others[name] = Path(file)
+
     require_writable(options.output / "figure.png")
     files = [
         str(file)
@@ -852,6 +874,7 @@ def _require(options: argparse.Namespace) -> None:
         raise InputError(
             "This command is not part of the extension; run it from a checkout of the project."
         )
+
     missing = [_PACKAGES.get(name, name) for name in options.needs(options) if not _is_there(name)]
     if missing:
         inside = ", or run it inside Blender" if missing == ["bpy"] else ""

@@ -51,6 +51,7 @@ class DAFNET_OT_bake_to_rig(DafnetOperator, bpy.types.Operator):
                 else "its proportions are others"
             )
             self.report({"WARNING"}, f"The rig is off the character's motion, {off}: {why}")
+
         places = ", ".join(
             f"{part} {100 * mean:.1f} ({100 * most:.1f})"
             for part, (mean, most) in baked.errors.items()

@@ -36,6 +36,7 @@ def may_direct(cls: type[bpy.types.Operator], context: bpy.types.Context) -> boo
     """
     if not idle(cls):
         return False
+
     if context.mode != "OBJECT":
         cls.poll_message_set("Leave the current mode for object mode first")
     elif (character := sent(context)[0]) is None:
@@ -44,6 +45,7 @@ def may_direct(cls: type[bpy.types.Operator], context: bpy.types.Context) -> boo
         cls.poll_message_set("Choose the character's root")
     else:
         return True
+
     return False
 
 

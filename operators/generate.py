@@ -55,6 +55,7 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
         character = character_of(context)
         if not idle(cls):
             return False
+
         if character is None:
             cls.poll_message_set("Select a character, or add one")
         elif character.dafnet.root is None:
@@ -63,6 +64,7 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
             cls.poll_message_set("Leave the current mode for object or pose mode first")
         else:
             return True
+
         return False
 
     @classmethod
@@ -79,9 +81,11 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
         character = character_of(context)
         if self.task == "NEW":
             return job.settings_of(character, context.scene)
+
         take = active_take(character)
         if take is None:
             raise InputError("Choose a take in the list of takes first.")
+
         first, last = frames_of(take)
         if self.task == "ONWARD":
             return job.settings_of(
@@ -91,6 +95,7 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
                 kept_until=context.scene.frame_current,
                 frame_start=first,
             )
+
         draw = draw_of(take)
         return job.settings_of(
             character,

@@ -78,11 +78,13 @@ class LongOperator(DafnetOperator):
             self.cancel(context)
             self.report({"INFO"}, "Cancelled; the scene is as it was")
             return {"CANCELLED"}
+
         if event.type != "TIMER":
             allowed = event.type in _LOOKING or (
                 event.type == "LEFTMOUSE" and _over_sidebar(context, event)
             )
             return {"PASS_THROUGH"} if allowed else {"RUNNING_MODAL"}
+
         result = None
         running = False
         try:
@@ -92,11 +94,13 @@ class LongOperator(DafnetOperator):
         finally:
             if not running:
                 self.cancel(context)
+
         if running:
             self._show(context)
             return {"RUNNING_MODAL"}
         if result is None:
             return {"CANCELLED"}
+
         self.tell(result)
         return {"FINISHED"}
 
@@ -129,6 +133,7 @@ class LongOperator(DafnetOperator):
             except StopIteration as done:
                 return done.value
             step, now = perf_counter() - now, perf_counter()
+
         return None
 
     def _show(self, context: bpy.types.Context) -> None:

@@ -37,6 +37,7 @@ class DAFNET_OT_mark_frames(DafnetOperator, bpy.types.Operator):
         if overlays.shown_faults(plays) is not None:
             overlays.hide_faults()
             return
+
         takes = dict.fromkeys(
             [plays, *(action for action in takes_of(character) if PACKED in action)]
         )

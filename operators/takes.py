@@ -69,6 +69,7 @@ class DAFNET_OT_play_take(_OfTakes, bpy.types.Operator):
             index = (playing + (1 if self.step == "NEXT" else -1)) % len(rows)
         if not 0 <= index < len(rows) or rows[index] is None:
             raise InputError("This take's action was deleted; remove its row.")
+
         play_take(character, rows[index])
 
 

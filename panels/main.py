@@ -69,6 +69,7 @@ class DAFNET_PT_character(bpy.types.Panel):
                     icon="TRACKING_FORWARDS",
                 ).goal = "SEAT"
                 return
+
             layout.label(text="No character is selected", icon="INFO")
             layout.operator(DAFNET_OT_add_character.bl_idname, icon="ARMATURE_DATA")
             return
@@ -87,6 +88,7 @@ class DAFNET_PT_character(bpy.types.Panel):
         row.prop(settings, "furniture")
         if settings.furniture is None:
             row.operator(DAFNET_OT_find_furniture.bl_idname, text="", icon="VIEWZOOM")
+
         row = column.row(align=True)
         row.prop(settings, "root", icon="EMPTY_ARROWS")
         if lacks_root(context, character):

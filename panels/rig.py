@@ -79,6 +79,7 @@ class DAFNET_PT_rig(bpy.types.Panel):
         column.prop(own, "root_motion")
         if own.root_motion == "BONE":
             column.prop_search(own, "root_bone", rig.data, "bones")
+
         column.prop(own, "limbs")
         row = layout.row()
         row.scale_y = 1.5

@@ -97,6 +97,7 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
         if not len(own.takes):
             layout.label(text="Generated takes are listed here", icon="INFO")
             return
+
         row = layout.row()
         row.template_list(DAFNET_UL_takes.bl_idname, "", own, "takes", own, "active_take", rows=4)
 
@@ -110,6 +111,7 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
         take = active_take(character)
         if take is None:
             return
+
         figures = take.dafnet
         layout.label(
             text=(

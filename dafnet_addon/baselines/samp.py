@@ -221,6 +221,7 @@ class SampTraining:
             self.network.measure("in", before, _LEAST)
             self.network.measure("out", after, _LEAST)
             self.network.measure("sensor", sensor, _LEAST_SEEN)
+
         self.network.to(self.device)
 
     def _states(self, pool: Pool, rows: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -268,9 +269,11 @@ class SampTraining:
                 return (inputs_of(following(parts, goals[:, t])) - net.in_mean) / net.in_std
 
             before = self._lived(before, after, sensor, share, fed)
+
         before, after, sensor = (a.flatten(0, 1) for a in (before, after, sensor))
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.config.mixed):
             made, mean, log_variance = (a.float() for a in net(before, after, sensor))
+
         kl = 0.5 * (mean.square() + log_variance.exp() - 1.0 - log_variance).sum(-1).mean()
         return (made - after).square().sum(-1).mean() + _KL * kl
 
@@ -296,6 +299,7 @@ class SampTraining:
             else:
                 made, _, _ = self.network(out[t], after[:, t], sensor[:, t])
                 out.append(fed(t + 1, out[t], made.clamp(-_WIDE, _WIDE)))
+
         return torch.stack(out, dim=1)
 
 
@@ -360,7 +364,9 @@ def _walked(
             pose = following(made, parts.goal, seen_from(track.root[:, frame], root)).pose
             root = track.root[:, frame]
             parts = Parts(pose, truth.trajectory[:, t], truth.contacts[:, t], truth.goal[:, t])
+
         joints.append(points_back(parts.pose[..., :3], root[:, None]))
+
     return torch.stack(joints, dim=1).double().numpy()
 
 
@@ -388,6 +394,7 @@ def run(network: MotionNet, conditions: Conditions, z: np.ndarray) -> np.ndarray
         made = network.decode(noise[t], last, seen[t].expand(len(last), -1)).clamp(-_WIDE, _WIDE)
         out.append(made * network.out_std + network.out_mean)
         last = _remembered(told[min(t + 1, frames - 1)].expand(len(last), -1), last, made)
+
     return smpl_order(torch.stack(out).double().numpy())
 
 
@@ -406,6 +413,7 @@ def takes(
             noise[s] = np.random.default_rng([abs(seed), int(seed < 0)]).standard_normal(
                 noise[s].shape
             )
+
     if kind == "samp-ob":
         poses = run(network, shot.conditions, noise.swapaxes(0, 1))
         joints = [
@@ -417,4 +425,5 @@ def takes(
                 network, clip, shot.path, torch.from_numpy(noise).float(), own_root=kind == "samp"
             )
         )
+
     return np.stack([on_bones(take) for take in joints])

@@ -25,6 +25,7 @@ def _beside(file: Path, kind: str, clip: HeldClip) -> Measured:
             made = takes(network, clip, shot_of(clip, mode), [None, *range(SEEDS)], kind)
             runs[f"{mode.lower()}_t0"] = figures(clip, made[:1], mode)
             runs[f"{mode.lower()}_t1"] = figures(clip, made[1:], mode)
+
     return Measured(clip, runs)
 
 

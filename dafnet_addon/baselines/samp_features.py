@@ -105,6 +105,7 @@ def _solid(boxes: np.ndarray, place: np.ndarray) -> np.ndarray:
     ]
     if not len(near):
         return np.zeros(len(VOXELS))
+
     points = rotate(yaw_matrix(place[2]), VOXELS.numpy().astype(float))
     points[:, :2] += place[:2]
     return np.clip(1.0 - distances(near, points).min(0) / CELL, 0.0, 1.0)
@@ -162,6 +163,7 @@ def _goals(
         does[until] = np.eye(len(ACTIONS))[4 if action[start:end, 4].mean() > 0.5 else 3]
         solids.append(_solid(boxes, place[start]))
         which[until] = len(solids)
+
     return np.concatenate([_places(place), rise[:, None]], axis=1), does, which, solids
 
 
@@ -190,12 +192,14 @@ def _track(
         goals.append(goal)
         does.append(act)
         solids += found
+
     # One long motion: where one begins and another ends, straight limbs may twist a little.
     frames = fit(joints.reshape(-1, 22, 3))[1].reshape(*joints.shape[:2], 22, 3, 3)
     axes = np.concatenate([frames[..., 1], frames[..., 2]], axis=-1)
     velocity = np.diff(joints, axis=1, prepend=joints[:, :1]) * MODEL_FPS
     if joints.shape[1] > 1:
         velocity[:, 0] = velocity[:, 1]
+
     arrays = {
         "root": _places(root),
         "joints": joints,
@@ -271,6 +275,7 @@ def _window_root(root: np.ndarray, velocity: np.ndarray, ahead: np.ndarray) -> n
         out[:, i, 2] = out[:, i + 1, 2] - velocity[:, i, 2]
         step = np.concatenate([velocity[:, i, :2], np.zeros((len(root), 1))], axis=1)
         out[:, i, :2] = out[:, i + 1, :2] - rotate(yaw_matrix(out[:, i, 2]), step)[:, :2]
+
     way = ahead[:, 40:, -3:]
     step = np.concatenate([way[..., :2], np.zeros_like(way[..., :1])], axis=-1)
     out[:, 81:, :2] = root[:, 40:, :2] + rotate(yaw_matrix(root[:, 40:, 2]), step)[..., :2]
@@ -309,6 +314,7 @@ def of_clip(clip: HeldClip, path: RootPath) -> tuple[Track, Tensor]:
     touched = contacts(clip.joints).astype(float)
     for rest in clip.rests:
         touched[rest.start : rest.end, _TOUCHES] = 1.0
+
     low = (height < _SITS_UNDER) | (touched[:, _TOUCHES] > 0)
     seat = np.where(low, height - SEAT_TO_PELVIS, 0.0)
 

@@ -44,6 +44,7 @@ def train_samp(
         kept.restore(run.network, optimiser)
         step, seconds = kept.progress()
         kept.set_generators(device)
+
     clock, losses = clock_of(device), []
     while (share := training.share(step, seconds)) < 1.0:
         begin = clock()
@@ -58,11 +59,13 @@ def train_samp(
                     f"The loss of '{kind}' is not a number by step {step}; resume with a lower "
                     "peak rate."
                 )
+
             drawn = {f"generator.{name}": state for name, state in generators(device).items()}
             state = {"kind": kind, "config": asdict(run.config), "step": step, "seconds": seconds}
             write_checkpoint(file, {**of_training(run.network, optimiser), **drawn}, state)
             progress(training.share(step, seconds), mean)
             losses.clear()
+
     return step
 
 
@@ -73,9 +76,11 @@ def load_samp(file: Path) -> tuple[str, MotionNet]:
     kept = Checkpoint.read(file)
     if kept.state.get("kind") not in KINDS:
         raise kept.refused("it holds none of SAMP's networks")
+
     kind, config = kept.text("kind"), kept.settings(SampConfig, "config")
     with torch.device("meta"):
         kept.fits(network_of(kind, config))
+
     network = network_of(kind, config)
     kept.restore(network)
     return kind, network

@@ -64,10 +64,12 @@ def is_character(candidate: bpy.types.Object) -> bool:
         return False
     if candidate.dafnet.root is not None or candidate.mode == "EDIT":
         return True
+
     try:
         character_scale(candidate)
     except InputError:
         return False
+
     return True
 
 
@@ -95,6 +97,7 @@ def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
         return active if is_character(active) else None
     if active.parent and is_character(active.parent):
         return active.parent
+
     for candidate in context.scene.objects:
         own = candidate.dafnet
         if candidate.type == "ARMATURE" and active in (
@@ -104,6 +107,7 @@ def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
             own.hand_right,
         ):
             return candidate
+
     return None
 
 
@@ -134,6 +138,7 @@ def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:
     """
     if armature.mode == "EDIT":
         raise InputError(f"The armature '{armature.name}' is in edit mode; leave it and try again.")
+
     if missing := missing_bones(armature):
         raise InputError(
             f"The armature '{armature.name}' has no bone '{missing[0]}'; use a character made "
@@ -167,6 +172,7 @@ def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:
             f"The armature '{armature.name}' is scaled unevenly; set its three scales to the same "
             "positive value."
         )
+
     return scale * float(size[0]) * unit
 
 
@@ -189,6 +195,7 @@ def create_character(
         raise InputError(
             "A character can only be added in object mode; leave the current mode first."
         )
+
     scale = height / STATURE / metres_per_unit(context.scene)
     collection = bpy.data.collections.new(name)
     context.scene.collection.children.link(collection)
@@ -215,6 +222,7 @@ def create_character(
 
     for selected in context.view_layer.objects.selected:
         selected.select_set(False)
+
     settings.root.select_set(True)
     armature.select_set(True)
     context.view_layer.objects.active = armature
@@ -254,6 +262,7 @@ def _armature_object(
         bone.tail = scale * FACING @ _tail(joint_name)
         if PARENTS[j] >= 0:
             bone.parent = armature.data.edit_bones[JOINTS[PARENTS[j]]]
+
         across = abs(bone.vector.normalized().x) > 0.7
         ahead = abs(bone.vector.normalized().y) > 0.7
         bone.align_roll(Vector((0, 0, 1)) if across or ahead else Vector((0, -1, 0)))
@@ -261,6 +270,7 @@ def _armature_object(
     bpy.ops.object.mode_set(mode="OBJECT")
     for bone in armature.pose.bones:
         bone.rotation_mode = "QUATERNION"
+
     armature.data.display_type = "STICK"
     armature.show_in_front = True
     return armature

@@ -52,6 +52,7 @@ def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
             f"The armature '{armature.name}' has a parent; clear it, and parent the root object "
             "instead."
         )
+
     if any(not constraint.mute for constraint in armature.constraints) or has_drivers(
         armature, TRANSFORMS
     ):
@@ -74,12 +75,14 @@ def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
         raise InputError(
             f"The armature '{armature.name}' shows its rest position; set it to Pose Position."
         )
+
     data = armature.animation_data
     if data and (data.use_tweak_mode or any(track.is_solo for track in data.nla_tracks)):
         raise InputError(
             f"The armature '{armature.name}' plays an NLA strip in tweak or solo mode; leave it "
             "first."
         )
+
     return character_scale(armature, unit)
 
 
@@ -120,6 +123,7 @@ def bake(
             f"The character '{armature.name}' no longer has the size of the take; generate it "
             "again."
         )
+
     if not all(np.isfinite(values).all() for values in (take.joints, take.rotations, take.root)):
         raise InputError("The take holds values that are not numbers; generate it again.")
 
@@ -149,6 +153,7 @@ def bake(
         if j == 0:
             moved = (pelvis - rest[:3, 3]) @ rest[:3, :3]
             key_curves(add_curve, path + "location", joint_name, frames=frames, values=moved)
+
         key_curves(
             add_curve,
             path + "rotation_quaternion",
@@ -156,16 +161,19 @@ def bake(
             frames=frames,
             values=quaternions,
         )
+
     for curve in carried:
         copy_curve(curve, add_curve)
 
     if previous:
         previous.use_fake_user = True
+
     armature.rotation_mode = "XYZ"
     for joint_name in JOINTS:
         bone = armature.pose.bones[joint_name]
         bone.matrix_basis.identity()
         bone.rotation_mode = "QUATERNION"
+
     assign_action(armature, action)
     return action
 

@@ -51,6 +51,7 @@ def bake_takes(
     source = file or (Path(bpy.data.filepath) if bpy.data.filepath else None)
     if output is None and source is None:
         raise InputError("The scene was never saved; name an output.")
+
     written = output or source
     assert written is not None
     if written.suffix != ".blend":
@@ -64,6 +65,7 @@ def bake_takes(
 
     if file is not None:
         _open(file)
+
     progress(0.0)
     warnings = tuple(_warnings_about_file(in_place=output is None))
     for library in bpy.data.libraries:
@@ -113,6 +115,7 @@ def _open(file: Path) -> None:
     """
     if not file.is_file():
         raise InputError(f"There is no file '{file}'; check its path.")
+
     try:
         bpy.ops.wm.open_mainfile(filepath=str(file.resolve()))
     except RuntimeError as error:
@@ -134,12 +137,14 @@ def _warnings_about_file(in_place: bool) -> Iterator[str]:
         yield (
             f"{newer}, so parts of it may be missing from the output; bake it with that Blender."
         )
+
     for library in bpy.data.libraries:
         if library.is_missing:
             yield (
                 f"The library '{library.filepath}' is missing, and so is what the scene links "
                 "from it; put it back."
             )
+
     if bpy.app.autoexec_fail:
         yield (
             f"A script in the file did not run ({bpy.app.autoexec_fail_message}), so whatever it "
@@ -179,6 +184,7 @@ def _hint_at_other_scenes(scene: bpy.types.Scene, named: str | None) -> str:
                 return (
                     f"the scene '{other.name}' has '{armature.name}': give --scene '{other.name}'"
                 )
+
     return ""
 
 
@@ -195,6 +201,7 @@ def _character(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
             )
             raise InputError(f"The scene '{scene.name}' has no armature '{name}'; {to_do}.")
         return named[0]
+
     characters = [ob for ob in armatures if is_character(ob)]
     directed = [ob for ob in characters if ob.dafnet.root is not None] or characters
     if not directed:
@@ -203,9 +210,11 @@ def _character(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
             or "add one in Blender with Add Character and save the file"
         )
         raise InputError(f"The scene '{scene.name}' has no character; {to_do}.")
+
     if len(directed) > 1:
         names = ", ".join(f"'{ob.name}'" for ob in directed)
         raise InputError(
             f"The scene has several characters; choose one of {names} with --character."
         )
+
     return directed[0]

@@ -68,6 +68,7 @@ def playback_restorer(owner: bpy.types.Object) -> Callable[[bpy.types.Object], N
     data = owner.animation_data
     if data is None:
         return lambda found: found.animation_data_clear()
+
     action = data.action
     name, kept = (action.name_full, action.use_fake_user) if action else (None, False)
     mixed = data.action_blend_type, data.action_influence
@@ -85,6 +86,7 @@ def playback_restorer(owner: bpy.types.Object) -> Callable[[bpy.types.Object], N
                     (each for each in action.slots if each.handle == slot), None
                 )
             data.last_slot_identifier = last_slot
+
         if action:
             action.use_fake_user = kept
 
@@ -100,6 +102,7 @@ def action_curves(owner: bpy.types.Object) -> list[bpy.types.FCurve]:
         return list(data.action.fcurves)
     if data.action_slot is None:
         return []
+
     bags = (
         strip.channelbag(data.action_slot) for layer in data.action.layers for strip in layer.strips
     )
@@ -111,6 +114,7 @@ def animated_paths(owner: bpy.types.ID) -> set[str]:
     data = getattr(owner, "animation_data", None)
     if data is None:
         return set()
+
     actions = {
         data.action,
         *(strip.action for track in data.nla_tracks for strip in track.strips),

@@ -39,11 +39,13 @@ def copy_curve(
     _copy_keys(source, target)  # after the settings, some of which let Blender lay the handles anew
     for modifier in source.modifiers:
         _copy_modifier(modifier, target.modifiers.new(modifier.type))
+
     if group and len(target.group.channels) == 1:
         _copy_properties(group, target.group)
         target.group.lock = group.lock
     elif group and group.mute:
         target.mute = True
+
     target.lock = source.lock
     return target
 
@@ -56,7 +58,9 @@ def _copy_keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
         new.foreach_set("co", places.ravel())
         for point in new:
             point.interpolation = "LINEAR"
+
         return
+
     new.add(len(old))
     kinds = bpy.types.Keyframe.bl_rna.properties
     names = [kind.identifier for kind in kinds if kind.type in _KINDS and not kind.is_readonly]
@@ -74,6 +78,7 @@ def _copy_modifier(source: bpy.types.FModifier, target: bpy.types.FModifier) -> 
     _copy_properties(source, target)
     if source.type != "ENVELOPE":
         return
+
     old, new = source.control_points, target.control_points
     for k in range(len(old)):
         new.add(float(k))

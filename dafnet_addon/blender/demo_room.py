@@ -202,6 +202,7 @@ def build_room(context: bpy.types.Context) -> Room:
     furniture = new_collection(scene, "Furniture")
     for name, place in PLACES.items():
         add_piece(furniture, name, FURNITURE[name], place)
+
     _camera_and_lights(scene, new_collection(scene, "Camera and Lights"), walked)
 
     scene.cursor.location = (0.0, 0.0, 0.0)
@@ -221,6 +222,7 @@ def build_room(context: bpy.types.Context) -> Room:
     for frame, mode in ((1, "FREE"), (board.start + 5, "EE"), (board.stop - 6, "FREE")):
         settings.mode = mode
         armature.keyframe_insert("dafnet.mode", frame=frame)
+
     scene.frame_set(1)
     return Room(scene, armature, walked)
 
@@ -267,6 +269,7 @@ def run_demo(
             2,
             lambda part: progress(generating + (1 - generating) * part),
         )
+
     return report
 
 
@@ -287,11 +290,13 @@ def add_piece(
         if part.material not in names:
             names.append(part.material)
         _add(shape, part, names.index(part.material))
+
     mesh = bpy.data.meshes.new(name)
     shape.to_mesh(mesh)
     shape.free()
     for material in names:
         mesh.materials.append(_material(material))
+
     made = bpy.data.objects.new(name, mesh)
     made.location = (*place.position, 0.0)
     made.rotation_euler = (0.0, 0.0, place.yaw)
@@ -309,11 +314,13 @@ def _add(shape: bmesh.types.BMesh, part: Part, material: int) -> None:
         )
     else:
         bmesh.ops.create_cube(piece, size=1.0, matrix=frame)
+
     sharp = [edge for edge in piece.edges if edge.calc_face_angle(0.0) > radians(60)]
     if part.bevel > 0.0:
         bmesh.ops.bevel(
             piece, geom=sharp, offset=part.bevel, segments=3, profile=0.5, affect="EDGES"
         )
+
     wide = 4 * part.bevel**2
     flat = {
         face
@@ -325,6 +332,7 @@ def _add(shape: bmesh.types.BMesh, part: Part, material: int) -> None:
         copy = shape.faces.new([vertices[v] for v in face.verts])
         copy.smooth = face not in flat
         copy.material_index = material
+
     piece.free()
 
 
@@ -336,9 +344,11 @@ def _material(name: str) -> bpy.types.Material:
         found.diffuse_color = colour
         if found.node_tree is None:  # before 5.0
             found.use_nodes = True
+
         shader = next(node for node in found.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
         shader.inputs["Base Color"].default_value = colour
         shader.inputs["Roughness"].default_value = 0.6
+
     return found
 
 
@@ -358,6 +368,7 @@ def _camera_and_lights(
     for aim in aims:
         look_at(camera, (4.4, -6.1, 2.70), aim.tolist())
         turns.append(tuple(camera.rotation_euler))
+
     key_channels(camera, np.arange(1, len(aims) + 1), rotation_euler=np.array(turns))
 
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
@@ -383,4 +394,5 @@ def key_channels(owner: bpy.types.Object, frames: np.ndarray, **channels: np.nda
             )
             curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), linear))
             curve.update()
+
     assign_action(owner, action)

@@ -137,6 +137,7 @@ class Dependencies:
                 if aspect not in self._next:
                     self._next[aspect] = set(_followed(*aspect))
                 waiting += self._next[aspect]
+
         return found
 
     def _rigid(self, owner: bpy.types.Object) -> Iterator[Simulation]:
@@ -149,6 +150,7 @@ class Dependencies:
             or world.point_cache.is_baked
         ):
             return
+
         may_be_released = "rigid_body.kinematic" in animated_paths(owner)
         if (
             body is not None
@@ -176,6 +178,7 @@ class Dependencies:
                 if scene.use_custom_simulation_range
                 else scene.frame_start
             )
+
         if since:
             colliders = (
                 o for o in scene.objects if any(m.type == "COLLISION" for m in o.modifiers)
@@ -278,6 +281,7 @@ def _pointers(block: bpy.types.bpy_struct, depth: int) -> Iterator[bpy.types.ID]
     for each in block.values() if isinstance(block, bpy.types.NodesModifier) else ():
         if isinstance(each, bpy.types.ID):
             yield each
+
     for kind in block.bl_rna.properties:
         if kind.type not in {"POINTER", "COLLECTION"} or kind.identifier == "rna_type":
             continue

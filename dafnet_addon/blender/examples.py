@@ -235,6 +235,7 @@ def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
         raise InputError(
             "An example can only be added in object mode; leave the current mode first."
         )
+
     scene, example = context.scene, EXAMPLES[kind]
     unit, fps = metres_per_unit(scene), scene.render.fps / scene.render.fps_base
     plan = example.plan(fps)
@@ -252,6 +253,7 @@ def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
         armature = create_character(context)
     finally:
         scene.cursor.location = middle
+
     armature.rotation_euler.z += float(path.yaw[0])
     own = armature.dafnet
     own.furniture = furniture
@@ -275,9 +277,11 @@ def _direct(
         if plan.ee_frames is None or role not in plan.targets:
             setattr(own, f"{role}_influence", 0.0 if plan.ee_frames else 1.0)
             continue
+
         begin, end = plan.ee_frames
         frames = np.arange(begin, end)
         key_channels(target, first + frames, location=middle + plan.targets[role][frames] / unit)
+
     if plan.ee_frames is not None:
         modes = [(0, "FREE"), (plan.ee_frames[0], "EE")]
         if plan.ee_frames[1] < len(plan.route.path):

@@ -51,6 +51,7 @@ def furniture_of(settings: Settings, dependencies: Dependencies) -> "Furniture |
     """
     if settings.furniture is None:
         return None
+
     scene = find_scene(settings)
     armature = find_object(settings, settings.armature, "character")
     named = (settings.root, settings.head, settings.hand_left, settings.hand_right)
@@ -78,10 +79,12 @@ def furniture_now(context: bpy.types.Context, settings: Settings) -> dict[str, l
     furniture = furniture_of(settings, Dependencies(scene))
     if furniture is None:
         return {}
+
     furniture.begin(context.evaluated_depsgraph_get())
     found: dict[str, list[Mesh]] = defaultdict(list)
     for solid in furniture.solids(metres_per_unit(scene)):
         found[solid.name].append(solid)
+
     return dict(found)
 
 
@@ -154,6 +157,7 @@ class Furniture:
             pointer = instance.object.data.as_pointer()
             if pointer not in shapes:
                 shapes[pointer] = _geometry(instance.object)
+
             vertices, triangles = shapes[pointer]
             if len(triangles):
                 source = None if instance.is_instance else instance.object.original
@@ -173,11 +177,13 @@ class Furniture:
                 f"The furniture collection '{name}' has no visible mesh besides the character's "
                 "own; add some, or clear the setting."
             )
+
         if not self._pieces:
             raise InputError(
                 f"The meshes of the furniture collection '{name}' have no faces; add some, or "
                 "choose another collection."
             )
+
         self._shown = {o: o.visible_get() for o in self.members if _may_have_faces(o)}
 
     def add(self, depsgraph: bpy.types.Depsgraph, shaped: set[bpy.types.Object]) -> None:
@@ -228,11 +234,13 @@ class Furniture:
             yield (
                 f"'{name}' is scaled to zero, so the character does not see it; give it a scale."
             )
+
         for name in self._changed:
             yield (
                 f"The shape of '{name}' changes during the shot; its shape at the first frame is "
                 "used."
             )
+
         for name in self._toggled:
             yield (
                 f"'{name}' is shown or hidden during the shot; it counts throughout as it does at "
@@ -246,11 +254,13 @@ class Furniture:
         }
         if carried := self._named(self._carried - worn):
             yield f"Ignored as furniture, since the character moves it: {carried}."
+
         if helpers := self._named(self._helpers):
             yield (
                 f"Ignored as helpers, since no render shows them: {helpers}; let renders show "
                 "what should count."
             )
+
         if doubtful := self._named(self._doubtful):
             yield (
                 "Not rendered, or drawn as wire or bounds, but solid for the character: "
@@ -284,6 +294,7 @@ class Furniture:
     def _compare(self, piece: _Piece, evaluated: bpy.types.Object) -> None:
         if piece.name in self._changed:
             return
+
         vertices, _ = _geometry(evaluated)
         tolerance = _SHAPE_TOLERANCE * np.ptp(piece.vertices, axis=0).max()
         if (
@@ -342,6 +353,7 @@ def _geometry(evaluated: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
         mesh.loop_triangles.foreach_get("vertices", triangles)
     finally:
         evaluated.to_mesh_clear()
+
     return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3)
 
 

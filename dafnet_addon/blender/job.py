@@ -97,6 +97,7 @@ def run(
     """
     if weights is None:
         weights = load_weights(weights_path(context))
+
     started = perf_counter()
     used = names_in_use(settings)
     resume, resume_frame = _kept_take(settings)
@@ -106,6 +107,7 @@ def run(
         raise InputError(
             "Something was deleted while the scene was read; generate again."
         ) from error
+
     seconds = {"reading": perf_counter() - started}
 
     draws = draws_of(settings)
@@ -128,6 +130,7 @@ def run(
     started = perf_counter()
     if gone := used - names_in_use(settings):
         raise InputError(f"'{min(gone)}' is no longer in the scene; generate again.")
+
     actions = yield from within(_bake_steps(settings, takes, read.controls, draws), _GENERATED, 1.0)
     seconds |= takes[0].seconds | {"fitting": sum(take.seconds["fitting"] for take in takes)}
     seconds["baking"] = perf_counter() - started
@@ -159,12 +162,14 @@ def _kept_take(settings: Settings) -> tuple[Take | None, int]:
             f"The take '{action.name}' begins at another frame than the range; let the range "
             "start there."
         )
+
     render = find_scene(settings).render
     if not 0.0 < index * render.fps_base / render.fps < len(take) / take.fps:
         raise InputError(
             f"Frame {settings.kept_until} is not inside the take '{action.name}'; go to a "
             "frame in it."
         )
+
     return take, index
 
 
@@ -189,9 +194,11 @@ def _bake_steps(
                 names.append(action.name_full)
             if len(names) < len(takes):
                 yield len(names) / len(takes)
+
         actions = [find_action(name) for name in names]
         play_take(armature, actions[0])
         undo.pop_all()
+
     return actions
 
 

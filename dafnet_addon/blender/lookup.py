@@ -72,4 +72,5 @@ def names_in_use(settings: Settings) -> set[str]:
     for collection in bpy.data.collections:
         if collection.name_full == settings.furniture:
             used |= {collection.name_full, *(o.name_full for o in collection.all_objects)}
+
     return used

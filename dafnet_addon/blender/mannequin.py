@@ -317,10 +317,13 @@ def _part(
         n = (s + 1) % _SEGMENTS
         for r in range(0, last, _SEGMENTS):
             faces.append((r + s, r + n, r + _SEGMENTS + n, r + _SEGMENTS + s))
+
         faces.append((_RINGS * _SEGMENTS, n, s))
         faces.append((_RINGS * _SEGMENTS + 1, last + s, last + n))
+
     if axis == "y":  # its two other axes are exchanged, which turns faces inside out
         faces = [face[::-1] for face in faces]
+
     return points, faces
 
 
@@ -351,6 +354,7 @@ def add_body(
     mesh.from_pydata((scale * np.concatenate(vertices) @ FACING).tolist(), [], faces)
     for name, colour in _MATERIALS:
         mesh.materials.append(_material(name, colour))
+
     mesh.polygons.foreach_set("material_index", materials)
     mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), bool))
     mesh.update()
@@ -360,6 +364,7 @@ def add_body(
     body.parent = armature
     for bone, members in groups.items():
         body.vertex_groups.new(name=bone).add(members, 1.0, "REPLACE")
+
     body.modifiers.new("Armature", "ARMATURE").object = armature
     body.hide_select = True
     return body
@@ -373,7 +378,9 @@ def _material(name: str, colour: tuple[float, float, float, float]) -> bpy.types
         found.roughness = 0.6
         if found.node_tree is None:  # always there from 5.0 on
             found.use_nodes = True
+
         shader = next(node for node in found.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
         shader.inputs["Base Color"].default_value = colour
         shader.inputs["Roughness"].default_value = 0.6
+
     return found

@@ -108,6 +108,7 @@ def bake_onto_rig(
         raise InputError(
             f"The character '{character.name}' shows its rest position; set it to Pose Position."
         )
+
     rig_map = in_names_of(rig_map, rig.data.bones.keys()) if rig.mode != "EDIT" else rig_map
     required(rig, rig_map)
 
@@ -195,6 +196,7 @@ def _bake(
     }
     if previous:
         previous.use_fake_user = True
+
     if attachments.loose:
         _correct_loose(
             context,
@@ -246,6 +248,7 @@ def _prepare_rig(
     ):
         _key_setting(rig, add_curve, bone=bone, key=key, value=value, frame=first)
         switched.discard((bone, key))
+
     for bone, key in switched:
         value = rig.pose.bones[bone].get(key)
         _key_setting(rig, add_curve, bone=bone, key=key, value=value, frame=first)
@@ -258,6 +261,7 @@ def _prepare_rig(
         if control.bone in moved:
             kinds = ("location", "scale")[control.moves :]
             _key_rest(rig.pose.bones[control.bone], add_curve, first, kinds)
+
     return add_curve
 
 
@@ -289,20 +293,24 @@ def _facing(bodies: np.ndarray) -> np.ndarray:
 def _require_bakeable(context: bpy.types.Context, rig: bpy.types.Object, root_motion: str) -> None:
     if rig.type != "ARMATURE":
         raise InputError(f"'{rig.name}' is not an armature; choose the armature of your rig.")
+
     if rig.library:
         raise InputError(
             f"The armature '{rig.name}' is linked; make a library override of it, or make it "
             "local first."
         )
+
     if rig.data.pose_position == "REST":
         raise InputError(
             f"The armature '{rig.name}' shows its rest position; set it to Pose Position."
         )
+
     if rig not in {each.original for each in context.evaluated_depsgraph_get().ids}:
         raise InputError(
             f"'{rig.name}' or its collection is disabled in viewports; enable it, or hide it with "
             "H."
         )
+
     data = rig.animation_data
     if data and (data.use_tweak_mode or any(track.is_solo for track in data.nla_tracks)):
         raise InputError(
@@ -310,6 +318,7 @@ def _require_bakeable(context: bpy.types.Context, rig: bpy.types.Object, root_mo
         )
     if has_drivers(rig, TRANSFORMS):
         raise InputError(f"The object '{rig.name}' is moved by drivers; mute them and bake again.")
+
     delta = (*rig.delta_location, *rig.delta_rotation_euler, *(s - 1.0 for s in rig.delta_scale))
     if root_motion == "OBJECT" and (any(not c.mute for c in rig.constraints) or any(delta)):
         raise InputError(
@@ -331,6 +340,7 @@ def _record(
             bodies.append(np.array(evaluated.matrix_world, float))
             poses.append(pose_matrices(evaluated, list(JOINTS)))
             above.append(np.array(own.matrix_world @ own.matrix_basis.inverted_safe(), float))
+
     recording = _Recording(np.array(bodies), np.array(poses), np.array(above))
     if not all(
         np.isfinite(values).all() for values in (recording.bodies, recording.poses, recording.above)
@@ -339,6 +349,7 @@ def _record(
             f"'{character.name}' or '{rig.name}' has a transform that is not a number; fix what "
             "drives it."
         )
+
     return recording
 
 
@@ -356,6 +367,7 @@ def _animated(rig: bpy.types.Object) -> tuple[set[str], set[tuple[str, str]]]:
             switched.add((bone, key))
         elif bone in rig.pose.bones:
             moved.add(bone)
+
     return moved, switched
 
 
@@ -371,6 +383,7 @@ def _interfering(
     places = [rig_map.place(joint) for joint in JOINTS]
     for name in suspects:
         rig.pose.bones[name].matrix_basis.identity()
+
     rest = pose_matrices(evaluated_now(context, rig), places) if suspects else np.empty(0)
 
     found = []
@@ -381,10 +394,12 @@ def _interfering(
         change = np.abs(pose_matrices(evaluated_now(context, rig), places) - rest)
         if np.nanmax(change) > _INTERFERING:
             found.append(name)
+
         bone.matrix_basis.identity()
 
     for name in suspects - set(found):
         rig.pose.bones[name].matrix_basis = poses[name]
+
     return found
 
 
@@ -423,16 +438,19 @@ def _rotation_channels(mode: str, quaternions: np.ndarray) -> tuple[str, np.ndar
     """
     if mode == "QUATERNION":
         return "rotation_quaternion", quaternions
+
     if mode == "AXIS_ANGLE":
         axis, length = quaternions[:, 1:], np.linalg.norm(quaternions[:, 1:], axis=1)
         angle = 2.0 * np.arctan2(length, quaternions[:, 0])
         return "rotation_axis_angle", np.concatenate(
             [angle[:, None], normalised(axis, np.array([0.0, 1.0, 0.0]))], axis=1
         )
+
     angles, before = [], Euler((0.0, 0.0, 0.0), mode)
     for quaternion in quaternions:
         before = Quaternion(quaternion.tolist()).to_euler(mode, before)
         angles.append(tuple(before))
+
     return "rotation_euler", np.array(angles)
 
 
@@ -490,8 +508,10 @@ def _key_control(
         key_curves(
             adding_to("location"), start + "location", bone.name, frames=frames, values=moves
         )
+
     if control.pole is None:
         key_curves(adding_to("rotation"), start + path, bone.name, frames=frames, values=values)
+
     return curves
 
 

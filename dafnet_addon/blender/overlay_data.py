@@ -111,6 +111,7 @@ def watched_character(context: bpy.types.Context) -> bpy.types.Object | None:
     character, _ = sent(context)
     if character is None and last is not None and is_character(last):
         character = last
+
     _last_watched[:] = key, character.name if character else ""
     return character
 
@@ -204,6 +205,7 @@ def _ghosts(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Dra
             unpacked = _unpacked(action)
             if unpacked is None:
                 continue
+
             take = unpacked.take
             index = min(max(frame - action.dafnet.frame_start, 0), len(take) - 1)
             figures.append(
@@ -215,6 +217,7 @@ def _ghosts(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Dra
                     name=action.name,
                 )
             )
+
         return tuple(figures)
 
     return cache.recall("ghosts", (unit, frame, identities), draw)
@@ -239,6 +242,7 @@ def root_path(
     root, own, scene = armature.dafnet.root, armature.dafnet, context.scene
     if root is None:
         return None
+
     first, last = (
         (scene.frame_start, scene.frame_end)
         if own.use_scene_range
@@ -247,6 +251,7 @@ def root_path(
     matrices = _keyed_matrices(root, range(first, last + 1))
     if matrices is None:
         return None
+
     path, _ = root_from_matrices(matrices)
     return RootPath(path.position * metres_per_unit(scene), path.yaw), first
 
@@ -337,6 +342,7 @@ def _spheres(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Dr
     root, scene = armature.dafnet.root, context.scene
     if root is None:
         return ()
+
     frame = scene.frame_current, scene.frame_subframe
     key = cache.edits, cache.furniture, scene.session_uid, armature.session_uid, frame
 
@@ -383,6 +389,7 @@ def _contacts(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[D
     played = _played(context, armature)
     if played is None or played.frame is None:
         return ()
+
     frame, take = played.frame, played.take
     key = (
         cache.edits,
@@ -406,10 +413,12 @@ def _contacts(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[D
                 place = np.append(joints[toe, :2], root[2] + ABOVE_FLOOR)
                 lines.append((ring(place, 0.08 * size) / unit, _PLANTED))
                 beads.append((joints[toe, None] / unit, _PLANTED, 0.02 * size / unit))
+
         for place, gap in zip(judged, distances, strict=True):
             if bad_collisions(gap[None, None])[0]:
                 colour = _INSIDE if gap < 0.0 else _TOUCHING
                 beads.append((place[None] / unit, colour, 0.045 * size / unit))
+
         return (compose(lines, beads, width=2.5),)
 
     return cache.recall("contacts", key, draw)
@@ -422,6 +431,7 @@ def _reach(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Draw
     played = _played(context, armature)
     if played is None:
         return ()
+
     frame, take = played.frame, played.take
     unit = metres_per_unit(context.scene)
 
@@ -438,6 +448,7 @@ def _reach(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Draw
             target = _target_of(played.unpacked.controls, name)
             if target is None:
                 continue
+
             target = target / unit
             counts = np.isfinite(target).all(-1)
             both = counts[:-1] & counts[1:]
@@ -450,6 +461,7 @@ def _reach(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Draw
                 lines.append((np.array([[path[frame], target[frame]]]), NOW))
                 apart = 100.0 * unit * float(np.linalg.norm(path[frame] - target[frame]))
                 labels.append((target[frame], f"{apart:.1f} cm", NOW))
+
         return (compose(lines, beads, labels),)
 
     return cache.recall("reach", (played.action.session_uid, unit, frame), draw)
@@ -469,6 +481,7 @@ def _target_of(controls: Controls, name: str) -> np.ndarray | None:
     counts = np.array(modes) == "EE"
     if influence is not None:
         counts &= influence > 0.0
+
     places = np.where(counts[:, None], target, np.nan)
     return places if np.isfinite(places).any() else None
 
@@ -501,4 +514,5 @@ def drawings(context: bpy.types.Context, kinds: Collection[str]) -> dict[str, tu
             found[kind] = KINDS[kind](context, armature)
         except (DafnetError, ReferenceError):
             found[kind] = ()
+
     return found

@@ -117,6 +117,7 @@ def floor_path(path: RootPath, unit: float, facing_every: int, now: int) -> Draw
     if 0 <= now < len(path):
         lines.append((np.array([[places[now], 2.5 * ahead[now] - 1.5 * places[now]]]) / unit, NOW))
         beads.append((places[now, None] / unit, NOW, 0.03 / unit))
+
     return compose(lines, beads)
 
 

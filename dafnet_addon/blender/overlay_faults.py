@@ -74,6 +74,7 @@ def faults_of(
         found[action.session_uid] = Faults(
             foot_sliding(joints, take.fps, floor), bad_collisions(apart)
         )
+
     return found
 
 

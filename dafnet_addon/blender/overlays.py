@@ -189,6 +189,7 @@ def _arrange() -> None:
         _batches.clear()
     if not listening:
         overlay_data.forget()
+
     _redraw()
 
 
@@ -279,6 +280,7 @@ def _batches_of(kind: str, number: int, drawing: Drawing) -> list[tuple[str, Any
     if len(drawing.lines):
         ends = drawing.lines.reshape(-1, 3)
         add("POLYLINE_SMOOTH_COLOR", "LINES", ends, np.repeat(drawing.line_colours, 2, axis=0))
+
     _batches[kind, number] = drawing, batches
     return batches
 
@@ -340,6 +342,7 @@ def _draw_flat() -> None:
 
     if not wanted.get(CIRCLE):
         return
+
     scale = context.preferences.system.ui_scale
     inset = (1.4 * _CIRCLE_RADIUS + _CIRCLE_MARGIN) * scale
     middle = corner_of(context.area, context.region, inset)
@@ -416,6 +419,7 @@ def _draw_timeline() -> None:
     faults = shown_faults(action)
     if action is None or faults is None:
         return
+
     bars = fault_bars(faults, action.dafnet.frame_start)
     if not len(bars.row):
         return

@@ -116,6 +116,7 @@ def _written(
                 if abs(curve.evaluate(frame) - value) > 1e-5:
                     curve.keyframe_points.insert(frame, value).interpolation = "LINEAR"
             curve.update()
+
     last = first + len(walked.path) - 1
     extended = extended_to(context.scene, armature, last)
     told = (*told_of(met, first), *warnings, *([doubt] if doubt else []))
@@ -130,6 +131,7 @@ def _cut(root: bpy.types.Object, first: int) -> dict[tuple[str, int], list[tuple
     for curve in action_curves(root):
         if curve.data_path not in MOVES:
             continue
+
         earlier = [point for point in curve.keyframe_points if point.co[0] < first]
         if earlier:
             last = earlier[-1]
@@ -139,11 +141,14 @@ def _cut(root: bpy.types.Object, first: int) -> dict[tuple[str, int], list[tuple
             kept[curve.data_path, curve.array_index] = [
                 (frame, curve.evaluate(frame)) for frame in between
             ]
+
         for k in reversed(
             [k for k, point in enumerate(curve.keyframe_points) if point.co[0] >= first]
         ):
             curve.keyframe_points.remove(curve.keyframe_points[k], fast=True)
+
         curve.update()
+
     return kept
 
 
@@ -151,6 +156,7 @@ def _line_of(context: bpy.types.Context, curve: bpy.types.Object) -> np.ndarray:
     """The longest line (N, 3) of a curve as the scene evaluates it, world, Blender units."""
     if curve.type != "CURVE":
         raise InputError(f"'{curve.name}' is not a curve; select a Bezier, poly or NURBS curve.")
+
     evaluated = curve.evaluated_get(context.evaluated_depsgraph_get())
     lines = _lines(evaluated)
     if not lines:  # it has a bevel or another surface: the bare line, without its modifiers
@@ -168,10 +174,12 @@ def _line_of(context: bpy.types.Context, curve: bpy.types.Object) -> np.ndarray:
         finally:
             bpy.data.objects.remove(bare)
             bpy.data.curves.remove(data)
+
     matrix = np.array(evaluated.matrix_world, float)
     world = [line @ matrix[:3, :3].T + matrix[:3, 3] for line in lines]
     if not world:
         raise InputError(f"The curve '{curve.name}' has no line; draw one on the floor.")
+
     return max(world, key=lambda line: float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()))
 
 
@@ -183,11 +191,13 @@ def _lines(owner: bpy.types.Object) -> list[np.ndarray]:
     try:
         if mesh is None or len(mesh.polygons) or not len(mesh.edges):
             return []
+
         flat, edges = np.empty(3 * len(mesh.vertices)), np.empty(2 * len(mesh.edges), int)
         mesh.vertices.foreach_get("co", flat)
         mesh.edges.foreach_get("vertices", edges)
     finally:
         owner.to_mesh_clear()
+
     points, pairs = (
         flat.reshape(-1, 3),
         {tuple(sorted(pair)) for pair in edges.reshape(-1, 2).tolist()},
@@ -198,6 +208,7 @@ def _lines(owner: bpy.types.Object) -> list[np.ndarray]:
             closed = (start, k - 1) in pairs and k - start > 2
             lines.append(points[[*range(start, k), *([start] if closed else [])]])
             start = k
+
     return [line for line in lines if len(line) > 1]
 
 
@@ -237,6 +248,7 @@ def along_curve(
     if start is not None and away >= _THERE:
         way = yield from within(_way(at, start, [points[0]]), _READ, _FOUND)
         points = np.concatenate([way[:-1], points])
+
     walked = trail(
         points,
         start,
@@ -281,6 +293,7 @@ def places_of(
         yield from play_steps(context, frames, simulations, look)
     except ReferenceError as error:
         raise InputError("Something was deleted while the scene was read; try again.") from error
+
     return np.array([places[frame] for frame in frames], float)
 
 
@@ -340,6 +353,7 @@ def through_points(
     """
     if not points:
         return (yield from walk.steps(context, armature, None, seconds, speed))
+
     settings = settings_of(armature, context.scene)
     spots = [point.matrix_world.translation for point in points] + [
         context.scene.cursor.location
@@ -349,6 +363,7 @@ def through_points(
     places = [spot * at.unit for spot in flat]
     if len(places) > 1 and np.linalg.norm(places[0] - at.place[:2]) < 0.3:
         del places[0]  # it stands there already
+
     start = yield from within(rest_at(at), _READ, _READ)
     way = yield from within(_way(at, start, places), _READ, _FOUND)
     last = way[-1] - (way[-2] if len(way) > 1 else np.array(start.position))

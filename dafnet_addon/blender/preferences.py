@@ -77,11 +77,13 @@ def device_of(context: bpy.types.Context) -> str | None:
     engine = addon.preferences.engine if addon else "NUMPY"
     if engine == "NUMPY":
         return None
+
     if importlib.util.find_spec("torch") is None:
         raise InputError(
             "PyTorch is not installed in Blender's Python; set the engine in the add-on's "
             "preferences to NumPy."
         )
+
     import torch
 
     there = {
@@ -94,6 +96,7 @@ def device_of(context: bpy.types.Context) -> str | None:
             f"PyTorch finds no device '{engine}'; choose another engine in the add-on's "
             "preferences."
         )
+
     return engine
 
 

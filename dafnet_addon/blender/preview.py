@@ -40,6 +40,7 @@ def use_workbench(scene: bpy.types.Scene, width: int = 640, height: int = 360) -
     shading.show_cavity, shading.cavity_type = True, "SCREEN"
     if scene.world is None:
         scene.world = bpy.data.worlds.new("World")
+
     scene.world.color = (0.60, 0.62, 0.64)
 
 
@@ -98,6 +99,7 @@ def render_sheet(
             scene.render.filepath = str(Path(folder, f"{frame}.png"))
             bpy.ops.render.render(write_still=True, scene=scene.name)
             images.append(_pixels(Path(scene.render.filepath)))
+
     height, width, _ = images[0].shape
     rows = -(-len(images) // columns)
     grid = np.ones((rows * height, columns * width, 4), np.float32)
@@ -105,6 +107,7 @@ def render_sheet(
         top = (rows - 1 - i // columns) * height  # pixels run from the bottom row up
         left = (i % columns) * width
         grid[top : top + height, left : left + width] = image
+
     _write(path, grid)
 
 

@@ -119,6 +119,7 @@ def controls_of(
             controls.append(
                 Control(rig_map.joints[joint], j, moves=j == 0 or _is_detached(rig, rig_map, j))
             )
+
     controls += sorted(ends, key=lambda control: control.pole is not None)
 
     for control in controls:
@@ -128,6 +129,7 @@ def controls_of(
                 f"The bone '{bone.name}' is connected to its parent and cannot move; disconnect "
                 "it in edit mode."
             )
+
     return controls
 
 
@@ -168,6 +170,7 @@ def find_attachments(
         )
         for control, turn in zip(controls, turns, strict=True):
             rig.pose.bones[control.bone].matrix_basis = Matrix(turn.tolist()).to_4x4()
+
         poses.append(pose_matrices(evaluated_now(context, rig), names))
         channels.append(turns)
 
@@ -183,6 +186,7 @@ def find_attachments(
             inverse = transpose(rotation[:, c])
             turned.append(_spread(inverse @ bare[:, i]))
             moved.append(_spread(rotate(inverse, place[:, i] - place[:, c])) / size)
+
         turned_by.append(int(np.argmin(turned)) - 1)
         moved_by.append(int(np.argmin(moved)) - 1)
         if min(turned) > _RIGID and controls[i].pole is None:
@@ -307,6 +311,7 @@ def channels_for(
         if control.moves:
             axes = carried @ attachments.axes[i]
             moves[:, i] = rotate(np.linalg.inv(axes), place[:, i] - rest)
+
     return Channels(turns, moves, wanted)
 
 

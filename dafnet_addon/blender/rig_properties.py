@@ -130,16 +130,19 @@ def character_for(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.type
                 "Your Rig panel."
             )
         return chosen
+
     several = [o for o in there if o in context.selected_objects] or there
     if not several:
         raise InputError(
             "There is no DAFNet character in the scene; add one and generate a motion first."
         )
+
     if len(several) > 1:
         raise InputError(
             "There are several characters; choose one in the Your Rig panel, or select it with "
             "the rig."
         )
+
     return several[0]
 
 
@@ -175,6 +178,7 @@ def presets(_settings: Any, _context: bpy.types.Context) -> list[tuple[str, str,
         except InputError:
             continue
         items.append((key, rig_map.name, rig_map.about))
+
     _menu_items[:] = items
     return _menu_items
 

@@ -63,6 +63,7 @@ def rigid_parts(matrices: np.ndarray, what: str) -> tuple[np.ndarray, float]:
             f"The {what} has a transform that is not a number; clear its transform or fix what "
             "drives it."
         )
+
     scale = float(lengths[0].mean())
     if (
         scale < 1e-9
@@ -73,6 +74,7 @@ def rigid_parts(matrices: np.ndarray, what: str) -> tuple[np.ndarray, float]:
             f"The {what} is scaled unevenly or over time; give it the same positive scale on all "
             "three axes throughout."
         )
+
     return matrices[:, :3, :3] / lengths[:, None], scale
 
 
@@ -102,6 +104,7 @@ def _hand(hand: bpy.types.Bone | None) -> np.ndarray:
     found = np.full((2, 3), np.nan)
     if hand is None:
         return found
+
     tips = {tip.name.lower(): np.array(tip.head_local - hand.head_local) for tip in hand.children}
     tips = {
         name: tip
@@ -110,12 +113,14 @@ def _hand(hand: bpy.types.Bone | None) -> np.ndarray:
     }
     if tips:
         found[0] = np.mean(list(tips.values()), axis=0)
+
     index, little = (
         next((tip for name, tip in tips.items() if word in name), None)
         for word in ("index", "pinky")
     )
     if index is not None and little is not None:
         found[1] = index - little
+
     return found
 
 
@@ -172,6 +177,7 @@ def motion_of(shape: Shape, bodies: np.ndarray, poses: np.ndarray) -> Motion:
             joints[:, j] = joints[:, parent] + rotate(
                 frames[:, parent], shape.body.rest[j] - shape.body.rest[parent]
             )
+
     for collar, shoulder in ((13, 16), (14, 17)):
         # what moves the shoulder has no bone in the map
         if not np.isfinite(shape.rest[collar]).all():
@@ -179,6 +185,7 @@ def motion_of(shape: Shape, bodies: np.ndarray, poses: np.ndarray) -> Motion:
             frames[:, collar] = (
                 rotation_between(along, joints[:, shoulder] - joints[:, collar]) @ frames[:, collar]
             )
+
     return Motion(joints, frames)
 
 

@@ -137,6 +137,7 @@ def save_map(rig_map: RigMap, name: str) -> Path:
     stem = bpy.path.clean_name(name.strip()).lower()
     if not stem.strip("_"):
         raise InputError("The preset has no name; enter one.")
+
     text = as_text(replace(rig_map, name=name.strip(), known_by=tuple(rig_map.joints.values())))
     try:
         file = user_folder(create=True) / f"{stem}.json"
@@ -145,6 +146,7 @@ def save_map(rig_map: RigMap, name: str) -> Path:
         raise InputError(
             f"The preset cannot be written: {error.strerror}; check Blender's user folder."
         ) from error
+
     return file
 
 
@@ -169,6 +171,7 @@ def detected(armature: bpy.types.Object) -> RigMap:
     best = max(found, key=lambda each: each[0])[1] if found else None
     if best is not None and all(joint in best.joints for joint in NEEDED):
         return best
+
     guess = _guessed(armature)
     return guess if best is None or len(guess.joints) > len(best.joints) else best
 
@@ -227,12 +230,14 @@ def required(armature: bpy.types.Object, rig_map: RigMap) -> None:
     """
     if armature.mode == "EDIT":
         raise InputError(f"The armature '{armature.name}' is in edit mode; leave it and try again.")
+
     for joint in NEEDED:
         if not rig_map.joints.get(joint):
             raise InputError(
                 f"'{armature.name}' has no bone for the {joint.replace('_', ' ')} yet; choose one "
                 "in the Your Rig panel."
             )
+
     seen: dict[str, str] = {}
     for joint, bone in rig_map.joints.items():
         if bone not in armature.data.bones:
@@ -317,6 +322,7 @@ def _split(name: str) -> tuple[str | None, set[str]]:
         for side in ("left", "right"):
             if word.startswith(side) and word != side:
                 words[k : k + 1] = [side, word[len(side) :]]
+
     sides = [_SIDES[word] for word in words if word in _SIDES]
     words = [word for word in words if word not in _SIDES]
     return (sides[0] if sides else None), {*words, *(a + b for a, b in pairwise(words))}
@@ -355,6 +361,7 @@ def _guessed(armature: bpy.types.Object) -> RigMap:
         put("pelvis", column.pop(0))
     if len(column) > 2:
         column = [column[0], column[(len(column) - 1) // 2], column[-1]]
+
     spine = {1: ["spine2"], 2: ["spine1", "spine3"]}.get(
         len(column), ["spine1", "spine2", "spine3"]
     )
@@ -396,6 +403,7 @@ def _carrier(armature: bpy.types.Object, bone: str | None, others: list[str]) ->
     """
     if bone is None:
         return None
+
     own = armature.data.bones
     return next(
         (

@@ -60,9 +60,11 @@ def state_restorer(armature: bpy.types.Object) -> Callable[[bpy.types.Object], N
             _set(bone, channels)
             for key, value in numbers.items():
                 bone[key] = value
+
         rows = found.dafnet.takes
         while len(rows) > listed:
             rows.remove(len(rows) - 1)
+
         found.dafnet.active_take = active
 
     return restore

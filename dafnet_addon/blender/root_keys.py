@@ -41,9 +41,11 @@ def keyable_root(settings: Settings) -> bpy.types.Object:
             f"The character '{settings.armature}' has no root; choose its root object in the "
             "DAFNet panel."
         )
+
     root = find_object(settings, settings.root, "root")
     for reason in _in_the_way(root):
         raise InputError(f"The root '{root.name}' {reason}")
+
     return root
 
 
@@ -53,12 +55,15 @@ def _in_the_way(root: bpy.types.Object) -> Iterator[str]:
         yield "follows something; clear its parent and constraints to key it."
     if root.library or len(root.rotation_mode) != 3 or root.rotation_mode[2] != "Z":
         yield "is linked or not in rotation mode XYZ; make it local and set that mode."
+
     zeros = (*root.delta_location, *root.delta_rotation_euler, *(s - 1.0 for s in root.delta_scale))
     if any(zeros) or any(curve.data_path.startswith("delta_") for curve in action_curves(root)):
         yield "has delta transforms; set them to zero, without keys, to key it."
+
     data = root.animation_data
     if data is None:
         return
+
     if any(
         not driver.mute and driver.data_path.startswith((*MOVES, "delta_"))
         for driver in data.drivers
@@ -70,11 +75,13 @@ def _in_the_way(root: bpy.types.Object) -> Iterator[str]:
 
     if data.action is None:
         return
+
     if data.action_blend_type != "REPLACE" or data.action_influence < 1.0:
         yield (
             "mixes its action with NLA strips; set the action's blending to Replace and its "
             "influence to 1 to key it."
         )
+
     if data.action.library or data.action.override_library:
         yield f"has its keys in a linked action; make '{data.action.name}' local to key it."
 
@@ -136,6 +143,7 @@ def unchanged_on_failure(root: bpy.types.Object) -> Iterator[None]:
             root.animation_data_clear()
         root.location, root.rotation_euler = place, turn
         raise
+
     if kept:
         bpy.data.actions.remove(kept)
 
@@ -194,6 +202,7 @@ def write_keys(
             raise InputError(
                 f"The root '{root.name}' cannot be keyed; unlock its action and curves."
             )
+
     _eased(action_curves(root), first)
     return np.array(sorted(frames))
 

@@ -98,10 +98,12 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
             f"The scene '{settings.scene}' is not the active one; make it active and generate "
             "again."
         )
+
     if scene.render.frame_map_old != scene.render.frame_map_new:
         raise InputError(
             f"The scene '{settings.scene}' uses time stretching; set it back to 100 : 100."
         )
+
     unit = metres_per_unit(scene)
     armature = find_object(settings, settings.armature, "character")
     size = require_bakeable(armature, unit)
@@ -111,6 +113,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
             f"The character '{armature.name}' has no root; choose its root object in the DAFNet "
             "panel."
         )
+
     root = find_object(settings, settings.root, "root")
     names = {role: name for role in _TARGETS if (name := getattr(settings, role))}
     targets = {role: find_object(settings, name, _TARGETS[role]) for role, name in names.items()}
@@ -161,6 +164,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
                 f"The upper body's source '{source.name}' follows the character itself; mute what "
                 "links the two."
             )
+
         bones, bodies = np.array(tracks.bones), np.array(tracks.bodies)
         given["upper_body"], off = _upper_body_of_source(
             source,
@@ -243,6 +247,7 @@ class _Tracks:
             self.influences[role].append(getattr(own, f"{role}_influence"))
             self.targets[role].append(array(evaluated.matrix_world))
             self.local[role].append(array(evaluated.matrix_local))
+
         if self._source:
             evaluated = self._source.evaluated_get(depsgraph)
             self.bodies.append(array(evaluated.matrix_world))
@@ -262,6 +267,7 @@ def _require_independent(
             f"A driver of the mode or an influence of '{armature.name}' reads the character "
             "itself; remove the driver."
         )
+
     for what, leader in leading.items():
         if dependencies.follows(leader, armature, shaped=False):
             raise InputError(
@@ -304,8 +310,10 @@ def _warnings(
             f"Bones of '{armature.name}' have constraints or drivers, which change the take; mute "
             "them to see it as generated."
         )
+
     if furniture:
         yield from furniture.warnings()
+
     pushed = (
         simulation.name
         for simulation in simulations
@@ -327,9 +335,11 @@ def _rigid(matrices: np.ndarray, unit: float, what: str) -> np.ndarray:
             f"The {what} has a transform that is not a number; clear its transform or fix what "
             "drives it."
         )
+
     length = np.linalg.norm(matrices[:, :3, :3], axis=1, keepdims=True)
     if (length < 1e-9).any():
         raise InputError(f"The {what} is scaled to zero; give it a scale.")
+
     out = matrices.copy()
     out[:, :3, :3] /= length
     y, z = out[:, :3, 1], out[:, :3, 2]
@@ -358,6 +368,7 @@ def _upper_body_source(
     """
     if settings.upper_body_source is None:
         return None, None
+
     source = find_object(settings, settings.upper_body_source, "upper body's source")
     if source.type != "ARMATURE" or source == armature:
         raise InputError(
@@ -365,6 +376,7 @@ def _upper_body_source(
         )
     if is_character(source):
         return source, None
+
     rig_map = map_of(source)
     required(source, rig_map)
     return source, rig_map
@@ -386,12 +398,14 @@ def _upper_body_of_take(
             f"The take '{action.name}' has {take.fps:g} frames per second, the scene {fps:g}; "
             "generate it again."
         )
+
     at = np.arange(len(full)) + settings.frame_start - action.dafnet.frame_start
     if ((at < 0) | (at >= len(take)))[full].any():
         raise InputError(
             f"The take '{action.name}' does not cover all frames whose mode is FULL; choose a "
             "longer take."
         )
+
     at = np.clip(at, 0, len(take) - 1)
     path, _ = root_from_matrices(take.root[at])
     local = size / take.scale * to_root(path, take.joints[at][:, list(UPPER)])

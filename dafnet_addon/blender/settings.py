@@ -68,18 +68,22 @@ class Settings:
     def __post_init__(self) -> None:
         if self.mode is not None and self.mode not in MODES:
             raise InputError(f"The mode '{self.mode}' is unknown; choose {', '.join(MODES)}.")
+
         for frame in (self.frame_start, self.frame_end):
             whole(frame, "A frame of the range", -_LAST_FRAME, _LAST_FRAME)
+
         if self.frame_end < self.frame_start:
             raise InputError(
                 f"The frame range ends at {self.frame_end}, before its start at "
                 f"{self.frame_start}; "
                 "set the end after the start."
             )
+
         whole(self.frame_end - self.frame_start + 1, "The length of the frame range", 1, MAX_FRAMES)
         whole(self.take_count, "The number of takes", 1, MAX_TAKES)
         for seed in (self.seed, self.lower_seed or 0):
             whole(seed, "The seed", 0, MAX_SEED)
+
         whole(self.seed + self.take_count - 1, "The last take's seed", 0, MAX_SEED)
 
 

@@ -143,6 +143,7 @@ class Stage:
         darker = mixed(colour, (0.10, 0.10, 0.12), _JOINTS_DARKER)
         for slot, each in enumerate((colour, darker)):
             mesh.materials[slot] = self._material(each)
+
         self.scene.collection.objects.link(bpy.data.objects.new("Mannequin", mesh))
         self.seen.append(vertices[::7])
 
@@ -200,6 +201,7 @@ class Stage:
             place[2] = (
                 max(place[2], 0.5 * (high + low) / reach) if axis else 0.5 * (high + low) / reach
             )
+
         self._place = place
         frame = np.eye(4)
         frame[:3, :3], frame[:3, 3] = self.axes.T, place @ self.axes

@@ -87,10 +87,12 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
     except InputError:
         bpy.data.collections.remove(made)
         raise
+
     if unseen := sorted(f"'{name}'" for name in near if away[name] > REACH * size):
         warnings.append(
             f"Never closer than {REACH:g} m, so the character does not see: {', '.join(unseen)}."
         )
+
     return FoundFurniture(
         _adopted(scene, own, made),
         tuple(sorted(near)),
@@ -117,6 +119,7 @@ def _adopted(
     for each in list(earlier.objects):
         if each.name not in made.objects and len(each.users_collection) > 1:
             earlier.objects.unlink(each)
+
     bpy.data.collections.remove(made)
     return earlier
 
@@ -129,6 +132,7 @@ def _path(context: bpy.types.Context, settings: Settings, armature: bpy.types.Ob
             f"The character '{armature.name}' has no root; choose its root object in the DAFNet "
             "panel."
         )
+
     step = max(1, round(scene.render.fps / scene.render.fps_base / _PLACES_A_SECOND))
     frames = [*range(settings.frame_start, settings.frame_end, step), settings.frame_end]
     return places_of(
@@ -177,6 +181,7 @@ def _ignored(
             each.data.bevel_depth or each.data.extrude or each.data.bevel_object
         ):
             continue
+
         matrix = np.array(each.matrix_world, float)
         corners = (np.array(each.bound_box) @ matrix[:3, :3].T + matrix[:3, 3]) * unit
         low, high = corners.min(0), corners.max(0)
@@ -185,6 +190,7 @@ def _ignored(
         standing = (high[2] - path[:, 2] > _LOW * size) & (low[2] - path[:, 2] < _HIGH * size)
         if (near & standing).any():
             (others if seen else hidden).append(f"'{each.name}'")
+
     out = []
     if hidden:
         out.append(
@@ -192,4 +198,5 @@ def _ignored(
         )
     if others:
         out.append(f"Not meshes, so ignored: {', '.join(others)}; convert what should count.")
+
     return out

@@ -103,10 +103,12 @@ def stored_take(action: bpy.types.Action) -> tuple[Take, Controls]:
             f"The action '{action.name}' is not a take, or its motion was removed; generate a new "
             "one."
         )
+
     key, mark = action.as_pointer(), hash(data)
     if key not in _unpacked or _unpacked[key][0] != mark:
         _unpacked.clear()  # one is enough: what asks again asks for the same
         _unpacked[key] = mark, unpacked(data)
+
     return _unpacked[key][1]
 
 
@@ -135,6 +137,7 @@ def drop_take(armature: bpy.types.Object, index: int) -> None:
     own.active_take = max(0, min(own.active_take, len(own.takes) - 1))
     if action is None or action in takes_of(armature):
         return
+
     action.use_fake_user = action.dafnet.accepted = action.dafnet.ghost = False
     plays = armature.animation_data and armature.animation_data.action == action
     if plays and (others := takes_of(armature)):

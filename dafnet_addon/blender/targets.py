@@ -86,4 +86,5 @@ def add_targets(context: bpy.types.Context, armature: bpy.types.Object) -> list[
         armature.users_collection[0].objects.link(target)
         setattr(armature.dafnet, role, target)
         added.append(target)
+
     return added

@@ -70,6 +70,7 @@ def start_of(
     if first is None:
         keyed = last_key(root)
         first = scene.frame_current if keyed is None else keyed
+
     seen: list[tuple[float, np.ndarray, float]] = []
 
     def look() -> None:
@@ -119,6 +120,7 @@ def walk(
     scene, furniture = context.scene, armature.dafnet.furniture
     if seat is not None and furniture is None:
         furniture = _collection_of(seat, armature, scene)
+
     settings = settings_of(armature, scene, furniture=furniture.name_full if furniture else None)
     names = [seat.name, *(child.name for child in seat.children_recursive)] if seat else []
     goal = np.array(scene.cursor.location, float)
@@ -132,6 +134,7 @@ def walk(
     own = find_collection(settings.furniture) if settings.furniture is not None else None
     with unchanged_on_failure(root):
         keyed_along(context, root, route, first=start.first, scale=1.0 / start.unit, fps=start.fps)
+
     character.dafnet.furniture = own
     last = start.first + len(route.path) - 1
     extended = extended_to(scene, character, last)
@@ -196,10 +199,12 @@ def _route(
             doubted.steps(solids, route.path.position[:, :2], floor, size), 0.95, 1.0
         )
         return route, passages, (doubt,) if doubt else ()
+
     seat, *_ = names
     parts = [solid for solid in solids if solid.name in names]
     if not parts:
         raise InputError(f"'{seat}' is not in the character's furniture collection; move it there.")
+
     spot = yield from within(
         seat_of.steps(parts, start.place[:2], floor, seat, size=size), 0.05, 0.2
     )
@@ -217,4 +222,5 @@ def _route(
                 f"'{each.name}' stands where one comes to sit on '{seat}'; pull "
                 f"'{seat}' out, or choose another seat."
             )
+
     return route, passages, ()

@@ -74,11 +74,13 @@ def _numbers(value: object, what: str) -> np.ndarray:
         raise InputError(
             f"{what} cannot be read as an array; give rows of the same length, of numbers only."
         ) from error
+
     if found.dtype.kind not in "fiub":
         raise InputError(
             f"{what} holds something other than numbers ({found.dtype.name}); give an array of "
             "numbers."
         )
+
     return found
 
 
@@ -126,11 +128,13 @@ def inside(
             f"{what} holds {'an infinite number' if is_infinite else 'what is not a number'}; "
             f"{fix}."
         )
+
     if known.size and float(np.abs(known).max()) > upper_bound:
         raise InputError(
             f"{what} holds {float(np.abs(known).max()):.3g}, which is too far off; keep within "
             f"{upper_bound:g}."
         )
+
     return found
 
 
@@ -141,11 +145,13 @@ def rotations(found: np.ndarray, what: str) -> np.ndarray:
     known = found[np.isfinite(found).all(axis=(-2, -1))].astype(float)
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(np.swapaxes(known, -1, -2) @ known - np.eye(3))
+
     if not (off < _UNTRUE).all() or not (np.linalg.det(known) > 0).all():
         raise InputError(
             f"{what} holds a matrix that is not a rotation; give right-handed axes of length 1 at "
             "right angles."
         )
+
     return found
 
 
@@ -160,6 +166,7 @@ def corners(value: object, what: str, vertices: int) -> np.ndarray:
         raise InputError(
             f"{what} name missing vertices; number them from 0, or clean the mesh up and try again."
         )
+
     return found.astype(np.int64)
 
 

@@ -148,6 +148,7 @@ def _between(offset: np.ndarray, asked: np.ndarray, fps: float = MODEL_FPS) -> n
         out[start:end] = (1 - smoothstep(t / fade))[:, None] * before + smoothstep(
             (t - rest + fade) / fade
         )[:, None] * after
+
     return out
 
 
@@ -175,6 +176,7 @@ def standing_still(
                     place[start:end, 2] - np.broadcast_to(floor, len(on))[start:end]
                     < TOE_HEIGHT + _LOW
                 ).all()
+
         for start, end in runs(on):
             while end - start >= _PLANTS:
                 away = np.linalg.norm(place[start:end, :2] - place[start, :2], axis=-1) > _SLIPS
@@ -182,6 +184,7 @@ def standing_still(
                 if stop - start >= _PLANTS:
                     stands.append((foot, int(start), int(stop)))
                 start = stop + _PLANTS
+
     return stands
 
 
@@ -205,8 +208,10 @@ def planted(
         place[2] = np.median(heights[start:end]) + TOE_HEIGHT
         moved[start:end, foot] = strength * (place - toe)
         held[start:end, foot] = True
+
     for foot in (0, 1):
         moved[:, foot] = _between(moved[:, foot], held[:, foot])
+
     ankles = joints[:, ANKLES] + moved
     down = _lowered(joints[:, HIPS], ankles, held)
     return _on_legs(joints, -down, ankles, joints[:, KNEES] + moved / 2)
@@ -266,9 +271,11 @@ def seated(joints: np.ndarray, tops: np.ndarray, strength: float = 1.0) -> np.nd
     for start, end in runs(need > 0.0):
         if need[start:end].max() > _SINKS:
             need[start:end] = 0.0  # under a table, not on it
+
     lift = strength * _covering(need)
     if not lift.any():
         return joints
+
     return _on_legs(
         joints, lift, joints[:, ANKLES], joints[:, KNEES] + lift[:, None, None] * (0.0, 0.0, 0.5)
     )
@@ -304,8 +311,10 @@ def cleared(
     out_of = strength * _out_of(joints[:, [*wrists, *ANKLES]], distance)
     if not out_of.any():
         return joints
+
     for k, name in enumerate(_ARMS):
         out_of[np.isfinite(targets.get(name, np.full((len(joints), 3), np.nan))).all(-1), k] = 0.0
+
     out_of[:, 2:, 2] = 0.0
     out = _on_legs(
         joints,
@@ -318,6 +327,7 @@ def cleared(
         out[:, elbow], out[:, wrist] = two_bone(
             joints[:, shoulder], goal, pole, _UPPER_ARM, _FOREARM
         )
+
     return out
 
 
@@ -372,6 +382,7 @@ def reach_targets(
     wished = _wished(joints, targets, strength, fps)
     if not wished:
         return joints
+
     out, goals = joints.copy(), {}
     for name, goal in wished.items():
         if name == "head":
@@ -379,11 +390,13 @@ def reach_targets(
         else:
             base, limit = joints[:, _ARMS[name][0]], _UPPER_ARM + _FOREARM + _FARTHEST_LEAN
         goals[END_EFFECTORS[name]] = base + _softly_limited(goal - base, limit)
+
     damping = np.full(len(joints), _DAMPING)
     for _ in range(_ROUNDS):
         wants = [(j, goal - out[:, j]) for j, goal in goals.items()]
         if max(float(np.abs(want).max()) for _, want in wants) < 1e-4:
             break
+
         bent = _bent(out, wants, damping)
         # Levenberg and Marquardt: of a target that is out of reach a bold step may lead farther
         # away, to and fro.
@@ -393,11 +406,13 @@ def reach_targets(
         better = misses < missed
         out[better] = bent[better]
         damping = np.where(better, np.maximum(damping / 2.0, _DAMPING), damping * 4.0)
+
     for name, (shoulder, elbow, wrist) in _ARMS.items():
         if name in wished:
             out[:, elbow], out[:, wrist] = two_bone(
                 out[:, shoulder], goals[wrist], out[:, elbow], _UPPER_ARM, _FOREARM
             )
+
     return out
 
 
@@ -422,6 +437,7 @@ def _bent(
             skew[:, 0, 1], skew[:, 0, 2], skew[:, 1, 2] = lever[:, 2], -lever[:, 1], lever[:, 0]
             rows.append(_SUPPLE[at] * (skew - np.swapaxes(skew, 1, 2)))
         columns.append(np.concatenate(rows, axis=1))
+
     jacobian = np.concatenate(columns, axis=2)
     square = jacobian @ np.swapaxes(jacobian, 1, 2) + (damping**2)[:, None, None] * np.eye(
         moves.shape[1]
@@ -433,6 +449,7 @@ def _bent(
         moving = [j for j in range(len(JOINTS)) if _HANGS[j, at] and j != at]
         arms = joints[:, moving] - joints[:, at, None]
         joints[:, moving] = joints[:, at, None] + np.einsum("tij,tbj->tbi", turn, arms)
+
     return joints
 
 
@@ -465,4 +482,5 @@ def cleaned(
         yield 0.8
     if settings.reach > 0.0:
         joints = reach_targets(joints, targets, settings.reach)
+
     return joints

@@ -129,6 +129,7 @@ def _path_of(
             f"The root tilts by up to {np.degrees(tilt):.0f}°; only its heading and position were "
             "used."
         )
+
     moved = np.ptp(raw.position, axis=0).max() / controls.scale
     if len(raw) == 1:
         warnings.append(
@@ -139,6 +140,7 @@ def _path_of(
             "The root does not move, so the character stays where it is; animate the root to make "
             "it walk."
         )
+
     step = np.linalg.norm(np.diff(raw.position, axis=0), axis=1) / controls.scale
     if len(step) and step.max() > _SPRINT / controls.fps:
         frame = int(np.argmax(step)) + 1
@@ -146,6 +148,7 @@ def _path_of(
             f"The root jumps {step.max() * controls.scale:.1f} m, {frame} frames after the first; "
             "slow it down there."
         )
+
     position = resample_positions(raw.position / controls.scale, times, target)
     path = RootPath(position, resample_positions(raw.yaw, times, target))
     return smoothed(path)
@@ -171,12 +174,14 @@ def _body(controls: Controls, times: np.ndarray, target: np.ndarray, path: RootP
             "The mode is FULL but there is no upper body to follow; choose a source, or use FREE "
             "or EE."
         )
+
     body = np.asarray(controls.upper_body, float) / controls.scale
     full = _modes(controls) == "FULL"
     if not np.isfinite(body[full]).all():
         raise InputError(
             "The upper body to follow has a joint that is not a number; fix its animation."
         )
+
     between = resample_positions(body, times, target)
     return to_root(
         path, np.where(np.isfinite(between), between, resample_nearest(body, times, target))
@@ -210,6 +215,7 @@ def _observed(
         place = _targets(controls, name, times, target, path)
         if place is None:
             continue
+
         influence = _influence(controls, name, times, target)
         used = (modes == "EE") & np.isfinite(place).all(-1) & (influence > 0.0)
         far = np.linalg.norm(place - _REACH_FROM, axis=-1)
@@ -222,13 +228,16 @@ def _observed(
             )
             within = _REACH_FROM + normalised(place - _REACH_FROM) * _REACH
             place = np.where((far > _REACH)[:, None], within, place)
+
         observation[used, slot], share[used, slot] = place[used], influence[used]
+
     full = modes == "FULL"
     if full.any():
         body = _body(controls, times, target, path)
         full &= np.isfinite(body).all(axis=(1, 2))
         observation[full, : len(UPPER)], share[full, : len(UPPER)] = body[full], 1.0
         share[full, MODEL_ORDER.index(0)] = float(controls.pelvis_given)
+
     return observation.reshape(frames, -1), share
 
 
@@ -246,6 +255,7 @@ def _request(controls: Controls, path: RootPath, fps: float, warnings: list[str]
         _hold(change, observation[start - 1], share[start - 1])
         if _altered(change, observation, share).any():
             changes.append(change)
+
     return Request(observation, share, tuple(changes))
 
 
@@ -274,6 +284,7 @@ def _starts(modes: np.ndarray, length: float) -> list[tuple[int, np.ndarray]]:
                 smoothstep((np.arange(min(longest, len(modes) - start)) + 1.0) / (longest + 1.0)),
             )
         )
+
     return out
 
 
@@ -326,6 +337,7 @@ def turns_of(controls: Controls, path: RootPath) -> dict[str, Turn]:
         asked = getattr(controls, f"{name}_rotation")
         if asked is None:
             continue
+
         asked = np.array(asked, float)
         known = np.isfinite(asked).all(axis=(1, 2))
         counts = np.where((modes == "EE") & known, _influence(controls, name, times, times), 0.0)
@@ -335,8 +347,10 @@ def turns_of(controls: Controls, path: RootPath) -> dict[str, Turn]:
             share[frames] = (1.0 - ease) * share[start - 1] + ease * counts[frames]
             for t in np.flatnonzero(~known[frames]) + start:  # as it was, beside the root
                 asked[t] = path.rotation[t] @ path.rotation[t - 1].T @ asked[t - 1]
+
         if (share > 0.0).any():
             out[name] = Turn(asked, share)
+
     return out
 
 
@@ -355,6 +369,7 @@ def _at_model_rate(scene: Scene, times: np.ndarray, target: np.ndarray) -> Scene
             full[:, :3, :3] = full[:, :3, :3] @ resample_positions(linear, times, target)
             solid = replace(solid, matrix=full)
         solids.append(solid)
+
     return Scene(tuple(solids))
 
 
@@ -371,6 +386,7 @@ def _look_around(scene: Scene, path: RootPath, occupied: np.ndarray, warnings: l
             f"The root runs through furniture in the shot, {places}; move the path or the "
             "furniture."
         )
+
     crowd = occupied.mean(axis=1)
     if crowd.max() > _CROWDED:
         warnings.append(
@@ -396,10 +412,12 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
         raise InputError(
             "What is to be generated is not given as a Scene and Controls; make one of each."
         )
+
     for solid in scene.solids:
         in_frames(
             solid.matrices() if isinstance(solid, Box) else solid.matrix, solid.name, len(controls)
         )
+
     warnings: list[str] = []
     frames = covering_frames(len(controls), controls.fps)
     times, target = frame_times(len(controls), controls.fps), frame_times(frames, MODEL_FPS)
@@ -408,6 +426,7 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
 
     if not scene.solids:
         warnings.append("There is no furniture; the character walks and stands on a bare floor.")
+
     # Nothing farther away than the body, or the upper body that it is given, is felt or seen: it
     # need not be measured.
     farthest = float(np.linalg.norm(request.observation.reshape(-1, 3), axis=1).max())

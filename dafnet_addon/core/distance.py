@@ -101,6 +101,7 @@ def _parts(triangles: np.ndarray, vertices: int) -> np.ndarray:
         low = roots.min(axis=1)
         if (roots == low[:, None]).all():
             return np.unique(low, return_inverse=True)[1].reshape(-1)
+
         np.minimum.at(label, roots.reshape(-1), np.repeat(low, 3))
         while (label[label] != label).any():
             label = label[label]
@@ -140,6 +141,7 @@ def _triangle_distance(points: np.ndarray, rows: np.ndarray) -> np.ndarray:
     for length, along, base in ((aa, u, xx), (bb, v, xx), (cc, w, edge.copy())):
         share = np.clip(along / np.maximum(length, 1e-18), 0.0, 1.0)
         np.minimum(edge, base + share * (share * length - 2 * along), out=edge)
+
     return np.sqrt(np.maximum(np.where(on_face, height * height, edge), 0.0))
 
 
@@ -206,6 +208,7 @@ def _unsigned(
             changed.append(offer(nodes[unknown], named[unknown]))
             yield 0.5
         active = np.unique(np.concatenate(changed))
+
     return distance.reshape(shape)
 
 
@@ -264,6 +267,7 @@ def _inside(
         inside = _between_crossings(line, depth, parts[triangle], size)
         votes += np.moveaxis(inside, (0, 1, 2), (axis, across, along))
         yield 0.5 + axis / 6
+
     return votes >= 2
 
 
@@ -290,6 +294,7 @@ def _crossings(
         share = (row[crossed] - lower[:, 0]) / (upper[:, 0] - lower[:, 0])
         ends[crossed, entered[crossed]] = lower[:, 1:] + share[:, None] * (upper - lower)[:, 1:]
         entered[crossed] += 1
+
     ends = np.take_along_axis(ends, np.argsort(ends[:, :, :1], axis=1), axis=1)
 
     first = np.ceil(ends[:, 0, 0]).astype(int)
@@ -341,6 +346,7 @@ def _furniture(
     room = (extent[:, 0] >= _ROOM[0]) & (extent[:, 2] >= _ROOM[1])
     if floor is None:
         return np.ones(len(corners), bool), room[part]
+
     height = corners @ floor[:3] + floor[3]
     bottom, top = np.full(parts, np.inf), np.full(parts, -np.inf)
     np.minimum.at(bottom, part, height.min(axis=1))
@@ -375,9 +381,11 @@ def build_grid(
     empty = DistanceGrid(np.zeros(3), _FINEST, np.full((2, 2, 2), BAND, np.float32))
     if not len(triangles):
         return empty
+
     vertices, triangles = _welded(np.asarray(vertices, float), triangles)
     if not len(triangles):
         return empty
+
     yield 0.0
     part, corners = _parts(triangles, len(vertices)), vertices[triangles]
     kept, room = _furniture(corners, part, floor)
@@ -401,6 +409,7 @@ def build_grid(
     )
     while _too_many(corners, last - first, spacing):
         spacing *= 1.25
+
     origin = first - (BAND + spacing)
     nx, ny, nz = (np.ceil((last + BAND + spacing - origin) / spacing).astype(int) + 1).tolist()
     values = yield from _unsigned(corners, origin, spacing, (nx, ny, nz))
@@ -440,20 +449,24 @@ def grid_of(mesh: Mesh, floor: float) -> Generator[float, None, DistanceGrid]:
     """
     if mesh.grid is not None:
         return mesh.grid
+
     rigid, linear = rigid_split(mesh.matrix)
     vertices = np.asarray(mesh.vertices, float) @ linear.reshape(-1, 3, 3)[0].T
     plane = _floor_plane(rigid, floor)
     if plane is not None and len(vertices) and (vertices @ plane[:3] + plane[3]).min() > FLOOR:
         plane = None  # nothing of it can be floor: one grid for a row of books, whatever the shelf
+
     key = hashlib.blake2b(np.rint(vertices * 1e5).astype(np.int64).tobytes(), digest_size=16)
     key.update(np.asarray(mesh.triangles, np.int64).tobytes())
     key.update(b"" if plane is None else np.rint(plane * 1e4).astype(np.int64).tobytes())
     name = key.digest()
     if name not in _cache:
         _cache[name] = yield from build_grid.steps(vertices, np.asarray(mesh.triangles), plane)
+
     _cache.move_to_end(name)
     while len(_cache) > 1 and sum(grid.values.nbytes for grid in _cache.values()) > _CACHED_BYTES:
         _cache.popitem(last=False)
+
     return _cache[name]
 
 
@@ -493,6 +506,7 @@ def prepared(
                     "separate the furniture from it, or split it into parts."
                 )
         solids.append(solid)
+
     return Scene(tuple(solids)), tuple(warnings)
 
 
@@ -512,4 +526,5 @@ def scaled(scene: Scene, factor: float) -> Scene:
             matrix = np.diag([factor, factor, factor, 1.0]) @ np.asarray(solid.matrix, float)
             grid = None if solid.grid is None else solid.grid.scaled(factor)
             solids.append(replace(solid, matrix=matrix, grid=grid))
+
     return Scene(tuple(solids))

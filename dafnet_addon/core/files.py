@@ -37,6 +37,7 @@ def require_writable(path: Path) -> None:
     """
     if path.is_dir():
         raise InputError(f"'{path}' is a folder; give the output another name.")
+
     folder = _existing(path.absolute().parent)
     if not folder.is_dir():
         raise InputError(f"'{folder}' is not a folder; give the output another place.")
@@ -84,6 +85,7 @@ def _replace(part: Path, path: Path) -> None:
     """Put a file in another's place, once it is on the disk."""
     with part.open("rb+") as written:
         os.fsync(written.fileno())
+
     try:
         os.replace(part, path)
     except PermissionError as error:  # on Windows, where an open file is not replaced
@@ -91,6 +93,7 @@ def _replace(part: Path, path: Path) -> None:
             f"'{path}' cannot be replaced; close it in other programs, or give the output another "
             "name."
         ) from error
+
     if os.name == "posix":  # elsewhere a folder cannot be opened
         folder = os.open(path.parent, os.O_RDONLY)
         try:
@@ -133,12 +136,15 @@ def _runs(process: int) -> bool:
         handle = ctypes.windll.kernel32.OpenProcess(0x1000, False, process)  # to ask, not to touch
         if handle:
             ctypes.windll.kernel32.CloseHandle(handle)
+
         # it is there, but not ours
         return bool(handle) or ctypes.windll.kernel32.GetLastError() == 5
+
     try:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
     except (PermissionError, OverflowError):
         return True
+
     return True

@@ -74,6 +74,7 @@ class Draw:
         hold("temperature", number(self.temperature, "The temperature", 0.0, _HOTTEST))
         if self.lower_seed is not None:
             hold("lower_seed", whole(self.lower_seed, "The seed of the legs", 0, MAX_SEED))
+
         if self.lower_temperature is not None:
             hold(
                 "lower_temperature",
@@ -94,6 +95,7 @@ def _kept(resume: Take, frame: int, controls: Controls, path: RootPath) -> np.nd
             f"Frame {frame} is not inside the take, which lasts {seconds:.2f} s; go on from a "
             "frame in it."
         )
+
     count = min(covering_frames(frame, controls.fps), len(resume.path), len(path))
     old = RootPath(
         resume.path.position[:count] * (resume.scale / controls.scale), resume.path.yaw[:count]
@@ -221,9 +223,11 @@ def _finished_steps(
             joints = _joints(at_own_rate(_bent(joints)))
         if clean_up.reach > 0.0:
             joints = reach_targets(joints, targets, clean_up.reach, controls.fps)
+
         own = _bent(joints, controls.fps)
         yield 0.8
         metrics = judged(_joints(own))
+
     yield 1.0
 
     if turns := turns_of(controls, shot.own_path):
@@ -231,6 +235,7 @@ def _finished_steps(
         own = own._replace(
             local=continuous_signs(quaternion_from_matrix(local_from_global(frames)))
         )
+
     root = RootPath(shot.own_path.position * controls.scale, shot.own_path.yaw)
     return Take(
         fps=controls.fps,
@@ -316,6 +321,7 @@ def takes_steps(
             )
             for each in changes
         )
+
     unchanged = [
         Unchanged(PREROLL + each.start, each.observation, (each.share > 0.0).astype(float))
         for each in changes
@@ -339,6 +345,7 @@ def takes_steps(
             _SAMPLED + (1.0 - _SAMPLED) * (b + 1) / len(draws),
         )
         takes.append(replace(take, seconds=seconds | take.seconds))
+
     return takes
 
 
@@ -355,6 +362,7 @@ def clean_again_steps(
         or not np.isclose(controls.fps, take.fps, rtol=1e-5)
     ):
         raise InputError("The take has other frames than the controls; generate it again.")
+
     close = partial(np.allclose, rtol=1e-5, atol=_HAIR)
     same_path = close(shot.path.position, take.path.position) and close(
         shot.path.yaw, take.path.yaw
@@ -367,6 +375,7 @@ def clean_again_steps(
         raise InputError(
             "The take was made for other modes or targets than the controls'; generate it again."
         )
+
     return (
         yield from within(
             _finished_steps(

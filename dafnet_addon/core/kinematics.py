@@ -149,6 +149,7 @@ def two_bone(
             bend,
             _across(np.eye(3)[least], along),
         )
+
     bend = normalised(bend)
     cosine = np.clip(
         (length1**2 + distance**2 - length2**2) / (2.0 * length1 * distance), -1.0, 1.0
@@ -208,11 +209,13 @@ def fit(
     chest = _aligned(joints, 9, [12, 13, 14])
     for child in (1, 2, 3):
         place(child)
+
     aim(3, 6, _between(frame[:, 0], chest, 1 / 3))
     aim(6, 9, _between(frame[:, 0], chest, 2 / 3))
     frame[:, 9] = chest
     for child in (12, 13, 14):
         place(child)
+
     # the chest's, rounded as when the head is turned: figures hold to the last bit
     aim(12, 15, _between(chest, chest, 1 / 2))
     frame[:, 15] = frame[:, 12]
@@ -227,6 +230,7 @@ def fit(
     for ankle, toe in ((7, 10), (8, 11)):
         aim(ankle, toe, frame[:, PARENTS[ankle]])
         frame[:, toe] = frame[:, ankle]
+
     return position[:, 0], frame
 
 
@@ -270,9 +274,11 @@ def turned(frames: np.ndarray, turns: Mapping[str, Turn]) -> np.ndarray:
             half = _between(chest, asked, share / 2.0)
             bone = rotation_between(half @ OFFSETS[at], frames[:, neck] @ OFFSETS[at])
             out[:, neck] = np.where(given, bone @ half, frames[:, neck])
+
         parent = out[:, PARENTS[at]]
         part = np.where(given, _between(parent, asked, share), parent)
         out[:, at] = np.where((share >= 1.0)[:, None, None], asked, part)
+
     return out
 
 
@@ -340,9 +346,11 @@ def _smoothed_circle(seen: np.ndarray, weight: np.ndarray, carry: float) -> np.n
         ratio = carry / diagonal[t - 1]
         diagonal[t] -= ratio * carry
         z[t] += ratio * z[t - 1]
+
     z[-1] /= diagonal[-1]
     for t in range(n - 2, -1, -1):
         z[t] = (z[t] + carry * z[t + 1]) / diagonal[t]
+
     return z
 
 
@@ -371,10 +379,12 @@ def come_over(motion: Bent, changes: Sequence[tuple[int, np.ndarray, Bent]]) -> 
             tail = Bent(before[2].local[-rest:], before[2].pelvis[-rest:])
             led = _mixed(tail, Bent(other.local[:rest], other.pelvis[:rest]), before[1][-rest:])
             other = Bent(*(np.concatenate([a, b[rest:]]) for a, b in zip(led, other, strict=True)))
+
         local[frames], pelvis[frames] = _mixed(
             other, Bent(motion.local[frames], motion.pelvis[frames]), ease
         )
         before = start, ease, other
+
     return Bent(local, pelvis)
 
 

@@ -58,6 +58,7 @@ def band_speeds(joints: np.ndarray, fps: float, which: tuple[int, ...]) -> dict[
             if long_enough
             else float("nan")
         )
+
     return found
 
 
@@ -70,6 +71,7 @@ def sway(joints: np.ndarray, fps: float) -> float:
     second = round(fps)
     if len(place) < 2 * second:
         return float("nan")
+
     path = gaussian(place, _SMOOTH * fps)
     along = np.gradient(path, axis=0) * fps
     pace = np.linalg.norm(along, axis=-1)
@@ -83,6 +85,7 @@ def sway(joints: np.ndarray, fps: float) -> float:
     whole = views(straight, second).all(-1)
     if not whole.any():
         return float("nan")
+
     return float(np.median(np.ptp(views(aside, second), axis=-1)[whole]))
 
 
@@ -95,6 +98,7 @@ def descent(joints: np.ndarray, fps: float, seated: int) -> float:
     resting, highest = height[-1], height.max()
     if highest - resting < 0.15:
         return float("nan")
+
     share = (highest - height) / (highest - resting)
     above_first = np.flatnonzero(share < _FROM)
     above_last = np.flatnonzero(share < _TO)

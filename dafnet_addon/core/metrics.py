@@ -241,6 +241,7 @@ def seat_report(
         report.append(
             {"name": seat.name, "seat_height": height, "pelvis_height": pelvis, "error": error}
         )
+
     return report
 
 
@@ -310,6 +311,7 @@ def motion_metrics(
     if distance is not None:
         collisions = float(bad_collisions(distance(joints[:, list(BAD_COLLISION_JOINTS)])).mean())
         depth = penetration(distance(body_points(joints)))
+
     error = end_effector_distance(joints, targets or {})
     return {
         "foot_sliding_per_frame": float(foot_sliding(joints, fps, floor).mean()),

@@ -65,5 +65,6 @@ def bounds(solid: Box | Mesh) -> tuple[np.ndarray, np.ndarray]:
         corners = (0.5 * (low + high) + 0.5 * (high - low) * _CORNERS) @ linear.reshape(-1, 3, 3)[
             0
         ].T
+
     world = corners @ np.swapaxes(matrices[..., :3, :3], -1, -2) + matrices[..., None, :3, 3]
     return world.min(axis=-2), world.max(axis=-2)

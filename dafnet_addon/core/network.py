@@ -251,6 +251,7 @@ def _sizes(weights: Weights, system: System) -> Sizes:
     model = config.get("model")
     if not isinstance(model, dict):
         raise unusable(weights, "they do not say how their model is built ('model')")
+
     name = model.get("system", DAFNET.name)
     if name != system.name:
         raise unusable(
@@ -301,12 +302,14 @@ def _sizes(weights: Weights, system: System) -> Sizes:
         offsets = shaped(config.get("offsets"), "offsets", OFFSETS.shape)
     except InputError:
         offsets = np.zeros(OFFSETS.shape)
+
     for name, fits in (
         ("fps", config.get("fps") == MODEL_FPS),
         ("offsets", np.allclose(offsets, OFFSETS)),
     ):
         if not fits:
             raise unusable(weights, f"they were made for another skeleton or frame rate ('{name}')")
+
     return found
 
 
@@ -322,6 +325,7 @@ def _normalisation(tensors: _Tensors, sizes: Sizes) -> Normalisation:
     for name in ("pose_std", "velocity_std", "ahead_std"):
         if getattr(found, name).min(initial=1.0) < _MIN_DEVIATION:
             raise unusable(tensors.weights, f"'{name}' is not positive")
+
     return found
 
 
@@ -336,6 +340,7 @@ def _noise(tensors: _Tensors, partition: Partition) -> TakeNoise:
         if f"{name}.passing" in tensors:
             passing[columns, columns] = tensors.values(f"{name}.passing", size, size)
             taps[columns] = tensors.values(f"{name}.taps", size, TAPS)
+
     return TakeNoise(lasting, passing, taps)
 
 
@@ -399,6 +404,7 @@ def _step(
     weight = tensors.values(f"{name}.weight", size, size)
     if np.abs(log_scale).max() > _MAX_LOG_SCALE or not np.linalg.cond(weight) <= _MAX_CONDITION:
         raise unusable(tensors.weights, f"'{name}' cannot be inverted")
+
     scale = np.exp(log_scale)
     inverse = np.linalg.inv(weight)
     if not np.abs(inverse / scale[:, None]).max() < _MAX_INVERSE:
@@ -448,6 +454,8 @@ def _coupling(
             known = np.setdiff1d(np.arange(first_inputs), rows)
             in_advance = array(np.concatenate([into[known], bias[None]]))
             into = into[rows]
+
         layers.append(LSTMLayer(array(np.concatenate([into, back])), array(bias)))
+
     out = tensors.linear(f"{name}.out", width, 2 * (size - half))
     return CouplingNet(in_advance, tuple(layers), out, width)

@@ -99,6 +99,7 @@ def occupancy(scene: Scene, path: RootPath) -> Generator[float, None, np.ndarray
             at = frames[row], sphere
             out[at] = np.maximum(out[at], found)
             yield (count + k / len(seen)) / len(scene.solids)
+
     return out
 
 
@@ -123,6 +124,7 @@ def tops_under(scene: Scene, path: RootPath) -> np.ndarray:
     """
     if not scene.solids:
         return np.full(len(path), np.nan)
+
     spots = np.array([(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)]) * _FOOTPRINT
     heights = np.arange(_LOWEST, _HIGHEST, _APART)
     columns = np.concatenate([np.c_[np.tile(spot, (len(heights), 1)), heights] for spot in spots])

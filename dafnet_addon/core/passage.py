@@ -110,12 +110,14 @@ def seats_along(
     pieces = yield from within(_pieces(scene, path), 0.0, 0.3)
     if not pieces:
         return ()
+
     floor, column = path.position[:, 2], _upright(path, _COLUMN)
     touching, standing = [], []
     for k, piece in enumerate(pieces.values()):
         touching.append(distance(piece, column, floor) < _TOUCHES)
         standing.append(_still_over(piece.solids[0], path, fps))
         yield 0.3 + 0.7 * k / len(pieces)
+
     touched, still = np.stack(touching), np.stack(standing)
     carries = touched & still[..., None] & (_COLUMN < _HIGHEST)
 
@@ -138,6 +140,7 @@ def seats_along(
         top = float(np.median(floor[there] + _COLUMN[ends[there]] - _TOUCHES))
         found.append(SatOn(place, top, frozenset(np.array(list(pieces))[under].tolist())))
         resting &= ~there
+
     return tuple(found[::-1])
 
 
@@ -151,6 +154,7 @@ def _inside(piece: Scene, path: RootPath, fps: float) -> np.ndarray:
         velocity = np.gradient(path.position[:, :2], axis=0) * fps
         speed = np.linalg.norm(velocity, axis=1, keepdims=True)
         forward = np.where(speed > _STILL, velocity / np.maximum(speed, _STILL), forward)
+
     right = np.stack([forward[:, 1], -forward[:, 0], np.zeros(len(path))], axis=1)[:, None] * _ASIDE
     points = np.concatenate([axis - right, axis, axis + right], axis=1)
     left, middle, right = np.split(distance(piece, points, path.position[:, 2]) < _MEETS, 3, axis=1)
@@ -179,13 +183,16 @@ def passages(
         for seat, gap in zip(seats, away, strict=True):
             if name not in seat.pieces:
                 continue
+
             over_seat = np.maximum(limit, seat.top + _OVER_SEAT - floor)
             for start, stop in _visits(inside.any(axis=1), fps):
                 # A bed or a deep sofa is under the body for longer than where it sits.
                 around = slice(max(start - round(_PAUSE * fps), 0), stop + round(_PAUSE * fps))
                 if (gap[around] < _COMES).any():
                     limit[start:stop] = over_seat[start:stop]
+
             limit[gap < _RESTS] = np.inf
+
         met[name] = (inside & (limit[:, None] <= _HEIGHTS)).any(axis=1)
 
     found = [

@@ -112,6 +112,7 @@ def _rounded(points: np.ndarray) -> tuple[np.ndarray, float, list[tuple[float, f
         start = travelled
         append((1 - u) ** 2 * a + 2 * u * (1 - u) * points[i] + u * u * b)
         corners.append((start, travelled))
+
     append(points[-1:])
     dense = np.concatenate(pieces)
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(dense, axis=0), axis=1))])
@@ -148,6 +149,7 @@ def _speeds(
         squared[i] = min(squared[i], squared[i - 1] + 2.0 * start * step)
     for i in range(len(arc) - 2, -1, -1):
         squared[i] = min(squared[i], squared[i + 1] + 2.0 * end * step)
+
     return np.sqrt(squared)
 
 
@@ -158,9 +160,11 @@ def _leg(origin: Stop, via: Sequence[Point], goal: Stop, cruise: float, fps: flo
     points: list[np.ndarray] = [np.asarray(origin.position, float)]
     if origin.seated:
         points.append(points[0] + AFTER_SEAT * forward_of(origin.yaw))
+
     points += [np.asarray(p, float) for p in via]
     if goal.seated:
         points.append(np.asarray(goal.position, float) + BEFORE_SEAT * forward_of(goal.yaw))
+
     points.append(np.asarray(goal.position, float))
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if not np.isfinite(gaps).all() or (gaps < 0.05).any():
@@ -216,6 +220,7 @@ def walked_along(
     for _ in range(3):  # the turn's length depends on the heading at its end
         leave_end = leave + _turn_seconds(leave_turn)
         leave_turn = _wrapped(walked(leave_end) - origin.yaw)
+
     arrive_turn = _wrapped(goal.yaw - heading[-1])
     linger = 0.0 if goal.seated else 0.5 * (_turn_seconds(arrive_turn) - 0.6)
     arrive_end = at(arc[-1] - _SETTLED) if goal.seated else clock[-1] + linger
@@ -267,6 +272,7 @@ def route(
         raise InputError(
             f"Walking needs a speed above {_CORNER_SPEED} m/s and a positive frame rate."
         )
+
     positions: list[np.ndarray] = []
     yaws: list[np.ndarray] = []
     rests: list[Rest] = []
@@ -287,6 +293,7 @@ def route(
         if not isinstance(place, Stop):
             via.append(place)
             continue
+
         leg = _leg(origin, via, place, speed, fps)
         turns = round((float(yaws[-1][-1]) - float(leg.yaw[0])) / (2 * np.pi))
         positions.append(leg.position)
@@ -294,6 +301,7 @@ def route(
         count += len(leg)
         rest(place, float(yaws[-1][-1]))
         origin, via = place, []
+
     position = np.concatenate(positions)
     position[:, 2] = floor
     return Route(RootPath(position, np.concatenate(yaws)), tuple(rests))

@@ -206,10 +206,12 @@ def lay_in_t_pose(
     low, high = quaternion_from_matrix(np.array([pelvis, chest]))
     for k, j in enumerate((PELVIS, *SPINE)):
         turn[j] = matrix_from_quaternion(slerp(low, high, np.array(k / len(SPINE))))
+
     if spine:
         turn[spine[-1]] = chest
     else:
         chest = pelvis
+
     if _angle(chest @ pelvis.T) > _BENT:
         for j, child in pairwise([PELVIS, *spine]):
             if j:
@@ -217,6 +219,7 @@ def lay_in_t_pose(
                     rotation_between(turn[j] @ (rest[child] - rest[j]), REST[child] - REST[j])
                     @ turn[j]
                 )
+
     turn[[SPINE[-1], NECK, *COLLARS]] = chest
     turn[HEAD], ground = _level(chest), _level(pelvis)
     hung = [(collar, chest, shoulder) for collar, shoulder in zip(COLLARS, SHOULDERS, strict=True)]
@@ -235,6 +238,7 @@ def lay_in_t_pose(
         aside = off - (off @ axis) * axis
         if np.linalg.norm(aside) > _CLEAR or off @ axis < 0.0:
             turn[first] = rotation_between(aside, -bend) @ turn[first]
+
         turn[middle] = rotation_between(turn[first] @ lower, axis) @ turn[first]
         if arm:
             turn[end] = _hand_laid(
@@ -246,12 +250,15 @@ def lay_in_t_pose(
         else:
             foot = _FOOT_OF[end]
             turn[end] = turn[foot] = _foot_laid(turn[middle], ground, rest[foot] - rest[end], end)
+
     for j in range(1, len(JOINTS)):
         if not present[j]:
             turn[j] = turn[PARENTS[j]]
+
     straight = rest.copy()
     for j in range(1, len(JOINTS)):
         straight[j] = straight[PARENTS[j]] + turn[PARENTS[j]] @ (rest[j] - rest[PARENTS[j]])
+
     return Body(straight, present, turn)
 
 
@@ -265,6 +272,7 @@ def _with_column(rest: np.ndarray) -> np.ndarray:
     place = dict(zip(column, along, strict=True))
     for k in range(3):
         rest[column, k] = np.interp(along, [place[j] for j in known], rest[known, k])
+
     return rest
 
 
@@ -291,6 +299,7 @@ def _trunk_laid(rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     up = np.array([pelvis.T[:, 2], chest.T[:, 2]])
     if up[0] @ up[1] > np.cos(_BENT) and across_hips @ across_chest > 0.0:
         return upright(across_hips, along, canonical), upright(across_chest, along, canonical)
+
     return pelvis, chest
 
 
@@ -312,6 +321,7 @@ def _hand_laid(
     )
     if not np.isfinite(across).all():
         return turn
+
     seen = turn @ across
     return rotation_between(seen - (seen @ axis) * axis, np.array([0.0, 1.0, 0.0])) @ turn
 
@@ -395,6 +405,7 @@ def retarget(
         _lean(joints, frames, targets, spine[-1], body)
         _bring_head(joints, frames, targets[:, HEAD], [j for j in trunk if j != spine[-1]], place)
         place(*COLLARS, *SHOULDERS)
+
     for collar, shoulder, elbow, wrist in zip(COLLARS, SHOULDERS, ELBOWS, WRISTS, strict=True):
         arm = sum(
             body.length(j) * normalised(source.joints[:, j] - source.joints[:, PARENTS[j]])
@@ -425,6 +436,7 @@ def retarget(
                 along = normalised(source.joints[:, child] - source.joints[:, at])
                 joints[:, child] = joints[:, at] + body.length(child) * along
             targets[:, end] = joints[:, end]
+
         bend = _bend(source, name, joints[:, first], targets[:, end])
         if lands[name]:
             joints[:, mid], joints[:, end] = two_bone(
@@ -435,16 +447,20 @@ def retarget(
                 body.length(end),
                 bend,
             )
+
         for at, child in ((first, mid), (mid, end)):
             straight = rotation_between(
                 rotate(source.frames[:, at], axis), joints[:, child] - joints[:, at]
             )
             frames[:, at] = straight @ source.frames[:, at]
+
         bends.append(bend)
+
     place(*FEET)
     for j in range(1, len(JOINTS)):
         if not body.present[j]:
             frames[:, j] = frames[:, PARENTS[j]]
+
     return RetargetedMotion(
         Motion(joints, frames), frames @ body.alignment, targets, np.stack(bends, axis=1), ratio
     )
@@ -487,6 +503,7 @@ def limb_errors(joints: np.ndarray, source: np.ndarray) -> dict[str, np.ndarray]
         if name in LIMBS:
             off.append(np.abs(_degrees(*ours[name]) - _degrees(*theirs[name])))
         found[name.replace("_", " ")] = np.max(off, axis=0)
+
     return found
 
 
@@ -507,11 +524,13 @@ def _targets(
     for ankle, side in zip(ANKLES, (-1.0, 1.0), strict=True):
         out = source.frames[:, ankle, :, 0] * (1.0, 1.0, 0.0)
         targets[:, [ankle, _FOOT_OF[ankle]]] += (side * wider * normalised(out))[:, None]
+
     trunk = body.trunk() / source_body.trunk()
     if not landing or ratio != 1.0 or abs(trunk - 1.0) > _SAME_SIZE:
         upper = [HEAD] if landing else [HEAD, *SHOULDERS, *WRISTS]
         upright = source.joints[:, upper] - source.joints[:, HIPS].mean(axis=1, keepdims=True)
         targets[:, upper] = targets[:, HIPS].mean(axis=1, keepdims=True) + trunk * upright
+
     if body.present[FEET].all():
         rise = (body.rest[ANKLES, 2] - body.rest[FEET, 2]) - ratio * (
             source_body.rest[ANKLES, 2] - source_body.rest[FEET, 2]
@@ -523,6 +542,7 @@ def _targets(
                 j for j in range(len(JOINTS)) if j not in feet and (ratio != 1.0 or j not in WRISTS)
             ]
             targets[:, carried, 2] += (rise.mean() * _standing(source.joints))[:, None]
+
     return targets
 
 
@@ -596,6 +616,7 @@ def _lean(
                 -1, keepdims=True
             )
         turn = _limited(matrix_from_vector(pull) @ turn, _TRUNK_TURN)
+
     frames[:, chest] = turn @ meant
 
 
@@ -627,6 +648,7 @@ def _shrug(
                 if short
                 else _limited(asked, limit)
             )
+
     frames[:, collar] = turn @ meant
 
 

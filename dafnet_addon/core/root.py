@@ -80,6 +80,7 @@ def gaussian(values: np.ndarray, sigma: float) -> np.ndarray:
     n = len(values)
     if n < 2:
         return values.copy()
+
     radius = int(4 * sigma + 0.5)
     reach = np.arange(1, radius + 1)
     before = 2 * values[:1] - values[np.minimum(reach[::-1], n - 1)]
@@ -107,12 +108,14 @@ def _held_yaw(forward: np.ndarray, certainty: np.ndarray) -> np.ndarray:
     good = certainty > 0.35
     if not good.any():
         return np.zeros(len(yaw))
+
     last = np.maximum.accumulate(np.where(good, np.arange(len(yaw)), -1))
     yaw = np.unwrap(yaw[np.where(last < 0, np.argmax(good), last)])
     turn = np.abs(np.diff(yaw)) > _MAX_TURN
     if turn.any():
         for t in range(1, len(yaw)):
             yaw[t] = yaw[t - 1] + np.clip(yaw[t] - yaw[t - 1], -_MAX_TURN, _MAX_TURN)
+
     return yaw
 
 
@@ -189,6 +192,7 @@ def ahead(path: RootPath) -> np.ndarray:
         later = slice(frames, frames + len(path))
         out[:, k, :2] = rotate(transpose(path.rotation), position[later] - path.position)[:, :2]
         out[:, k, 2] = yaw[later] - path.yaw
+
     return out.reshape(len(path), -1)
 
 

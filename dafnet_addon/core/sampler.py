@@ -234,6 +234,7 @@ class Sampler:
                 f"The weights '{self.weights.path}' have to know where the root goes during the "
                 "next second; give its whole path, or choose weights for a live root."
             )
+
         return way
 
     def decode(self, index: int, noise: Array) -> Frame:
@@ -266,6 +267,7 @@ class Sampler:
         xp = self.backend.xp
         if inputs is None:
             inputs = self.inputs.at(self._shot.scene[index], self._memory.past)
+
         made: list[Array] = []
         log_det = 0.0 * pose.sum(-1)
         for i, part in enumerate(self.network.parts):
@@ -353,6 +355,7 @@ class Sampler:
             elif t >= len(known):
                 share = float(smoothstep(np.array((t - len(known) + 1) / _PASSING)))
                 noise = last_kept + (own_noise[t] - last_kept) * share
+
             for stretch in unchanged:
                 if stretch.start == t:
                     going_on = own_noise[t : t + len(stretch.given)] - own_noise[t] + noise
@@ -368,13 +371,16 @@ class Sampler:
                     noise = last_kept = frame.noise
                 else:
                     frame = self.decode(t, noise)
+
             frames.append(frame)
             if watch is not None:
                 watch(t, self._checked(numpy(frame.pose[:1]))[0])
+
             yield (t + 1) / len(conditions)
 
         with np.errstate(over="ignore", invalid="ignore"):
             densities = [_log_density(frame) for frame in frames]
+
         return Samples(
             poses=self._checked(self._stacked([frame.pose for frame in frames])),
             actions=self._stacked([frame.inputs[:, : self.actions] for frame in frames]),

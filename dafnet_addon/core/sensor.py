@@ -24,6 +24,7 @@ def _spheres() -> np.ndarray:
         count = round(2.0 * np.pi * k)
         angle = 2.0 * np.pi * np.arange(count) / max(count, 1)
         rings.append(np.stack([k * _SPACING * np.cos(angle), k * _SPACING * np.sin(angle)], axis=1))
+
     layer = np.concatenate(rings)
     heights = np.arange(15) * _SPACING
     flat = np.broadcast_to(layer, (15, len(layer), 2))

@@ -51,6 +51,7 @@ class Box:
                 f"The half_size {whose} is negative; give half its length, width and height in "
                 "metres."
             )
+
         frames = [
             len(center) if center.ndim == 2 else 1,
             len(rotation) if rotation.ndim == 3 else 1,
@@ -99,23 +100,27 @@ class Mesh:
         matrix = shaped(self.matrix, f"The matrix {whose}", (4, 4), (-1, 4, 4))
         if 0 in matrix.shape:
             raise InputError(f"The matrix {whose} has no frames; give one matrix, or one a frame.")
+
         if not np.isfinite(vertices).all() or not np.isfinite(matrix).all():
             part = "vertices" if not np.isfinite(vertices).all() else "matrix"
             raise InputError(
                 f"The {part} {whose} have a coordinate that is not a number; fix its geometry or "
                 "transform."
             )
+
         if np.abs(matrix[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max() > _UNTRUE:
             raise InputError(
                 f"The matrix {whose} is of no scale, rotation and place; its last row has to be 0 "
                 "0 0 1."
             )
+
         far = float(np.abs(vertices).max(initial=0.0)), float(np.abs(matrix[..., :3, :3]).max())
         if max(*far, far[0] * far[1], float(np.abs(matrix[..., :3, 3]).max())) > FARTHEST:
             raise InputError(
                 f"The mesh '{self.name}' reaches out millions of metres; fix its vertices or its "
                 "matrix."
             )
+
         hold("vertices", vertices)
         hold("triangles", corners(self.triangles, f"The triangles {whose}", len(vertices)))
         hold("matrix", matrix)

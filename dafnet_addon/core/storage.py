@@ -81,6 +81,7 @@ def packed(take: Take, controls: Controls) -> bytes:
                 arrays[name] = value
             elif value is not None:
                 plain[name] = _sayable(value)
+
     out = io.BytesIO()
     text = np.frombuffer(json.dumps(plain).encode(), np.uint8)
     np.savez_compressed(
@@ -127,8 +128,10 @@ def _words(file: zipfile.ZipFile) -> dict[str, Any]:
         raise InputError(
             f"'plain' {'is not text' if isinstance(error, UnicodeDecodeError) else error}"
         ) from error
+
     if not isinstance(said, dict):
         raise InputError("'plain' is not an object")
+
     whole(said.get("version", 1), "'version'", 1, _VERSION)
     return said
 
@@ -141,21 +144,26 @@ def _array(file: zipfile.ZipFile, name: str, dtype: str, upper_bound: int) -> np
         info = file.getinfo(f"{name}.npy")
     except KeyError as error:
         raise InputError(f"'{name}' is missing") from error
+
     # others may claim gigabytes to begin with
     if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise InputError(f"'{name}' is compressed in another way")
     if info.file_size > upper_bound * np.dtype(dtype).itemsize + _MAX_HEADER:
         raise InputError(f"'{name}' is larger than the take's frames ask for")
+
     data = file.read(info)
     found = _HEADER.match(data)
     if found is None:
         raise InputError(f"'{name}' is not an array")
+
     kind, first_fastest, sizes = (each.decode("latin-1") for each in found.groups())
     if kind != dtype:
         raise InputError(f"'{name}' holds {printable(kind, 20)}, not {dtype}")
+
     shape = tuple(int(size) for size in sizes.replace(" ", "").split(",") if size)
     if math.prod(shape) * np.dtype(dtype).itemsize != len(data) - found.end():
         raise InputError(f"the size of '{name}' is not that of its shape")
+
     flat = np.frombuffer(data, dtype, offset=found.end())
     return flat.reshape(shape, order="F" if first_fastest == "True" else "C")
 
@@ -183,6 +191,7 @@ def _arrays(file: zipfile.ZipFile, fps: float) -> dict[str, np.ndarray]:
             upper_bound = math.prod(longest[name] if size == -1 else size for size in shape)
             found = shaped(_array(file, name, "<f4", upper_bound), f"'{name}'", shape)
             arrays[name] = inside(found, f"'{name}'", FARTHEST, free=name in _FREE).astype(float)
+
     return arrays
 
 
@@ -205,9 +214,11 @@ def _take(said: dict[str, Any], arrays: dict[str, np.ndarray], fps: float) -> Ta
     for name in ("fps", "scale"):
         if said.get(f"take.{name}") != said.get(f"controls.{name}"):
             raise InputError(f"'take.{name}' is not that of the controls")
+
     likelihood, warnings = said.get("take.log_likelihood"), said.get("take.warnings")
     if not isinstance(warnings, list) or not all(isinstance(each, str) for each in warnings):
         raise InputError("'take.warnings' is something other than sentences")
+
     seconds = {key: value for key, value in figures("take.seconds").items() if value is not None}
     return Take(
         fps=fps,

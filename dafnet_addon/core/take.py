@@ -74,6 +74,7 @@ class Controls:
                 f"The root has {frames} frames at {self.fps:g} a second, more than a shot may "
                 "have; split it."
             )
+
         hold("mode", _checked_mode(self.mode, frames))
         if not isinstance(self.pelvis_given, bool | np.bool_):
             raise InputError(
@@ -88,6 +89,7 @@ class Controls:
                 f"{name}_rotation": (frames, 3, 3),
                 f"{name}_influence": (frames,),
             }
+
         for name, shape in shapes.items():
             if getattr(self, name) is not None:
                 what = f"'{name}'"
@@ -110,12 +112,14 @@ def _checked_root(root: object) -> np.ndarray:
     found = shaped(root, "The root", (-1, 4, 4), like=", one matrix for each frame")
     if not len(found):
         raise InputError("The root has no frames; give at least one frame, a 4 × 4 matrix.")
+
     broken = np.flatnonzero(~np.isfinite(found).all(axis=(1, 2)))
     if len(broken):
         raise InputError(
             f"The root's transform is not a number at frame {broken[0]}; fix its keys, drivers or "
             "constraints."
         )
+
     return inside(found, "The root", FARTHEST)
 
 
@@ -132,14 +136,17 @@ def _checked_mode(mode: object, frames: int) -> str | tuple[str, ...]:
             f"The mode is {printable(mode, 40)}; use FREE, EE or FULL, one word or one for each "
             "frame."
         )
+
     wrong = [each for each in modes if not isinstance(each, str) or each not in MODES]
     if wrong:
         raise InputError(f"The mode '{printable(wrong[0], 40)}' is unknown; use FREE, EE or FULL.")
+
     if not isinstance(mode, str) and len(modes) != frames:
         raise InputError(
             f"There are {len(modes)} modes for {frames} frames; give one word, or one for each "
             "frame."
         )
+
     return mode if isinstance(mode, str) else tuple(modes)
 
 

@@ -55,9 +55,11 @@ def _openblas() -> tuple[Callable[[], int], Callable[[int], None]] | None:
         library = ctypes.CDLL(core._multiarray_umath.__file__)
     except (OSError, AttributeError):
         return None
+
     for name in _NAMES:
         if hasattr(library, name.format("get")) and hasattr(library, name.format("set")):
             return getattr(library, name.format("get")), getattr(library, name.format("set"))
+
     return None
 
 
@@ -70,6 +72,7 @@ def one_thread() -> Iterator[None]:
     if found is None:
         yield
         return
+
     get, put = found
     before = get()
     put(1)

@@ -63,6 +63,7 @@ def trail(
         raise InputError(f"The {name} has a point that is not a number; fix its transform.")
     if not SLOWEST <= speed <= FASTEST:
         raise InputError(f"People walk at {SLOWEST} to {FASTEST} m/s; choose a speed between them.")
+
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) if len(points) else 0.0
     if length < SHORTEST:
         raise InputError(
@@ -72,6 +73,7 @@ def trail(
         origin = np.array(start.position)
         ahead = origin + AFTER_SEAT * forward_of(start.yaw)
         points = np.concatenate([[origin, ahead] if start.seated else [origin], points])
+
     # Twice: the smoothing shortens corners, so its samples are no more evenly apart.
     curve, length = _even(points)
     curve, length = _even(gaussian(curve, _ROUNDING / (length / (len(curve) - 1))))
@@ -105,8 +107,10 @@ def _headings(
     moving = np.ones(frames, bool)
     for a, b in stands:
         moving[a:b] = False
+
     if not moving.any():
         return np.full(frames, yaw)
+
     told = np.flatnonzero(moving & (np.linalg.norm(velocity, axis=1) > 1e-6))
     heading = np.unwrap(yaw_of(velocity[told]))
     out = np.interp(np.arange(frames), told, heading)
@@ -120,6 +124,7 @@ def _headings(
         needed = (0.6 + (_TURN_SECONDS - 0.6) * abs(after - before) / np.pi) * fps
         u = (np.arange(a, b) - max(a, b - needed)) / max(min(needed, b - a), 1.0)
         out[a:b] = before + smoothstep(u) * (after - before)
+
     return out
 
 
@@ -136,8 +141,10 @@ def followed(positions: np.ndarray, fps: float, yaw: float = 0.0, floor: float =
             "The object to follow has a place that is not a number; fix its keys, drivers or "
             "constraints."
         )
+
     if len(positions) < 2 or np.ptp(positions, axis=0).max() < SHORTEST / 2:
         raise InputError("The object to follow hardly moves over the floor; choose one that does.")
+
     smooth = gaussian(positions, _SHAKE * fps)
     velocity = np.gradient(smooth, axis=0) * fps
     stands = runs(np.linalg.norm(velocity, axis=1) < _MOVES, max(2, round(_STANDS * fps)))
@@ -146,12 +153,14 @@ def followed(positions: np.ndarray, fps: float, yaw: float = 0.0, floor: float =
         way = np.linspace(0.0, 1.0, b - a)[:, None] if a > 0 and b < len(smooth) else 0.0
         ends = smooth[a if a > 0 else b - 1], smooth[b - 1 if b < len(smooth) else a]
         smooth[a:b] = ends[0] + (ends[1] - ends[0]) * way
+
     raw = _headings(velocity, stands, yaw, fps)
     sway = _SWAY * fps
     heading = gaussian(raw, sway)
     while np.abs(np.diff(heading)).max() * fps > _TURN_RATE and sway < 2.0 * fps:
         sway *= 1.3
         heading = gaussian(raw, sway)
+
     path = RootPath(np.c_[smooth, np.full(len(smooth), floor)], heading)
     rests = [
         Rest(

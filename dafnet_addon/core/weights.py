@@ -64,8 +64,10 @@ def read_safetensors(path: str | Path) -> tuple[dict[str, np.ndarray], dict[str,
         raise _damaged(path, "its header is not text") from error
     except ValueError as error:
         raise _damaged(path, f"its header {error}") from error
+
     if not isinstance(entries, dict):
         raise _damaged(path, "its header is not an object")
+
     metadata = entries.pop("__metadata__", {})
     if not isinstance(metadata, dict) or not all(
         isinstance(value, str) for value in metadata.values()
@@ -74,6 +76,7 @@ def read_safetensors(path: str | Path) -> tuple[dict[str, np.ndarray], dict[str,
 
     for name, entry in entries.items():
         _check_entry(path, printable(name, _SHOWN), entry)
+
     spans = sorted(entry["data_offsets"] for entry in entries.values())
     if [begin for begin, _ in spans] + [len(data)] != [0] + [end for _, end in spans]:
         raise _damaged(path, "its tensors overlap, leave holes or leave the file")
@@ -86,6 +89,7 @@ def read_safetensors(path: str | Path) -> tuple[dict[str, np.ndarray], dict[str,
         tensors[name] = (
             (array.astype(np.uint32) << 16).view(np.float32) if entry["dtype"] == "BF16" else array
         )
+
     return tensors, metadata
 
 
@@ -124,8 +128,10 @@ def _parts(path: Path) -> tuple[bytes, bytes]:
             f"The weights file '{path}' cannot be read ({error.strerror}); "
             "install the extension again or choose another file."
         ) from error
+
     if 8 + len(header) + len(data) != size:
         raise _damaged(path, "it changed while it was read")
+
     return header, data
 
 
@@ -135,9 +141,11 @@ def _check_entry(path: Path, name: str, entry: object) -> None:
     """
     if not isinstance(entry, dict) or set(entry) != {"dtype", "shape", "data_offsets"}:
         raise _damaged(path, f"'{name}' is not described as it should be")
+
     dtype, shape, offsets = entry["dtype"], entry["shape"], entry["data_offsets"]
     if not isinstance(dtype, str) or dtype not in _DTYPES:
         raise _damaged(path, f"'{name}' has an unknown type")
+
     # A tensor without values may not be huge in its other directions either: NumPy makes none.
     if (
         not _are_counts(shape)
@@ -145,6 +153,7 @@ def _check_entry(path: Path, name: str, entry: object) -> None:
         or math.prod(size or 1 for size in shape) > _MAX_FILE
     ):
         raise _damaged(path, f"'{name}' has an impossible shape")
+
     if not _are_counts(offsets) or len(offsets) != 2:
         raise _damaged(path, f"'{name}' has impossible offsets")
     if offsets[1] - offsets[0] != math.prod(shape) * np.dtype(_DTYPES[dtype]).itemsize:
@@ -175,6 +184,7 @@ def write_safetensors(
         dtype = array.dtype.newbyteorder("<")
         if dtype not in _WRITTEN:
             raise TypeError(f"a weights file cannot hold {array.dtype} ('{name}')")
+
         chunks.append(array.astype(dtype).tobytes())
         end = offset + len(chunks[-1])
         header[name] = {
@@ -183,6 +193,7 @@ def write_safetensors(
             "data_offsets": [offset, end],
         }
         offset = end
+
     text = json.dumps(header, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 8)
     Path(path).write_bytes(b"".join([len(text).to_bytes(8, "little"), text, *chunks]))
@@ -251,10 +262,12 @@ def load_weights(path: str | Path | None = None) -> Weights:
     if metadata.get("format") != FORMAT:
         said = printable(metadata.get("format", "unknown"), _SHOWN)
         raise _other_version(path, f"its format is '{said}', not '{FORMAT}'")
+
     try:
         config = read_json(metadata.get("config", ""))
     except ValueError as error:
         raise _damaged(path, f"its config {error}") from error
+
     if not isinstance(config, dict):
         raise _damaged(path, "its config is not an object")
 
@@ -263,13 +276,17 @@ def load_weights(path: str | Path | None = None) -> Weights:
         shown = printable(name, _SHOWN)
         if name.endswith(".scale") and name.removesuffix(".scale") in stored:
             continue
+
         with np.errstate(over="ignore", invalid="ignore"):
             tensor = array.astype(np.float32)
             if array.dtype == np.int8:
                 tensor *= _row_scales(path, stored, name)
+
         if not np.isfinite(tensor).all():
             raise _damaged(path, f"'{shown}' holds values that are not numbers")
+
         tensors[name] = tensor
+
     return Weights(tensors, config, metadata, path)
 
 

@@ -72,6 +72,7 @@ def _hull(points: np.ndarray) -> np.ndarray:
             ):
                 out.pop()
             out.append(p)
+
         return out[:-1]
 
     return np.array(half(ordered) + half(ordered[::-1])) if len(ordered) > 2 else np.array(ordered)
@@ -98,6 +99,7 @@ def _axes(cells: np.ndarray) -> np.ndarray:
         a, b = np.ptp(hull @ u), np.ptp(hull @ v)
         if a * b < best - 1e-9:
             best, found = a * b, np.stack([u, v] if a >= b else [v, u])
+
     return found
 
 
@@ -133,12 +135,14 @@ def _seat_level(
     for k, level in enumerate(levels):
         masks.append(_roomy(np.abs(over - level) < _FLAT, reach))
         yield k / len(levels)
+
     room = np.array([mask.sum() for mask in masks])
     if not room.any():
         masks = [np.abs(over - level) < _FLAT for level in levels]
         room = np.array([mask.sum() for mask in masks])
     if room.max(initial=0) * field.cell**2 < _LEAST:
         return None
+
     lowest = int(np.argmax(room >= _NEARLY * room.max()))
     best = lowest + int(np.argmax(room[lowest : lowest + 1 + round(_FLAT / 0.02)]))
     level = float(np.median(over[masks[best]]))
@@ -181,6 +185,7 @@ def _spot(
         column = depth[first:last][np.abs(width[first:last] - aside) < 0.5 * _ROOM]
         column = column if len(column) else depth
         spots.append((float(aside), room, float(column.min()), float(column.max())))
+
     return next((spot for spot in spots if spot[3] - depth.min() <= _DEEPEST), spots[0])
 
 
@@ -206,6 +211,7 @@ def on_a_seat(
         if ((height > _LOWEST) & (height < _HIGHEST)).any():
             return True
         yield 1.0
+
     return False
 
 
@@ -236,6 +242,7 @@ def seat_of(
             kept.append(part)
             corners += [part[:, :2].min(0), part[:, :2].max(0)]
         yield 0.5
+
     found = None
     if kept:
         low, high = np.min(corners, axis=0), np.max(corners, axis=0)
@@ -244,7 +251,9 @@ def seat_of(
         for k, part in enumerate(kept):
             field.add(part)
             yield 0.5 + 0.1 * k / len(kept)
+
         found = yield from within(_seat_level(field, floor), 0.6, 1.0)
+
     if found is None:
         if not _SMALLEST < (across := extent(solids)) < _LARGEST:
             raise InputError(
@@ -255,6 +264,7 @@ def seat_of(
             f"'{name}' has no level surface between 22 and 85 cm over the floor to sit on; choose "
             "a seat."
         )
+
     level, cells = found
     places = field.middles(cells)
     middle = places.mean(0)
@@ -278,12 +288,14 @@ def seat_of(
         square = np.ptp(places @ longer) < 1.3 * np.ptp(places @ shorter)
         ways = np.stack([longer, -longer, shorter, -shorter] if square else [shorter, -shorter])
         forward = _nearest(ways, towards - middle)
+
     yield 1.0
     aside, room, low, high = _spot(places, forward, near)
     if back:
         at = min(low + _BEFORE_BACK, max(0.5 * (low + high), high - _ON_IT))
     else:
         at = max(0.5 * (low + high), high - _FROM_EDGE)
+
     position = at * forward + aside * np.array([forward[1], -forward[0]])
     yaw = facing(forward)
     return SeatPlace(position, yaw, floor + level, back, room, high - at)

@@ -46,6 +46,7 @@ def _corners(solid: Box | Mesh) -> np.ndarray:
             np.asarray(solid.triangles),
             np.asarray(solid.matrix),
         )
+
     matrix = matrix[0] if matrix.ndim == 3 else matrix
     world = rotate(matrix[:3, :3], vertices) + matrix[:3, 3]
     return np.asarray(world[triangles])
@@ -99,16 +100,19 @@ def parts_of_surfaces(
         boxes = yield from within(boxes_of.steps(solids), 0.0, 0.2)
         near = _reach_over(boxes[:, 0], boxes[:, 1], between)
         solids = [solid for solid, reaches in zip(solids, near, strict=True) if reaches]
+
     corners = [np.zeros((0, 3, 3))]
     for k, solid in enumerate(solids):
         corners.append(_corners(solid))
         if k % _SOLIDS_AT_ONCE == 0:
             yield 0.2 + 0.2 * k / len(solids)
+
     triangles = np.concatenate(corners)
     if between is not None:
         triangles = triangles[_reach_over(triangles.min(axis=1), triangles.max(axis=1), between)]
     if not len(triangles):
         return []
+
     longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(1)
     parts = np.maximum(1, np.ceil(longest / spacing)).astype(int)
     coarser = np.sqrt(max(1.0, float((parts.astype(float) ** 2 / 2).sum()) / _MAX_POINTS))
@@ -123,6 +127,7 @@ def parts_of_surfaces(
                 found.append(np.einsum("pk,fkc->fpc", weights, some).reshape(-1, 3))
                 yield 0.4 + 0.6 * done / len(triangles)
             done += len(some)
+
     return found
 
 

@@ -51,6 +51,7 @@ def _blocked(field: HeightField, radius: float) -> Generator[float, None, np.nda
             if (i * i + j * j) * field.cell**2 <= radius**2:
                 out |= padded[reach + i : reach + i + nx, reach + j : reach + j + ny]
         yield (reach + i) / (2 * reach + 1)
+
     return out
 
 
@@ -73,11 +74,13 @@ def _search(
     first, last = ((cell[0] + 1) * width + cell[1] + 1 for cell in (start, goal))
     if not (yield from _connected(walls, first, last)):
         return None
+
     left: list[float] = []
     down, across = goal[0] + 1 - np.arange(len(walls)), goal[1] + 1 - np.arange(width)
     for k in range(0, len(walls), _ROWS_AT_ONCE):
         left += np.hypot(down[k : k + _ROWS_AT_ONCE, None], across).ravel().tolist()
         yield 0.0
+
     closed = bytearray(walls.tobytes())
     wall = bytes(closed)
     steps = [(i * width + j, i * width, j, float(np.hypot(i, j))) for i, j in _NEIGHBOURS]
@@ -92,22 +95,27 @@ def _search(
             while path[-1] in came:
                 path.append(came[path[-1]])
             return [(cell // width - 1, cell % width - 1) for cell in path[::-1]]
+
         if closed[at]:
             continue
+
         closed[at] = 1
         tried += 1
         if tried % _CELLS_AT_ONCE == 0:
             nearest = min(nearest, left[at])
             yield 1.0 - nearest / left[first]
+
         here = cost[at]
         for step, down_by, across_by, length in steps:
             to = at + step
             if wall[to] or (down_by and across_by and (wall[at + down_by] or wall[at + across_by])):
                 continue
+
             total = here + length
             if total < cost.get(to, np.inf):
                 cost[to], came[to] = total, at
                 heapq.heappush(queue, (total + left[to], to))
+
     return None
 
 
@@ -124,6 +132,7 @@ def _connected(walls: np.ndarray, first: int, last: int) -> Generator[float, Non
         waves += 1
         if waves % _WAVES_AT_ONCE == 0:
             yield 0.0
+
     return not free[last]
 
 
@@ -174,6 +183,7 @@ def ways(
             if doubt := doubted(solids, places, floor, size):
                 raise InputError(doubt) from error
             raise
+
     return found
 
 
@@ -192,16 +202,19 @@ def _way(
             "right? "
             f"Choose one within {_FARTHEST * size:.0f} m, or walk there in parts."
         )
+
     field = height_field(np.zeros((0, 3)), *around(both), _CELL)
     for k, part in enumerate(parts):
         over = part - np.array([0.0, 0.0, floor])
         field.add(over[(over[:, 2] > _KNEE_LOW) & (over[:, 2] < _HEAD_HIGH)])
         yield 0.2 * k / len(parts)
+
     blocked = yield from within(_blocked(field, _RADIUS), 0.2, 0.2)
     ends = []
     for end in both:
         ends.append(_nearest_free(blocked, field.index(end)))
         yield 0.2
+
     path = (
         None if None in ends else (yield from within(_search(blocked, *ends), 0.2, 0.9))  # type: ignore[arg-type]
     )
@@ -210,6 +223,7 @@ def _way(
             "There is no way between the furniture from the character to where it is to go; make "
             "room for it."
         )
+
     cells = np.array(path)
     corners, at = [], 0
     while at < len(cells) - 1:
@@ -222,6 +236,7 @@ def _way(
         )
         corners.append(ahead)
         at = ahead
+
     middles = field.middles(cells[corners]) if corners else np.zeros((0, 2))
     return [(float(x), float(y)) for x, y in _apart(middles, start, goal)]
 
@@ -285,6 +300,7 @@ def doubted(
     boxes = boxes[~np.isnan(boxes[:, 0, 0])]
     if not len(boxes):
         return None
+
     extent = float((boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)).max())
     longest = (boxes[:, 1] - boxes[:, 0]).max(axis=1)
     rises = boxes[:, 1, 2] - floor
@@ -295,6 +311,7 @@ def doubted(
     too_small = extent < _TINY and longest.max() < _SMALLEST
     if not too_small and not (len(told) and told.min() > _TALLEST):
         return None
+
     return (
         f"The scene is {metres(extent * size)} across: is its unit right? Scale it to the "
         "character's size."

@@ -274,11 +274,14 @@ class PartFlow(nn.Module):
         for k, step in enumerate(self.steps()):
             if initialise:
                 step[0].initialise(x)
+
             state = None if states is None else states[k]
             for transform in step:
                 x, log_det, state = transform(x, conditions[k], state)
                 total = total + log_det
+
             after.append(state)
+
         return Forward(x, total, after)
 
     def _to_pose(
@@ -351,6 +354,7 @@ class BodyFlow(nn.Module):
                 break
             observation[..., columns] = pose[..., columns]
             given[..., columns.start // 3 : columns.stop // 3] = 1.0
+
         return torch.cat(
             [base, observation, given] if self.config.mask else [base, observation], dim=-1
         )
@@ -374,6 +378,7 @@ class BodyFlow(nn.Module):
                 x[..., columns], known, occupancy, before
             )
             total = total + log_det
+
         return Forward(noise, total, after)
 
     def inverse(
@@ -394,4 +399,5 @@ class BodyFlow(nn.Module):
             pose[..., columns], after[name] = part.inverse(
                 y[..., columns], known, occupancy, before
             )
+
         return Inverse(pose, after)

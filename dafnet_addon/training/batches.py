@@ -67,12 +67,14 @@ class Statistics:
                 values = unit * shard[name].reshape(-1, shard[name].shape[-1]).astype(float)
                 powers = np.stack([np.ones(values.shape[1]), values.mean(0), (values**2).mean(0)])
                 sums[name] = sums.get(name, 0.0) + len(values) * powers
+
         found = []
         for name, least in (("poses", 0.01), ("velocity", 1e-3), ("ahead", 1e-2)):
             count, mean, square = sums[name]
             spread = np.sqrt(np.maximum(square / count - (mean / count) ** 2, 0.0))
             for values in (mean / count, np.maximum(spread, least)):
                 found.append(model_order(values) if name == "poses" else values)
+
         return Statistics(*found)
 
 
@@ -121,8 +123,10 @@ def seen(file: Path, bank: DeviceBank) -> np.ndarray:
         for k in range(0, len(root), _AT_ONCE):
             some = slice(k, k + _AT_ONCE)
             out[some] = sensed([boxes[some], shapes[some], root[some]], bank).numpy()
+
         out.flush()
         part.rename(kept)
+
     return np.load(kept, mmap_mode="r")
 
 

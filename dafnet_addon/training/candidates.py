@@ -62,6 +62,7 @@ def _parts_there(folder: Path) -> tuple[str, ...]:
             parts = (*(("predictor",) if model.predicts else ()), *flow)
             if all(checkpoint_file(folder, each).exists() for each in parts):
                 return parts
+
     return ()
 
 
@@ -105,6 +106,7 @@ def _begin_cooling(folder: Path, out: Path, minutes: float) -> None:
     """Make the folder ``out``, whole or not at all: a run whose rate falls over ``minutes``."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(f"'{out}' holds something else than a cooling run; give another folder.")
+
     # The predictor is done, and the flow has learnt with what it is.
     runs = [
         Run.load(part, folder) if part == "predictor" else before_it_cooled(part, folder)
@@ -119,4 +121,5 @@ def _begin_cooling(folder: Path, out: Path, minutes: float) -> None:
         )
         run.folder = beside
         run.save()
+
     beside.replace(out)

@@ -106,21 +106,26 @@ class Checkpoint:
         """
         if path.suffix == _PICKLED:
             raise _pickled(path)
+
         try:
             arrays, words = read_safetensors(path)
         except WeightsError as error:
             raise _refused(path, f"it cannot be read: {str(error).split(';')[0]}") from None
+
         if words.get("format") != _FORMAT:
             raise InputError(
                 f"'{path}' is not a checkpoint of this version; train anew in another folder."
             )
+
         tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
         try:
             state = read_json(words.get("state", ""))
         except ValueError as error:
             raise _refused(path, f"its state {error}") from None
+
         if not isinstance(state, dict):
             raise _refused(path, "its state is not an object")
+
         return Checkpoint(path, tensors, state)
 
     def refused(self, what: str) -> InputError:
@@ -186,6 +191,7 @@ class Checkpoint:
         )
         if optimiser is None:
             return
+
         state = {}
         for k, (name, parameter) in enumerate(network.named_parameters()):
             if f"optimiser.{name}.step" in self.tensors:
@@ -194,6 +200,7 @@ class Checkpoint:
                     key: self.tensor(f"optimiser.{name}.{key}", like)
                     for key, like in zip(_ADAM, likes, strict=True)
                 }
+
         optimiser.load_state_dict(
             {"state": state, "param_groups": optimiser.state_dict()["param_groups"]}
         )
@@ -240,11 +247,13 @@ def slim_run(folder: Path, out: Path) -> list[Path]:
         if not file.stem.endswith(HELD):
             slim(Checkpoint.read(file), out / file.name)
             written.append(out / file.name)
+
     for file in [*sorted(folder.glob("*.safetensors")), folder / "log.jsonl"]:
         if file.exists():
             with whole_file(out / file.name) as part:
                 part.write_bytes(file.read_bytes())
             written.append(out / file.name)
+
     return written
 
 
@@ -275,6 +284,7 @@ def typed(kind: type[Settings], values: object) -> Settings:
         raise ValueError("they are not given by name")
     if unknown := values.keys() - known.keys():
         raise ValueError(f"unknown setting '{min(unknown)}'")
+
     found = {}
     for name, value in values.items():
         if known[name] is float and type(value) is int and abs(value) < 1 << 53:
@@ -284,6 +294,7 @@ def typed(kind: type[Settings], values: object) -> Settings:
         ):
             raise ValueError(f"'{name}' is not what it should be, {_NAMES[known[name]]}")
         found[name] = value
+
     return kind(**found)
 
 

@@ -192,6 +192,7 @@ def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
     if count > 1:
         sums["apd_upper"] = (diversity(takes[:, :, list(UPPER)]) * frames, float(frames))
         sums["apd_legs"] = (diversity(takes[:, :, list(LOWER)]) * frames, float(frames))
+
     seats = [
         float(
             np.median(take[r.start : r.end, 0, 2])
@@ -205,6 +206,7 @@ def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
             float(sum(abs(error) <= within / 100 for error in seats)),
             float(len(seats)),
         )
+
     return Figures(sums | _life(clip, takes), seats)
 
 
@@ -221,11 +223,13 @@ def _life(clip: HeldClip, takes: np.ndarray) -> Sums:
             take, MODEL_FPS, liveliness.LIVELY["wrists"] + liveliness.LIVELY["head"]
         ).items():
             found[f"speed_{band}"].append(value)
+
         found["sway"].append(liveliness.sway(take, MODEL_FPS))
         leans = np.degrees(liveliness.lean(take, forward))
         for rest in clip.rests:
             found["descent_seconds"].append(liveliness.descent(take, MODEL_FPS, rest.start))
             found["lean_degrees"].append(float(np.median(leans[rest.start : rest.end])))
+
     known = {
         name: [value for value in values if np.isfinite(value)] for name, values in found.items()
     }
@@ -265,6 +269,7 @@ def beside(
         other = shot_of(clip, mode, Scene())
         conditions = replace(other.conditions, occupancy=known.occupancy)
         shots[mode] = replace(shots["EE"], conditions=conditions, request=other.request)
+
     runs = {"ground_truth": figures(clip, clip.joints[None])}
     for mode in modes:
         noise, takes_of = _noise(sampler, len(known), seed, seeds, mode)
@@ -275,6 +280,7 @@ def beside(
             runs[f"{calm}_clean"] = figures(
                 clip, made_clean(takes[takes_of[calm]], shots[mode]), mode
             )
+
     return Measured(clip, runs)
 
 
@@ -341,8 +347,10 @@ def row(chosen: Sequence[Figures]) -> dict[str, Any]:
         if weight.sum() > 0:
             out[name] = float(f"{total.sum() / weight.sum():.4g}")
             intervals[name] = _interval(total, weight)
+
     if seats:
         out["seat_error_median"] = round(float(np.median(np.abs(seats))), 4)
+
     out["intervals"] = intervals
     return out
 
@@ -376,6 +384,7 @@ def rows(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
     for suffix, chosen in groups.items():
         runs = [run for run in _RUNS if chosen and run in chosen[0].runs]
         out |= {run + suffix: values for run, values in rows_of(chosen, runs).items()}
+
     return out
 
 
@@ -426,4 +435,5 @@ def table(rows: dict[str, dict[str, Any]], columns: Sequence[str] = COLUMNS) -> 
             + " | ".join(cell(values, name) for name in names)
             + " |"
         )
+
     return "\n".join(lines)

@@ -39,6 +39,7 @@ def tensors_of(
     }
     for name, tensor in predictor.state_dict().items() if predictor is not None else ():
         out[f"predictor.{name}"] = tensor.numpy()
+
     for part_name, part in flow.parts().items():
         for name, tensor in part.encoders.state_dict().items():
             out[f"{part_name}.encoders.{name}"] = tensor.numpy()
@@ -51,6 +52,7 @@ def tensors_of(
             out[f"{prefix}.weight"] = linear.weight().detach().numpy()
             for name, tensor in coupling.state_dict().items():
                 out[f"{prefix}.{name}"] = tensor.numpy()
+
     return out
 
 
@@ -69,6 +71,7 @@ def _grown(weights: Weights, name: str, array: np.ndarray, target: torch.Tensor)
             f"The weights '{weights.path}' do not fit this model ('{name}' is {old}, not {new}); "
             "choose others to begin with."
         )
+
     rows = target.view(gates, new[0] // gates, *new[1:])
     kept = torch.from_numpy(np.array(array)).view(gates, old[0] // gates, *old[1:])
     if len(old) == 2:
@@ -97,6 +100,7 @@ def adopt_part(part: PartFlow, name: str, weights: Weights, config: ModelConfig)
     """
     for key, target in part.encoders.state_dict().items():
         _grown(weights, key, weights.require(f"{name}.encoders.{key}"), target)
+
     model = weights.config["model"]
     told = int(model.get("ahead", 0)) + bool(model.get("ahead_mask", False))
     wanted = config.ahead + config.ahead_mask
@@ -105,12 +109,14 @@ def adopt_part(part: PartFlow, name: str, weights: Weights, config: ModelConfig)
             f"The weights '{weights.path}' are told of the root's way in another manner; choose "
             "another file."
         )
+
     for k, (norm, linear, coupling) in enumerate(part.steps()):
         prefix = f"{name}.{k}"
         for key, target in (("bias", norm.bias), ("log_scale", norm.log_scale)):
             target.copy_(
                 torch.from_numpy(np.array(weights.require(f"{prefix}.{key}", tuple(target.shape))))
             )
+
         linear.adopt(
             torch.from_numpy(
                 np.array(weights.require(f"{prefix}.weight", tuple(linear.weight().shape)))
@@ -168,6 +174,7 @@ def export(
             tensors[name] = array
         else:
             tensors[name], tensors[f"{name}.scale"] = quantised(array)
+
     tensors |= noise or {}
     with whole_file(file) as part:
         write_safetensors(

@@ -35,6 +35,7 @@ def noise_along(
     told = batch.past
     if predictor is not None:
         told = torch.cat([predictor(batch.past, batch.occupancy), batch.root], dim=-1)
+
     pose = torch.cat([batch.upper, batch.lower], dim=-1)
     conditions = {
         name: flow.condition(name, told, observation, given, pose) for name in flow.partition
@@ -73,6 +74,7 @@ def take_noise(
         tensors[f"{part}.spread"] = _root(mean)
         tensors[f"{part}.passing"] = _root(passing.reshape(-1, passing.shape[-1]))
         tensors[f"{part}.taps"] = _filters(passing)
+
     return {name: tensor.astype(np.float32) for name, tensor in tensors.items()}
 
 

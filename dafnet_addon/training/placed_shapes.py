@@ -24,6 +24,7 @@ class DeviceBank:
         self.count, self.device = len(bank), device
         if not self.count:
             return
+
         sizes = np.array([shape.values.shape for shape in bank.shapes])
         first = np.concatenate([[0], np.cumsum(sizes.prod(1))[:-1]])
         reach = [
@@ -58,6 +59,7 @@ class DeviceBank:
         out = torch.zeros(windows * frames, len(SPHERES), device=self.device)
         if not self.count:
             return out.reshape(windows, frames, -1)
+
         numbers = placed[..., 0].long()
         apart = (placed[:, None, :, 1:3] - root[:, :, None, :2]).norm(dim=-1)
         near = (numbers >= 0)[:, None] & (apart < self.reaches[numbers.clamp_min(0)][:, None])
@@ -68,6 +70,7 @@ class DeviceBank:
             # A frame that sees two shapes stands twice among the rows.
             row = (window * frames + frame)[:, None].expand_as(found)
             out.scatter_reduce_(0, row, found, "amax")
+
         return out.reshape(windows, frames, -1)
 
     def _seen(self, placed: Tensor, root: Tensor) -> Tensor:

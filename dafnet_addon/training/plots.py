@@ -72,12 +72,14 @@ def plot(report: dict[str, Any], file: Path) -> None:
         ax.set_yticks(range(len(shown)), [name.replace("_", " ") for name in shown])
         ax.invert_yaxis()
         ax.set_title(title)
+
     some = report["rows"]["ground_truth"]
     figure.suptitle(
         f"{some['clips']} captured clips of unseen bodies, {some['seat_episodes']} seat episodes"
     )
     with whole_file(file) as part:
         figure.savefig(part, format="png", dpi=80)
+
     plt.close(figure)
 
 
@@ -108,26 +110,32 @@ def curves(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
                 value, _, _ = _of(each, which, name)
                 ax.axhline(value, ls=":", color=colour, label=f"{label}, {each['weights']}")
         ax.set_title(title)
+
     makers, loss, best = axes.flat[len(_PANELS_OF_A_RUN) :]
     for maker in sorted({name for each in own for name in each["makers"]}):
         shares = [each["makers"][maker]["free_t0"]["sits_within_8cm"] for each in own]
         makers.plot(hours, shares, marker="o", ms=3, label=maker)
+
     makers.set_title("FREE, within 8 cm, by maker")
     for part in sorted({name for each in own for name in each["held_out"]}):
         loss.plot(hours, [each["held_out"][part] for each in own], marker="o", ms=3, label=part)
+
     loss.set_title("held-out loss, nats a frame")
     best.plot(hours, [each["score"] for each in own], marker="o", ms=3, label="the run")
     for each in others:
         best.axhline(each["score"], ls=":", color="#222222", label=each["weights"])
+
     best.set_title("score, cm (the least is kept)")
     for ax in axes.flat:
         ax.set_xlabel("hours of one core a part")
         ax.set_xlim(left=0.0)
         if ax.get_legend_handles_labels()[1]:
             ax.legend(fontsize=7)
+
     figure.suptitle(f"{rows[0]['clips']} captured clips of bodies and makers that choose weights")
     with whole_file(file) as part:
         figure.savefig(part, format="png", dpi=80)
+
     plt.close(figure)
 
 

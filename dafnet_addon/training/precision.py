@@ -22,6 +22,7 @@ def mixes(device: str) -> bool:
     kind = torch.device(device).type
     with torch.random.fork_rng(devices=[]):
         lstm = nn.LSTM(8, 8, 2, batch_first=True).to(device)
+
     try:
         with torch.autocast(kind, torch.bfloat16):
             hidden, state = lstm(torch.ones(2, 3, 8, device=device))
@@ -29,6 +30,7 @@ def mixes(device: str) -> bool:
         (hidden.float() + again.float()).sum().backward()
     except RuntimeError:
         return False
+
     return all(bool(p.grad.isfinite().all()) for p in lstm.parameters() if p.grad is not None)
 
 

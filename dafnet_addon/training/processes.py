@@ -34,6 +34,7 @@ def spread_out(
             progress((done + 1) / len(items))
             yield result
         return
+
     with ProcessPoolExecutor(processes, get_context("spawn"), start) as pool:
         for done, result in enumerate(pool.map(task, items)):
             progress((done + 1) / len(items))

@@ -42,6 +42,7 @@ def device_of(device: str) -> str:
         raise InputError(
             f"The device '{device}' cannot be used ({reason}); name another, 'cpu' for one."
         ) from None
+
     return device
 
 

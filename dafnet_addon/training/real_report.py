@@ -84,8 +84,10 @@ def real_report(
         for each in seated:
             parts.setdefault(of(each.clip), []).append(each)
         report[f"by {group}"] = {name: rows_of(each, _RUNS) for name, each in sorted(parts.items())}
+
     if walks is None:
         return report
+
     sent = measured(
         weights,
         walks.clips,
@@ -118,6 +120,7 @@ def real_text(report: dict[str, Any]) -> str:
                 parts.append(f"### {title[3:].capitalize()}: {name}\n\n{table(own, columns)}")
         elif rows:
             parts.append(f"## {title.capitalize()}\n\n{table(rows, columns)}")
+
     return "\n\n".join(parts)
 
 
@@ -134,6 +137,7 @@ def real_page(report: dict[str, Any], title: str) -> str:
     if report.get(_SENT):
         sent = {"all": report[_SENT], **report[f"by kind, {_SENT}"]}
         parts += [f"### {title}: {_SENT}", _page_table(_SENT_CELLS, sent)]
+
     return "\n\n".join(parts) + "\n"
 
 

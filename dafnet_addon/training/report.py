@@ -100,6 +100,7 @@ def _seat(stop: Stop, height: float, back: bool) -> np.ndarray:
     ]
     if back:
         rows.append(box((0.0, -0.23, height + 0.185), (0.44, 0.04, 0.47)))
+
     return placed(np.array(rows), np.array(stop.position), stop.yaw)
 
 
@@ -144,6 +145,7 @@ def long_rooms() -> list[Room]:
                 {"chair": chair, "stool": stool},
             )
         )
+
     return rooms
 
 
@@ -267,6 +269,7 @@ def _seats(weights: Weights, progress: Callable[[float], None]) -> dict[str, Any
                 for k, name in enumerate(_HEIGHTS)
             },
         }
+
     return out
 
 
@@ -300,6 +303,7 @@ def _followed(sampler: Sampler, task: tuple[HeldClip, np.ndarray | None]) -> _Fo
         seen.append(frame.inputs[0, : sampler.actions])
         gaussian = 0.5 * (frame.noise**2 + np.log(2.0 * np.pi)).sum()
         nats.append(float(gaussian - frame.log_det[0]) + metres)
+
     return _Followed(clip, np.array(seen[PREROLL:]), np.array(nats[PREROLL:]))
 
 
@@ -338,6 +342,7 @@ def _actions(
     counts = {"clips": len(clips), "frames": len(actions)}
     if not actions.shape[1]:
         return {**counts, "likelihood": {label: plain(chosen) for label, chosen in groups.items()}}
+
     mixed = actions[np.random.default_rng(0).permutation(len(actions))].astype(np.float32)
     cuts = np.cumsum([len(c.joints) for c in clips])[:-1]
     tasks = list(zip(clips, np.split(mixed, cuts), strict=True))
@@ -436,6 +441,7 @@ def report(
     for each in found:
         if each.clip.unseen and not each.clip.composed:
             groups[each.clip.activity].append(each)
+
     return {
         "rows": rows(found),
         "by_activity": {
@@ -554,9 +560,11 @@ def criteria(values: dict[str, Any]) -> list[Criterion]:
                 )
             else:
                 against_real(rows["ground_truth" + suffix], row_, label)
+
     for name, by_run in values["by_activity"].items():
         for run in ("free_t0", "ee_t0"):
             against_real(by_run["ground_truth"], by_run[run], f"{name}, {run.replace('_', ' ')}")
+
     for temperature in ("t0", "t1"):
         first, last = (
             values["drift"][f"{which}_third_{temperature}"] for which in ("first", "last")
@@ -580,6 +588,7 @@ def criteria(values: dict[str, Any]) -> list[Criterion]:
             1.0,
             count=f"{seats['paths_and_seeds']} trios",
         )
+
     diversity, told = values["diversity"], values["actions"]
     clips = f"{told['clips']} clips"
     add(
@@ -611,8 +620,10 @@ def criteria(values: dict[str, Any]) -> list[Criterion]:
     for name in ("feet_off_floor", "legs_penetration_mean"):
         label = f"legs under one upper body: {name.replace('_', ' ')}"
         add(label, legs[name], max(2.0 * real[name], real[name] + 0.002), most=True, count=clips)
+
     if "shares" not in told:
         return found  # a system without an action predictor
+
     add("actions: information, nats", told["information_nats"], 1.0, count=clips)
     add("actions: likeliest in 2 % of frames", told["likeliest_in_2_percent"], 6.0, count=clips)
     add(
@@ -648,6 +659,7 @@ def text(values: dict[str, Any]) -> str:
     ]
     for name, found in values["by_activity"].items():
         parts += [f"### {name[0].upper()}{name[1:]}", table(found)]
+
     parts += ["## Drift: first and last third of a minute", table(values["drift"])]
     parts += ["## Diversity", table(values["diversity"])]
     seats = [
@@ -719,6 +731,7 @@ def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) ->
             of_it[i]
             for i in np.unique(np.linspace(0, len(of_it) - 1, min(count, len(of_it))).astype(int))
         ]
+
     takes = in_processes(weights, _calm, chosen, lambda share: None)
     drawn: list[Row] = [
         (f"{clip.name}, {kind}", joints, clip.furniture)
@@ -738,6 +751,7 @@ def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) ->
             )
         with whole_file(files[-1]) as part:
             flat.save(part, format="PNG", optimize=True)
+
     return files
 
 

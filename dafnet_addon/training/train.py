@@ -158,6 +158,7 @@ def read_config(file: Path, changes: Sequence[str] = ()) -> tuple[ModelConfig, T
         raise InputError(
             f"The configuration '{file}' cannot be read ({error}); check the path and its TOML."
         ) from error
+
     presets = {"paper": PAPER.as_dict(), "small": SMALL.as_dict()}
     preset, given, training = (
         table.pop("preset", "small"),
@@ -166,14 +167,17 @@ def read_config(file: Path, changes: Sequence[str] = ()) -> tuple[ModelConfig, T
     )
     if not isinstance(preset, str) or preset not in presets:
         raise InputError(f"The preset '{preset}' is unknown; use one of {', '.join(presets)}.")
+
     try:
         if table or not isinstance(given, dict):
             raise ValueError(
                 f"unknown setting '{min(table, default='model')}' outside of [model] and [training]"
             )
+
         sizes = {field.name for field in fields(ModelConfig)}
         for name, value in tomllib.loads("\n".join(changes)).items():
             (given if name in sizes else training)[name] = value
+
         return typed(ModelConfig, {**presets[preset], **given}), typed(TrainingConfig, training)
     except ValueError as error:
         raise InputError(
@@ -208,6 +212,7 @@ class Run:
         for module in self.flow.modules():
             if isinstance(module, Coupling | EnvironmentEncoder):
                 module.mixed = self.config.mixed
+
         self.gmvae.predictor.mixed = self.config.mixed and part != "predictor"
         self.network: nn.Module = self.gmvae if part == "predictor" else self.flow.parts()[part]
         self.optimiser = torch.optim.Adam(
@@ -321,6 +326,7 @@ class Run:
         model = kept.settings(ModelConfig, "model")
         if part != "predictor" and part not in system_named(model.system).partition:
             raise kept.refused(f"its model has no part '{part}'")
+
         with torch.device("meta"):
             gmvae, flow = GMVAE(model), BodyFlow(model)
             if (
@@ -329,6 +335,7 @@ class Run:
             ):
                 raise kept.refused("its model is too large")
             kept.fits(gmvae if part == "predictor" else flow.parts()[part])
+
         settings = config or kept.settings(TrainingConfig, "config")
         run = Run(part, folder, model, settings, _statistics_of(kept), device)
         kept.restore(run.network, run.optimiser)
@@ -370,12 +377,14 @@ class Run:
             return self.gmvae.losses(
                 past, seen, self.hidden(sight), gumbel_temperature(self.share)
             ).total
+
         occupancy = self.hidden(batch.seen)
         observation, given = observation_for(batch.upper)
         x, condition = self._told(batch, occupancy, observation, given)
         part = self.flow.parts()[self.part]
         if initialise or not self.config.free_run:
             return -part.log_likelihood(x, condition, occupancy, initialise).mean()
+
         kept = 1 if float(torch.rand(())) < self.config.cold else self.config.captured
         calm = torch.rand(len(x), device=self.device) < self.config.calm
         z = torch.randn(len(x), x.shape[-1], device=self.device) * ~calm[:, None]
@@ -398,6 +407,7 @@ class Run:
             poses *= (
                 torch.rand(*poses.shape[:-1], 1, device=self.device) >= self.config.slot_dropout
             )
+
         pose = torch.cat([batch.upper, batch.lower], dim=-1)
         return pose[..., self.flow.partition[self.part]], self.flow.condition(
             self.part, base, observation, given, pose
@@ -435,6 +445,7 @@ class Run:
         if self.part != "lower":
             own = metres(made[..., upper], upper), metres(true[..., upper], upper)
             loss = loss + upper_loss(*own, calm, given[:, kept:, :joints])
+
         if self.part != "upper":
             legs = (..., slice(-LOWER_SIZE, None))
             pelvis = metres(batch.upper[:, kept:, :3], slice(0, 3))[..., 0, :]
@@ -445,6 +456,7 @@ class Run:
                 pelvis,
                 batch.step[:, kept:],
             )
+
         return loss
 
     @torch.no_grad()
@@ -471,6 +483,7 @@ def _statistics_of(kept: Checkpoint) -> Statistics:
             if not np.isfinite(values).all() or (name.endswith("std") and (values <= 0.0).any()):
                 raise kept.refused(f"'statistics.{name}' cannot be divided by or added")
             found[name] = values
+
     return Statistics(**found)
 
 
@@ -485,6 +498,7 @@ def dataset_pool(dataset: Path, device: str = "cpu") -> Pool:
         raise InputError(
             f"The dataset '{dataset}' holds no windows; make it with 'dafnet prepare'."
         )
+
     return pool
 
 
@@ -512,10 +526,12 @@ def descend(
     """
     for group in optimiser.param_groups:
         group["lr"] = config.rate(step, share)
+
     optimiser.zero_grad()
     loss.backward()
     if step == 0:
         ranks.from_first(network)
+
     ranks.average([p.grad for p in network.parameters() if p.grad is not None])
     nn.utils.clip_grad_norm_(network.parameters(), config.clip_norm)
     optimiser.step()
@@ -543,6 +559,7 @@ def train_part(
     """
     if threads is not None:
         torch.set_num_threads(threads)
+
     device = ranks.device_of(device)
     torch.backends.cuda.matmul.allow_tf32 = True
     pool = dataset_pool(dataset, device)
@@ -570,17 +587,20 @@ def train_part(
         statistics = predictor.statistics if predictor is not None else pool.statistics()
         if begin_with is not None:
             statistics = adopted_statistics(begin_with, statistics)
+
         run = Run(part, folder, model, config, statistics, device)
         if begin_with is not None:
             run.adopt(begin_with)
         if ranks.rank() == 0:
             run.save()
+
     if ranks.rank():
         torch.manual_seed(hash((config.seed, run.step, ranks.rank())) % 2**31)
     if predictor is not None:
         with predictor.with_average() as network:
             run.gmvae.load_state_dict(network.state_dict())
         run.gmvae.requires_grad_(False)
+
     recent: list[torch.Tensor] = []
     leads = ranks.rank() == 0
     curves = _curves(folder / "tensorboard" / part) if leads else None
@@ -598,9 +618,11 @@ def train_part(
         run.average()
         if run.step % config.save_every == 0:
             torch.stack(recent).mean().item()  # what a device still has to do is counted too
+
         run.seconds = ranks.mean(run.seconds + clock() - begin, run.device)
         if held_its_rate and run.cools and leads:
             run.save(f"{part}{HELD}")
+
         if run.step % config.save_every == 0 or run.share >= 1.0:
             mean = ranks.mean(float(torch.stack(recent).mean()), run.device)
             if not math.isfinite(mean):
@@ -608,8 +630,10 @@ def train_part(
                     f"The loss of '{part}' is not a number by step {run.step}; resume with a lower "
                     "peak rate."
                 )
+
             with run.with_average():
                 held_out = run.held_loss(held)
+
             if leads:
                 values = {
                     "part": part,
@@ -625,11 +649,14 @@ def train_part(
                 # once, by the next one.
                 with (folder / "log.jsonl").open("a", encoding="utf-8") as f:
                     f.write(json.dumps(values) + "\n")
+
                 if curves is not None:
                     for name in ("loss", "held_out", "windows"):
                         curves.add_scalar(name, values[name], run.step)
+
             recent.clear()
             pool.refresh()
+
     return run
 
 
@@ -692,10 +719,12 @@ def train(
             device=device,
             begin_with=begin_with,
         )
+
     if ranks.joined():
         for part in names:
             train_part(part, dataset, folder, model, config, device=device, begin_with=begin_with)
         return
+
     threads = max(1, min(torch.get_num_threads(), cores()) // len(names))
     with ProcessPoolExecutor(len(names), mp_context=multiprocessing.get_context("spawn")) as pool:
         begin = time.monotonic()
@@ -720,6 +749,7 @@ def train(
                 else (time.monotonic() - begin) / max(60.0 * config.minutes_flow, 1e-9)
             )
             progress(first + (1.0 - first) * min(1.0, spent))
+
         try:
             for done in parts:
                 done.result()
@@ -763,6 +793,7 @@ def account(folder: Path, dataset: Path) -> dict[str, str]:
     last = list(runs.values())[-1]
     if last.adopted:
         training["begun_with"] = last.adopted
+
     return {
         "licence": "CC-BY-4.0; provenance in LICENSE-WEIGHTS.md",
         "data": (dataset / "dataset.json").read_text(encoding="utf-8"),

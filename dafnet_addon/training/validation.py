@@ -69,6 +69,7 @@ def score(clips: Sequence[Measured]) -> float:
     makers: dict[str, list[float]] = defaultdict(list)
     for each in clips:
         makers[each.clip.maker] += [abs(error) for error in each.runs["free_t0"].seats]
+
     seats = 100.0 * float(np.mean([np.mean(errors) for errors in makers.values() if errors]))
     free, ee, truth = (
         row([each.runs[run] for each in clips]) for run in ("free_t0", "ee_t0", "ground_truth")
@@ -86,6 +87,7 @@ def likelihoods(folder: Path, dataset: Path) -> dict[str, float]:
     runs = checkpoints(folder)
     if "predictor" in runs:
         runs["predictor"].adopt_average()
+
     found = {}
     for part, run in runs.items():
         if part != "predictor":
@@ -94,6 +96,7 @@ def likelihoods(folder: Path, dataset: Path) -> dict[str, float]:
                 run.gmvae.load_state_dict(runs["predictor"].network.state_dict())
             run.config = replace(run.config, free_run=0.0, dropout_windows=0.0)
             found[part] = run.held_loss(held, _HELD_WINDOWS)
+
     return found
 
 
@@ -102,6 +105,7 @@ def recorded(folder: Path) -> list[dict[str, Any]]:
     file = folder / RECORD
     if not file.exists():
         return []
+
     try:
         return [read_json(line) for line in file.read_text(encoding="utf-8").splitlines()]
     except ValueError as error:
@@ -198,6 +202,7 @@ def _figures(clips: Sequence[Measured]) -> dict[str, Any]:
         figures[run]["intervals"] = {
             name: found["intervals"][name] for name in figures[run] if name in found["intervals"]
         }
+
     groups: dict[str, dict[str, Any]] = {}
     for group, of in _GROUPS.items():
         parts: dict[str, list[Measured]] = defaultdict(list)
@@ -212,6 +217,7 @@ def _figures(clips: Sequence[Measured]) -> dict[str, Any]:
             }
             for name, own in sorted(parts.items())
         }
+
     return {"clips": len(clips), "figures": figures, **groups}
 
 
@@ -227,6 +233,7 @@ def _keep_if_best(folder: Path, file: Path, found: dict[str, Any]) -> None:
             raise InputError(
                 f"'{best}' does not say how good it is; move it away, and validate again."
             ) from None
+
     annotate(file, {"validation": json.dumps(found)})
     with whole_file(best) as part:
         shutil.copyfile(file, part)

@@ -71,6 +71,7 @@ def _sections(text: str) -> dict[str, list[list[str]]]:
             words = words[1:]
         if words:
             lines.append(words)
+
     return sections
 
 
@@ -139,12 +140,15 @@ def _skeleton(sections: dict[str, list[list[str]]]) -> Skeleton:
         vectors.append(_numbers(bone["direction"], 3) * _numbers(bone["length"], 1))
         axes.append(_turn(bone["axis"][:3], bone["axis"][3], degrees))
         freedoms.append(tuple(word.lower() for word in bone.get("dof", [])))
+
     known = {"tx", "ty", "tz", "rx", "ry", "rz", "l"}
     if not set().union(*freedoms) <= known:
         raise ValueError("dof")
+
     length = float(_numbers([units.get("length", "1")], 1)[0])
     if length <= 0:
         raise ValueError("the unit of length")
+
     return Skeleton(
         tuple(names),
         tuple(parents),
@@ -198,6 +202,7 @@ def read_amc(file: Path, skeleton: Skeleton) -> Recording:
                 "does not have; put it beside "
                 "its own .asf."
             )
+
     check_size(file, frames, 2 * len(skeleton.bones), sum(map(len, values.values())))
     moved = []
     for bone, numbers in values.items():
@@ -205,7 +210,9 @@ def read_amc(file: Path, skeleton: Skeleton) -> Recording:
         angles = np.array(numbers)
         if frames < 1 or len(numbers) != frames * freedoms[bone] or not sound(angles):
             raise _broken(file, bone, freedoms[bone], frames)
+
         moved.append(angles.reshape(frames, freedoms[bone]))
+
     return _recording(skeleton, moved, degrees, rate)
 
 
@@ -252,6 +259,7 @@ def _recording(
                 elif freedom[0] == "t" and b == 0:
                     offsets[:, 0, "xyz".index(freedom[1])] += column
             local[:, b] = axis @ turn @ axis.T
+
         return offsets, local
 
     rest = posed(parents, begins[None], np.tile(np.eye(3), (1, len(names), 1, 1)))[0]

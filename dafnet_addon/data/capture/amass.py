@@ -45,16 +45,19 @@ def read_amass(file: Path) -> Recording:
             f"{', '.join(map(str, _SIZES))} and of 3, one for each frame; use the files as AMASS "
             "gives them."
         )
+
     if not all(sound(array) for array in (poses, way)):
         raise InputError(
             f"The archive '{file}' holds numbers that no motion has; get it again from where it "
             "came."
         )
+
     if any(rate.size != 1 or rate.dtype.kind == "U" for rate in rates):
         raise InputError(
             f"The archive '{file}' gives no one number as {named[0]}; use the files as AMASS "
             "gives them."
         )
+
     turns, way = poses[:, :66].reshape(-1, 22, 3), way.astype(float)
 
     def pose(rows: slice) -> tuple[np.ndarray, np.ndarray]:

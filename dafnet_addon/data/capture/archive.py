@@ -68,6 +68,7 @@ def _array(name: str, data: bytes) -> np.ndarray:
         shape, by_columns, dtype = np.lib.format.read_array_header_2_0(member)
     else:
         raise ValueError(f"'{name}' is an array of version {version}")
+
     held = len(data) - member.tell()
     if dtype.kind not in _KINDS or min(shape, default=0) < 0:
         raise ValueError(f"'{name}' holds neither numbers nor text")
@@ -75,6 +76,7 @@ def _array(name: str, data: bytes) -> np.ndarray:
         raise ValueError(
             f"'{name}' announces {'×'.join(map(str, shape))} entries, but holds {held} bytes"
         )
+
     flat = np.frombuffer(data, dtype, offset=member.tell()) if held else np.zeros(0, dtype)
     return flat.reshape(shape, order="F" if by_columns else "C")
 
@@ -93,6 +95,7 @@ def read_arrays(file: Path, *names: str) -> list[np.ndarray]:
         missing = [name for name in names if f"{name}.npy" not in archive.namelist()]
         if missing:
             raise ValueError(f"it lacks {', '.join(missing)}")
+
         infos = [archive.getinfo(f"{name}.npy") for name in names]
         unpacked = sum(info.file_size for info in infos)
         if unpacked > _SPARE + _PACKED * file.stat().st_size:
@@ -101,6 +104,7 @@ def read_arrays(file: Path, *names: str) -> list[np.ndarray]:
             )
         if any(info.compress_type not in (ZIP_STORED, ZIP_DEFLATED, ZIP_LZMA) for info in infos):
             raise ValueError("it is packed as no .npz is")
+
         return [_array(info.filename, archive.read(info)) for info in infos]
 
 
@@ -124,4 +128,5 @@ def mapped_arrays(file: Path) -> dict[str, np.ndarray]:
                 raise ValueError(f"'{info.filename}' holds neither numbers nor text")
             name = info.filename.removesuffix(".npy")
             arrays[name] = np.memmap(file, dtype, "c", data.tell(), shape)
+
     return arrays

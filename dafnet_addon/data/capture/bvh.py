@@ -85,8 +85,10 @@ def _hierarchy(text: str) -> list[_Joint]:
             i += 1
         else:
             raise ValueError(f"'{printable(tokens[i])}'")
+
     if open_joints or not joints:
         raise ValueError("its braces")
+
     return joints
 
 
@@ -100,6 +102,7 @@ def _parts(text: str) -> tuple[list[_Joint], int, float, np.ndarray]:
         raise ValueError("it has no MOTION with Frames and Frame Time")
     if motion.start() > MAX_JOINTS * _PER_JOINT:
         raise ValueError("its skeleton is not a body's")
+
     announced, (step,) = int(times[1]), numbers_in(times[2])
     return (
         _hierarchy(text[: motion.start()]),
@@ -122,6 +125,7 @@ def read_bvh(file: Path) -> Recording:
             f"The file '{file}' does not begin with HIERARCHY as a BVH file does; export it again "
             "as BVH."
         )
+
     try:
         joints, announced, step, values = _parts(text)
     except ValueError as error:
@@ -129,6 +133,7 @@ def read_bvh(file: Path) -> Recording:
             f"The BVH file '{file}' is damaged or breaks off (near: {str(error)[:120]}); export "
             "it again from where it came."
         ) from None
+
     kinds = sum(len(joint.channels) for joint in joints)
     frames = len(values) // max(kinds, 1)
     # Several exporters count the rest pose, or forget it.
@@ -143,6 +148,7 @@ def read_bvh(file: Path) -> Recording:
             f"{len(values)} numbers, or some "
             "that no motion has; export it again from where it came."
         )
+
     check_size(file, frames, len(joints), len(values))
     return _recording(joints, values.reshape(frames, kinds), step)
 
@@ -163,6 +169,7 @@ def _recording(joints: list[_Joint], values: np.ndarray, step: float) -> Recordi
                     offsets[:, j, "xyz".index(axis)] = column
                 else:
                     local[:, j] = local[:, j] @ rotation_about(axis, np.radians(column))
+
         return offsets, local
 
     rest = posed(parents, rest_offsets[None], np.tile(np.eye(3), (1, len(joints), 1, 1)))[0]

@@ -55,6 +55,7 @@ def _t_pose(joints: np.ndarray, limbs: np.ndarray) -> np.ndarray:
             direction(side + "shoulder", side + "elbow") * direction(side + "elbow", side + "wrist")
         ).sum(-1) > 0.85
         straight &= direction(side + "hip", side + "ankle")[:, 2] < -0.96
+
     level = (left[:, 2] > -0.6) & (right[:, 2] > -0.6) & (np.abs(left[:, 2] - right[:, 2]) < 0.25)
     held = (
         straight & level & (apart < -0.6) & (np.concatenate([limbs, limbs[-1:]]) * MODEL_FPS < 0.7)
@@ -62,6 +63,7 @@ def _t_pose(joints: np.ndarray, limbs: np.ndarray) -> np.ndarray:
     out = np.zeros(len(joints), dtype=bool)
     for start, end in runs(straight & (apart < 0.0)):
         out[start:end] = held[start:end].sum() >= _T_POSE
+
     return out
 
 
@@ -77,6 +79,7 @@ def _dropout(joints: np.ndarray, step: np.ndarray) -> np.ndarray:
             )
             if end - start >= _FROZEN and jumps > _JUMP:
                 bad[start : end + 1] = True
+
     bones = np.linalg.norm(joints[:, 1:] - joints[:, list(PARENTS[1:])], axis=-1)
     usual = np.median(bones, axis=0)
     return bad | (np.abs(bones - usual) > np.maximum(0.35 * usual, 0.06)).any(1)
@@ -100,6 +103,7 @@ def bad_frames(joints: np.ndarray) -> dict[str, np.ndarray]:
     """
     if len(joints) < 2:
         return {reason: np.zeros(len(joints), dtype=bool) for reason in REASONS}
+
     step = np.linalg.norm(np.diff(joints, axis=0), axis=-1)
     limbs = np.linalg.norm(np.diff(joints - joints[:, :1], axis=0), axis=-1).max(1)
     fast = (step[:, 0] * MODEL_FPS > _FASTEST_ROOT) | (limbs * MODEL_FPS > _FASTEST_LIMB)

@@ -110,10 +110,12 @@ def read_clips(folder: Path, left_out: list[str] | None = None) -> Iterator[Clip
                     f"The archive '{file}' is not a motion, since it lacks "
                     f"{', '.join(sorted(AMASS - arrays))}."
                 )
+
     for own in raw.values():
         for clip in _clips(folder, own, stated, left_out):
             found = True
             yield clip
+
     if not found:
         raise InputError(
             f"None of the motion files in the folder '{folder}' can be used; of the first: "
@@ -124,6 +126,7 @@ def read_clips(folder: Path, left_out: list[str] | None = None) -> Iterator[Clip
                 ".asf); give the folder that holds them."
             )
         )
+
     if left_out is not None:
         left_out += stated.unmet([file.relative_to(folder) for file in files])
 
@@ -143,6 +146,7 @@ def _compact(file: Path, left_out: list[str] | None) -> Iterator[Clip]:
         infos = [dict(info) for info in json.loads(str(words))]
     except (ValueError, TypeError, RecursionError):
         infos = []
+
     counted = (
         frames.ndim == 1 and frames.dtype.kind in "iu" and frames.size > 0 and int(frames.min()) > 0
     )
@@ -157,6 +161,7 @@ def _compact(file: Path, left_out: list[str] | None) -> Iterator[Clip]:
             "says; get it again from where "
             "it came."
         )
+
     ends = np.concatenate([[0], np.cumsum(frames.astype(np.int64) - 1)])
     for i, info in enumerate(infos):
         with leaving_out(left_out):
@@ -205,6 +210,7 @@ def _recorded(file: Path, skeletons: dict[Path, Skeleton | InputError]) -> Recor
         return read_bvh(file)
     if kind == ".npz":
         return read_amass(file)
+
     moved = bones_of_amc(file)
     whole = {asf: found for asf, found in skeletons.items() if isinstance(found, Skeleton)}
     fitting = {
@@ -225,6 +231,7 @@ def _recorded(file: Path, skeletons: dict[Path, Skeleton | InputError]) -> Recor
             "its bones; put its own there, "
             "named as the .amc begins."
         )
+
     return read_amc(file, fitting[named[-1]] if named else next(iter(fitting.values())))
 
 
@@ -238,6 +245,7 @@ def _skeletons(folder: Path) -> dict[Path, Skeleton | InputError]:
             found[asf] = read_asf(asf)
         except InputError as error:
             found[asf] = error
+
     return found
 
 
@@ -282,6 +290,7 @@ def _read(
                 f"{folder / 'clips.json'}."
             )
         )
+
     metres = joints * unit_of(joints, recording.unit, file)
     return _Read(path, fields, at_model_rate(metres, rate), uprightness(joints, rest))
 
@@ -297,6 +306,7 @@ def _clips(
     for file in files:
         with leaving_out(left_out):
             ours.append(_read(file, folder, stated, skeletons))
+
     evidence = sum((read.upright for read in ours), np.zeros(2))
     for read in ours:
         joints = z_up(read.joints, read.fields.get("up", "z" if evidence[1] > evidence[0] else "y"))

@@ -68,8 +68,10 @@ def text_of(file: Path) -> str:
         raise InputError(
             f"The file '{file}' cannot be opened ({error.strerror}); look at its permissions."
         ) from None
+
     if data[:2] in (BOM_UTF16_LE, BOM_UTF16_BE):
         return data.decode("utf-16", errors="replace")
+
     return data.removeprefix(BOM_UTF8).decode("latin-1")
 
 
@@ -86,6 +88,7 @@ def numbers_in(text: str) -> np.ndarray:
     """
     if "," in text:
         text = text.replace(",", " " if "." in text else ".")
+
     out, at = array("d"), 0
     while at < len(text):
         # In pieces, since a word takes eight times the memory that it takes in the file.
@@ -93,6 +96,7 @@ def numbers_in(text: str) -> np.ndarray:
         end = gap.start() if gap else len(text)
         out.extend(map(float, text[at:end].split()))
         at = end
+
     return np.array(out)
 
 

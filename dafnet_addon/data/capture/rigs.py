@@ -62,6 +62,7 @@ def rigs() -> tuple[Rig, ...]:
         found.append(
             Rig(file.stem, data["about"], frozenset(_plain(n) for n in data["known_by"]), joints)
         )
+
     return tuple(sorted(found, key=lambda rig: (-len(rig.needs), rig.name)))
 
 
@@ -88,6 +89,7 @@ def rig_of(recording: Recording, file: Path) -> tuple[Rig, dict[str, int]]:
     for rig, index in found:
         if rig.needs <= index.keys():
             return rig, index
+
     nearest, index = min(
         found, key=lambda pair: len(pair[0].needs - pair[1].keys()) / len(pair[0].needs)
     )

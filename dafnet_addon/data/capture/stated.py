@@ -56,6 +56,7 @@ def _csv_rows(text: str) -> list[tuple[str, dict[str, Any]]]:
     table.fieldnames = [name.strip().lower() for name in table.fieldnames or ()]
     if "file" not in table.fieldnames:
         raise ValueError("it has no column 'file'")
+
     rows = []
     for row in table:
         filled = {str(k): v.strip() if isinstance(v, str) else str(v) for k, v in row.items() if v}
@@ -64,6 +65,7 @@ def _csv_rows(text: str) -> list[tuple[str, dict[str, Any]]]:
             raise ValueError(f"no file in line {table.line_num}")
         if given:
             rows.append((given.pop("file"), given))
+
     return rows
 
 
@@ -90,6 +92,7 @@ class Stated:
                 """{"*.bvh": {"licence": "CC0", "subject": "s1"}}, """
                 "or as CSV with a column 'file'."
             ) from None
+
         for pattern, fields in rows:
             wrong = sorted(set(fields) - _FIELDS)
             wrong += [k for k, form in _FORMS.items() if not re.fullmatch(form, fields.get(k, ""))]
@@ -100,6 +103,7 @@ class Stated:
                     f"{', '.join(sorted(_FIELDS))}, with split 'train' or 'test', up 'y' or 'z' "
                     "and fps a number."
                 )
+
         self.rows = [(name, _pattern(name), fields) for name, fields in rows]
 
     def of(self, path: PurePath) -> dict[str, str]:

@@ -47,6 +47,7 @@ def summary(clips: Iterable[Clip], left_out: Sequence[str] = ()) -> str:
     for key in sorted(frames):
         minutes = f"{frames[key] / _MINUTE:.1f}"
         rows.append((*key[:4], minutes, str(count[key]), reasons(cut[key]), key[4]))
+
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     right = {4, 5}
     lines = [
@@ -67,4 +68,5 @@ def summary(clips: Iterable[Clip], left_out: Sequence[str] = ()) -> str:
         lines.append(
             f"{unstated} clips are not trained on: state their licence in clips.json or clips.csv"
         )
+
     return "\n".join(line.rstrip() for line in (*lines, *left_out))

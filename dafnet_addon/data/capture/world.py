@@ -36,6 +36,7 @@ def unit_of(joints: np.ndarray, stated: float | None, file: Path) -> float:
     leg = float(np.median(np.linalg.norm(np.diff(legs, axis=2), axis=-1).sum(-1)))
     if stated is not None and _SHORTEST <= leg * stated <= _LONGEST:
         return stated
+
     nearest = min(_UNITS.values(), key=lambda unit: abs(np.log(max(leg, 1e-12) * unit / _LEG)))
     if not _SHORTEST <= leg * nearest <= _LONGEST:
         raise InputError(
@@ -43,6 +44,7 @@ def unit_of(joints: np.ndarray, stated: float | None, file: Path) -> float:
             f"{', '.join(_UNITS)}; "
             "scale the file to metres."
         )
+
     return nearest
 
 
@@ -87,6 +89,7 @@ def floor_height(joints: np.ndarray) -> float:
     carried = joints[:, :1, 2] - toes[..., 2] > 0.3
     if not carried.any():
         return float(np.percentile(joints[..., 2].min(1), 2))
+
     planted = toes[..., 2][carried & (speed < 0.15)]
     # Low among them, since a foot may rest on a step; a runner's toes hardly stand, so that the
     # lower of the two counts too.

@@ -76,6 +76,7 @@ def _sits(
     found = resting(joints, root_from_joints(joints))
     if not found or wanted < lowest_pelvis(float(found[0].position[2])):
         return None
+
     moved = at_seat_height(joints, float(found[0].position[2]), wanted)
     path = root_from_joints(moved)
     for rest in resting(moved, path):
@@ -84,6 +85,7 @@ def _sits(
             frame = (rest.start + rest.end) // 2
             text = f"{_name(room)}: pelvis {100 * moved[frame, 0, 2]:.0f}"
             return wanted, moved[frame], float(path.yaw[frame]), room, text
+
     return None
 
 
@@ -131,6 +133,7 @@ def _rows(
         own = ShapeBank(tuple(shape for shape in bank.shapes if shape.kind == kind))
         pelvis = [seat.pelvis for shape in own.shapes for seat in shape.seats]
         rows[kind] = seats(min(pelvis), max(pelvis), partial(seat_shape_for, rng, own))
+
     rows["boxes"] = seats(LOWEST, HIGHEST, lambda *at: _of(seat_for(rng, *at)))
 
     def lies(joints: np.ndarray) -> Cell | None:
@@ -142,6 +145,7 @@ def _rows(
     for title, kind, make in (("lying", "lie", lies), ("working", "desk", works)):
         cells = [cell for _ in range(_COLUMNS) for cell in first((kind,), make)]
         rows[title] = sorted(cells, key=lambda cell: cell[0])
+
     return {title: cells for title, cells in rows.items() if cells}
 
 
@@ -171,5 +175,6 @@ def fit_sheet(
                 at = c * width + v * _SIZE[0], r * height + _LINE
                 paper.paste(Image.fromarray(seen), at)
             ink.text((c * width + 3, r * height + 1), f"{title}: {text}", fill="black")
+
     with whole_file(file) as part:
         paper.quantize(_COLOURS, dither=Image.Dither.NONE).save(part, format="PNG", optimize=True)

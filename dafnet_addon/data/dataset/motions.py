@@ -51,6 +51,7 @@ def read_motions(file: Path) -> tuple[list[Motion], Draws]:
             z[n] for n in ("frames", "first", "delta", "rests", "draws", "weights")
         )
         valid = np.unpackbits(z["valid"], count=int(frames.sum())).astype(bool)
+
     motions, steps, at = [], 0, 0
     for i, (name, source, subject, category) in enumerate(words["motions"]):
         joints = (
@@ -64,9 +65,11 @@ def read_motions(file: Path) -> tuple[list[Motion], Draws]:
             Motion(name, source, subject, category, joints, valid[at : at + frames[i]], own)
         )
         steps, at = steps + frames[i] - 1, at + frames[i]
+
     draws: Draws = {}
     at = 0
     for kind, count in words["kinds"].items():
         draws[kind] = rows[at : at + count], weights[at : at + count]
         at += count
+
     return motions, draws

@@ -88,15 +88,18 @@ def pack(
     shards = sorted(dataset.glob("pool-????.npz"))
     if not shards or not (dataset / _RECORD).exists():
         raise InputError(f"'{dataset}' is not a dataset; make one with 'dafnet prepare'.")
+
     left = int(mebibytes * 2**20)
     left -= _save(out / _RECORD, (dataset / _RECORD).read_bytes())
     left -= _save(out / f"{_PACKED}{_HELD}.npz", _windows(load_pool([dataset / "held.npz"])))
     if (dataset / FURNITURE).exists():
         with np.load(dataset / FURNITURE) as furniture:
             left -= _save(out / FURNITURE, _compressed(furniture))
+
     for old in out.glob(f"{_PACKED}????.npz"):
         if old.stem != f"{_PACKED}{_HELD}":
             old.unlink()
+
     windows = 0
     for k, file in enumerate(shards):
         shard = load_pool([file])
@@ -105,16 +108,20 @@ def pack(
         while count and len(data) > left:
             count = int(_SPARE * count * max(left, 0) / len(data))
             data = _windows(shard, count)
+
         if not count:
             break
+
         left -= _save(out / f"{_PACKED}{k:04d}.npz", data)
         windows += count
         progress((k + 1) / len(shards))
+
     if not windows:
         raise InputError(
             f"Not one window of '{dataset}' goes into {mebibytes:g} MiB beside its furniture and "
             "held-out windows; allow more."
         )
+
     return windows
 
 
@@ -133,17 +140,22 @@ def unpack(
         shard = dict(zip(fields, read_arrays(file, *fields), strict=True))
         if missing := [field for field in (*_STEPS, "kinds") if field not in shard]:
             raise InputError(f"'{file}' lacks {', '.join(missing)}; pack the dataset again.")
+
         for field, step in _STEPS.items():
             shard[field] = _from_changes(shard[field], step)
+
         kinds = {"poses": np.int16, "kinds": shard["kinds"].dtype}
         shard = {field: a.astype(kinds.get(field, np.float32)) for field, a in shard.items()}
         windows += len(shard["poses"]) * (name != _HELD)
         if not made.exists():
             with whole_file(made) as part, part.open("wb") as out:
                 np.savez(out, **shard)
+
         progress((k + 1) / len(files))
+
     if (packed / FURNITURE).exists():
         _save(dataset / FURNITURE, (packed / FURNITURE).read_bytes())
+
     described = json.loads((packed / _RECORD).read_text(encoding="utf-8"))
     _save(dataset / _RECORD, json.dumps({**described, "windows": windows}, indent=1).encode())
     return windows

@@ -55,6 +55,7 @@ def body_of(pose: np.ndarray) -> Body:
         radius = _THICK.get(part, 0.07)
         count = int(np.ceil(np.linalg.norm(end - start) / _SPAN)) + 1
         rows += [(*p, radius, *colour) for p in np.linspace(start, end, count)]
+
     head, neck = pose[joint("head")], pose[joint("neck")]
     rows.append((*(head + 0.08 * normalised(head - neck)), 0.1, *_TRUNK))
     rows.append((*pose[0], 0.09, *_TRUNK))
@@ -152,9 +153,11 @@ def picture(
         far, ground = np.minimum(far, floor), far >= floor
     else:
         ground = np.isinf(far)
+
     colour[~ground] = _lit(_FURNITURE, normal[~ground] @ camera.T)
     if body is not None:
         _draw_body(body, start, camera, far, colour)
+
     return np.clip(colour, 0, 255).astype(np.uint8).reshape(height, width, 3)
 
 
@@ -183,6 +186,7 @@ def _draw_body(
         ball = np.stack([x[rays], y[rays], z[rays] - depth], axis=-1) / radius
         near[rays] = depth
         flesh[rays] = _lit(own, ball)
+
     seen = np.isfinite(near)
     share = np.where(near < far, 1.0, _HIDDEN)[seen, None]
     colour[seen] += share * (flesh[seen] - colour[seen])

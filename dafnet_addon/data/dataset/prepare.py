@@ -120,6 +120,7 @@ def _why_not(clip: Clip) -> str:
         return ""
     if clip.category not in _WALK | _STAND | _SIT:
         return f"of the activity '{clip.category}', of which no windows are drawn"
+
     text = f"{clip.name} {clip.description}".lower()
     return next((f"whose name or description says '{word}'" for word in _AVOID if word in text), "")
 
@@ -135,6 +136,7 @@ def _unused(clips: Iterable[Clip]) -> list[str]:
             frames[why] += len(clip.joints)
             count[why] += 1
             sources[why].add(clip.source)
+
     return [
         f"Not used: {n / 1800:.1f} minutes {why} ({count[why]} of the clips of "
         f"{', '.join(sorted(sources[why]))})."
@@ -165,6 +167,7 @@ def _with_arms(joints: np.ndarray, standing: np.ndarray, seated: np.ndarray) -> 
     out = joints.copy()
     for k, j in enumerate(_ARMS):
         out[:, j] = out[:, PARENTS[j]] + world[:, k] * np.linalg.norm(OFFSETS[j])
+
     return out
 
 
@@ -178,6 +181,7 @@ def _measured(
     for clip in clips:
         if clip.source not in _SHARE_ALIKE:
             bodies[clip.source, "" if clip.source in _ONE_RIG else clip.subject].append(clip)
+
     found: list[tuple[Clip, Calibration]] = []
     for own in bodies.values():
         used = [clip for clip in own if role_of_clip(clip) in roles and not _why_not(clip)]
@@ -185,6 +189,7 @@ def _measured(
             with leaving_out(left_out):
                 body = calibrate(own)
                 found += [(clip, body) for clip in used]
+
     return found
 
 
@@ -216,6 +221,7 @@ def _motions(
                 ]
                 joints = _with_arms(joints, *poses)
             motions.append(motion_of(clip.name, clip.source, clip.subject, clip.category, joints))
+
     return motions
 
 
@@ -245,6 +251,7 @@ def _captured(motions: list[Motion]) -> dict[str, list[tuple[int, int, float]]]:
             kind = "walk" if m.category in _WALK else "stand"
             weight = 0.1 if m.source == "reactidle" else 1.0
             found[kind] += [(i, f, weight) for f in range(0, len(m.joints), 10)]
+
     return found
 
 
@@ -278,6 +285,7 @@ def sample(
         window = draw(rng, motions[motion], int(frame), bank)
         if window is not None:
             return kind, window
+
     raise InputError(
         f"In {_DRAWS} tries no window could be drawn from the motion, most likely since its clips "
         "are shorter than three "
@@ -337,10 +345,12 @@ def _read(folder: Path, out: Path) -> dict[str, Any]:
                 "clips' licence, their split ('train', or 'test' for held-out subjects) and "
                 "category (as 'locomotion')." + (f" Left out: {left_out[0]}" if left_out else "")
             )
+
         write_motions(out / f"{split}.npz", motions, draws)
         described[name] = sorted({f"{m.source}/{m.subject}" for m in captured})
         for motion in captured if split == "train" else ():
             licences[licence_of[motion.source, motion.name]].add(motion.source)
+
     described["licences"] = {
         licence: sorted(sources) for licence, sources in sorted(licences.items())
     }
@@ -368,13 +378,16 @@ def _asked(described: dict[str, Any], out: Path, windows: int, seed: int) -> Non
             f"A dataset holds 1 to {_SHARD * _SHARDS} windows; ask for so many instead of "
             f"{windows}."
         )
+
     if seed < 0:
         raise InputError(f"The seed is {seed}; give 0 or more.")
+
     if described.get("seed", seed) != seed:
         raise InputError(
             f"The dataset '{out}' was begun with the seed {described['seed']}; give this, or "
             "another folder."
         )
+
     if described.get("windows", 0) > windows:
         raise InputError(
             f"The dataset '{out}' was begun with {described['windows']} windows; ask for as many "
@@ -406,10 +419,12 @@ def prepare(
     out.mkdir(parents=True, exist_ok=True)
     for left in out.glob("*.part.*"):  # by a run that was ended
         left.unlink()
+
     if not described:
         described = _read(folder, out)
         if furniture:
             described["furniture"] = _furniture(furniture, out)
+
     described |= {"windows": windows, "seed": seed, "shares": _SHARES, "composed": _COMPOSITION}
     save_text(record, json.dumps(described, indent=1))
 
@@ -433,7 +448,9 @@ def prepare(
         ) as pool:
             for k, _ in enumerate(pool.imap_unordered(_shard, missing)):
                 progress((done + k + 1) / (1 + len(train)))
+
         done += len(tasks)
+
     rng, known = np.random.default_rng(seed), read_motions(out / "train.npz")
     _written(out / "fits.txt", lambda: fit_report(*known, rng, _FIT_TRIES, trained))
     if not (out / "preview.png").exists():

@@ -43,4 +43,5 @@ def preview(
             shown += 1
             rows.append((f"{kind}: {motions[i].source}, {motions[i].name}", joints, room))
             touching.append(contacts(joints))
+
     sheet(file, rows, contacts=touching)

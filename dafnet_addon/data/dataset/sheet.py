@@ -169,6 +169,7 @@ def _plan(
     if room is not None and len(room):
         square = (corner[0] - cell[2] / 2, corner[1] - cell[2] / 2, cell[2], cell[2])
         _furniture(ax, room, np.eye(3), np.array([*middle, 0.0]), square, scale)
+
     _lines(ax, seen(np.stack([path[:-1], path[1:]], 1)), _TRUNK, 0.8, cell)
     for frame in frames:
         pose = joints[frame]
@@ -191,6 +192,7 @@ def _plan(
                 "shrinkB": 0,
             },
         )
+
     ax.plot(*seen(path[0]), "o", color=_TRUNK, markersize=3)
     bar = np.array([corner[0] - scale / 2, cell[1] + 0.2])
     ax.plot([bar[0], bar[0] + scale], [bar[1], bar[1]], color="black", lw=1.2)
@@ -244,10 +246,12 @@ def sheet(
                 va="bottom",
                 fontsize=6,
             )
+
         _plan(ax, joints, yaw, room, frames, (columns * _WIDTH, bottom, _HEIGHT, _HEIGHT - 0.15))
         ax.text(
             0.05, bottom + _HEIGHT - 0.03, title, ha="left", va="top", fontsize=8, weight="bold"
         )
         ax.plot([0, across], [bottom, bottom], color=_FAINT, lw=0.8)
+
     with whole_file(file) as part:
         figure.savefig(part, format=file.suffix[1:])

@@ -72,12 +72,14 @@ def _animated_by_hand(rng: np.random.Generator, path: RootPath) -> RootPath:
     """
     if rng.random() < 0.5:
         path = smoothed(path, rng.uniform(4, 12), rng.uniform(4, 12))
+
     if rng.random() < 0.5:
         wobble = smoothed(
             RootPath(rng.normal(size=path.position.shape), rng.normal(size=len(path))), 12.0, 12.0
         )
         position = path.position + wobble.position * (1, 1, 0) * rng.uniform(0, 0.09)
         path = RootPath(position, path.yaw + wobble.yaw * rng.uniform(0, 0.25))
+
     return path
 
 
@@ -146,9 +148,11 @@ def draw(
         start = int(rng.integers(0, max(1, total - span)))
     else:
         start = int(np.clip(focus - rng.integers(HISTORY, span - 10), 0, max(0, total - span)))
+
     low, high = max(0, start - _MARGIN), min(total, start + span + _MARGIN)
     if not motion.valid[low:high].all():
         return None
+
     # What is used a few seconds earlier or later is there meanwhile.
     low, high = _farthest(motion.valid, low, -1), _farthest(motion.valid, high - 1, 1) + 1
     joints = motion.joints[low:high]
@@ -159,12 +163,14 @@ def draw(
         joints = at_another_desk(rng, joints)
     if speed != 1.0:
         joints = _retimed(joints, speed)
+
     first = min(round((start - low) / speed), len(joints) - _FRAMES)
     seated = bool(rests)
     if rng.random() < (0.4 if seated else 0.08):
         joints, first = joints[::-1], len(joints) - _FRAMES - first
     if rng.random() < 0.5:
         joints = mirrored(joints)
+
     path = root_from_joints(joints)
     seen = slice(max(0, first - _MARGIN), first + _FRAMES + _MARGIN)
     room, _ = furnished(rng, joints, path, bank, seen)
@@ -172,6 +178,7 @@ def draw(
         return None
     if rng.random() < 0.5:
         path = _animated_by_hand(rng, path)
+
     cut = slice(first, first + _FRAMES)
     poses = to_root(path, joints)[cut].reshape(_FRAMES, -1)
     recent = RootPath(path.position[cut][HISTORY:], path.yaw[cut][HISTORY:])

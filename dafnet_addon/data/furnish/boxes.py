@@ -78,6 +78,7 @@ def occupancy(boxes: np.ndarray, path: RootPath) -> np.ndarray:
         layers = np.flatnonzero(above < RADIUS)
         if not len(near) or not len(layers):
             continue
+
         angle = path.yaw[near] - yaw
         c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
         offset = rotate(yaw_matrix(np.array(-yaw)), path.position[near] - center)
@@ -98,4 +99,5 @@ def occupancy(boxes: np.ndarray, path: RootPath) -> np.ndarray:
         d = np.where((plane_out == 0) & (height <= 0), np.maximum(plane_in, height), d)
         index = (near[frame][:, None], layers[None, :], spot[:, None])
         out[index] = np.maximum(out[index], occupancy_of_distance(d))
+
     return out.reshape(len(path), -1)

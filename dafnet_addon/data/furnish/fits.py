@@ -43,14 +43,17 @@ def fit_report(
             heights = [r.position[2] for r in motions[i].rests if r.start < high and r.end > low]
             if heights and rng.random() < 0.5:
                 joints = at_seat_height(joints, float(heights[0]), rng.uniform(*_PELVIS))
+
             pieces, missing = fitted(rng, joints, root_from_joints(joints), probes(joints), bank)
             tally["no " + missing if missing in _PIECES else missing] += 1
             for piece, found in pieces:
                 tally[piece + " tried"] += 1
                 tally[piece + " fitted"] += found is not None
+
         cells = "".join(f"{tally[p + ' fitted']}/{tally[p + ' tried']}".rjust(12) for p in _PIECES)
         lines.append(
             f"{kind:14}{tally['']:>7}{tally['no seat']:>9}{tally['no bed']:>8}{tally['cut']:>6}"
             + cells
         )
+
     return "\n".join(lines)

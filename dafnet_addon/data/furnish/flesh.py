@@ -130,6 +130,7 @@ def pressed(rest: float, **parts: float) -> np.ndarray:
                 start, ""
             )
         out[i] = parts.get(name, rest)
+
     return out
 
 
@@ -187,6 +188,7 @@ def box_clearance(
     """
     if not len(boxes):
         return FAR
+
     flat = _raised(points, sinks)
     limits = np.broadcast_to(RADIUS - gives, points.shape[:2]).reshape(-1)
     centre = boxes[:, :2].mean(0)
@@ -198,6 +200,7 @@ def box_clearance(
     near = ((flat[:, :2] - centre) ** 2).sum(1) < (span + 0.1) ** 2
     if not near.any():
         return FAR
+
     return min(FAR, float((nearest_box(boxes, flat[near]) - limits[near]).min()))
 
 

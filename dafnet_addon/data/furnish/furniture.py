@@ -181,17 +181,20 @@ def _carrier(
         return [box((sx * (x - t / 2), y, under / 2), (t, t, under)) for sx in (-1, 1) for y in ys]
     if style == "wall":
         return [box((0, front - 0.02, under / 2), (2 * x, 0.04, under))]
+
     if style == "column":
         t, foot = rng.uniform(0.05, 0.12), rng.uniform(0.3, 0.5)
         column = box((0, middle, under / 2), (t, t, under))
         if rng.random() < 0.5:
             return [column, box((0, middle, 0.03), (foot, foot, 0.06))]
+
         star = [np.pi / 2 + 2 * np.pi * k / 5 for k in range(5)]
         arms = [(foot / 4 * np.cos(a), middle + foot / 4 * np.sin(a), 0.06) for a in star]
         return [
             column,
             *(box(arm, (foot / 2, 0.04, 0.08), a) for arm, a in zip(arms, star, strict=True)),
         ]
+
     return [box((sx * (x - 0.02), middle, under / 2), (0.04, depth, under)) for sx in (-1, 1)]
 
 
@@ -210,6 +213,7 @@ def _surface(
             box((0, back + each * (k + 0.3), top - thick / 2), (2 * x, 0.6 * each, thick))
             for k in range(count)
         ]
+
     if style == "open" and thick < 0.09 and min(2 * x, depth) > 0.3:
         rim = rng.uniform(0.09, 0.13)
         sides = [
@@ -220,6 +224,7 @@ def _surface(
             for y in (back + rim / 2, front - rim / 2)
         ]
         return sides + ends
+
     if style == "cushion" and thick > 0.05:
         pad = min(0.6 * thick, rng.uniform(0.03, 0.12))
         inset = rng.uniform(0.0, 0.03)
@@ -227,6 +232,7 @@ def _surface(
             box((0, middle, top - pad / 2), (2 * (x - inset), depth - inset, pad)),
             box((0, middle, top - pad - (thick - pad) / 2), (2 * x, depth, thick - pad)),
         ]
+
     return [box((0, middle, top - thick / 2), (2 * x, depth, thick))]
 
 
@@ -250,12 +256,14 @@ def _back(
             box((s * (x - 0.02), at, top + height / 2), (0.04, thick, height)) for s in (-1, 1)
         ]
         return posts + [box((0, at, z), (2 * x, 0.6 * thick, bar)) for z in heights]
+
     if style == "upright" and thick < 0.09:
         bars = [
             box((s, at, top + height / 2), (0.03, thick, height))
             for s in np.linspace(-x + 0.02, x - 0.02, 5)
         ]
         return [*bars, box((0, at, top + height), (2 * x, thick, 0.05))]
+
     if style == "leaning":
         count, lean = 4, np.tan(np.radians(rng.uniform(6.0, 28.0)))
         part = (height - low) / count
@@ -263,6 +271,7 @@ def _back(
         return [
             box((0, at - lean * rise, top + rise), (2 * x, thick, 1.05 * part)) for rise in rises
         ]
+
     return [box((0, at, top + (low + height) / 2), (2 * x, thick, height - low))]
 
 
@@ -293,6 +302,7 @@ def _arms(
             for y in ys
         ]
         return rests + posts
+
     size = (thick, depth, top + height - foot)
     return [box((s * (x + thick / 2), middle, (top + height + foot) / 2), size) for s in (-1, 1)]
 
@@ -315,15 +325,18 @@ def _seat(
     if top > _HIGH_SEAT and rng.random() < 0.5:
         # for the feet
         rows.append(box((0, front - 0.02, rng.uniform(0.15, top - 0.35)), (2 * x, 0.03, 0.03)))
+
     extra = []
     side = rng.uniform(0.03, 0.06) + 0.6 * max(0.0, thick - 0.08)
     if rng.random() < kind.backed:
         extra += _back(rng, side, top, x, back)
     if rng.random() < kind.armed:
         extra += _arms(rng, kind, side, top, x, back, front)
+
     both = np.array(rows), (np.array(extra) if extra else NO_BOXES.copy())
     for part in both:
         part[:, 0] += shift
+
     return both
 
 
@@ -341,6 +354,7 @@ def seat_for(
     for attempt in range(_TRIES):
         if attempt == _TRIES // 2 and not wanted:
             kind = _SEATS[0]  # a plain stool fits where nothing else does
+
         over = kind.over + error
         top = rest.position[2] - over
         carrying, extra = _seat(rng, top, kind, small=1.0 - 0.7 * attempt / _TRIES)
@@ -352,7 +366,9 @@ def seat_for(
             if attempt < _TRIES // 4:
                 continue
             extra = NO_BOXES
+
         return np.concatenate([carrying, extra])
+
     return None
 
 
@@ -390,9 +406,11 @@ def _bed_for(
                     (t, head - feet, top + h),
                 )
             )
+
         if rng.random() < 0.5:
             t, h = rng.uniform(0.04, 0.1), rng.uniform(0.1, 0.6)
             extra.append(box((shift, head + t / 2, (top + h) / 2), (2 * x, t, top + h)))
+
         carrying = np.array(rows + _carrier(rng, top, thick, x, feet, head, ("block", "legs")))
         carrying[1:, 0] += shift
         beside = np.array(extra) if extra else NO_BOXES
@@ -403,9 +421,11 @@ def _bed_for(
             carries(under, rest) for rest in beside_it
         ):
             continue
+
         return np.concatenate(
             [carrying, beside if box_clearance(beside, points, 0.02) >= 0 else NO_BOXES]
         )
+
     return None
 
 
@@ -434,6 +454,7 @@ def desk_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarr
         desk = placed(desk, origin, use.yaw)
         if box_clearance(desk, points, ON_DESK) >= 0:
             return desk
+
     return None
 
 
@@ -459,6 +480,7 @@ def board_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndar
         )
         if box_clearance(board, points, _ON_BOARD) >= 0:
             return board
+
     return None
 
 
@@ -477,6 +499,7 @@ def _shelf_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.nda
         )
         if style == "counter":
             rows += _carrier(rng, top, thick, x, near, far)
+
         if style == "bookcase":
             height = top + rng.uniform(0.1, 0.8)
             rows.append(box((0, far + 0.01, height / 2), (2 * x, 0.02, height)))
@@ -488,11 +511,13 @@ def _shelf_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.nda
                 box((0, (near + far) / 2, z), (2 * x, far - near, thick))
                 for z in np.arange(top - 0.35, 0.1, -0.35)
             ]
+
         shelf = np.array(rows)
         shelf[:, 0] += rng.uniform(-0.6, 0.6) * x
         shelf = placed(shelf, origin, use.yaw + rng.normal(0.0, 0.1))
         if box_clearance(shelf, points, ON_DESK) >= 0:
             return shelf
+
     return None
 
 
@@ -519,6 +544,7 @@ def _spare_desk(rng: np.random.Generator, rest: Rest, points: np.ndarray) -> np.
         candidate = placed(desk, rest.position[:2] + distance * forward, rest.yaw)
         if box_clearance(candidate, points) >= gap:
             return candidate
+
     return None
 
 
@@ -544,6 +570,7 @@ def _desk_alone(rng: np.random.Generator) -> np.ndarray:
         desk = np.concatenate(
             [desk, placed(seat, np.array([0.0, -y - rng.uniform(0.1, 0.5)]), rng.normal(0, 0.3))]
         )
+
     return desk
 
 
@@ -553,16 +580,19 @@ def _piece(rng: np.random.Generator) -> np.ndarray:
     if kind == "block":
         size = rng.uniform((0.2, 0.2, 0.2), (1.2, 0.8, 1.9))
         return box((0, 0, size[2] / 2 + rng.choice([0.0, rng.uniform(0, 0.8)])), tuple(size))[None]
+
     if kind == "wall":
         length, height = rng.uniform(1.0, 4.0), rng.uniform(1.0, 2.6)
         return box(
             (0, 0, height / 2 + rng.choice([0.0, 0.8])), (length, rng.uniform(0.03, 0.2), height)
         )[None]
+
     if kind == "desk":
         return _desk_alone(rng)
     if kind == "bed":
         size = rng.uniform((0.8, 1.9, 0.3), (1.8, 2.1, 0.6))
         return box((0, 0, size[2] / 2), tuple(size))[None]
+
     seat = _SEATS[rng.choice(len(_SEATS), p=_SEAT_SHARES)]
     return np.concatenate(_seat(rng, rng.uniform(0.3, 0.75), seat, 1.0))
 
@@ -593,6 +623,7 @@ def scattered(
                     clearance = box_clearance(candidate, points)
             kept.append(candidate)
             break
+
     return np.concatenate(kept)
 
 
@@ -613,6 +644,7 @@ def _cut_off(joints: np.ndarray, beds: list[Use], rests: list[Rest]) -> bool:
             np.linalg.norm((joints[end, PELVIS] - place)[:2]) > _NEAR_BY for place in places
         ):
             return True
+
     return False
 
 
@@ -636,6 +668,7 @@ def fitted(
     beds, rests = lying(joints), resting(joints, path)
     if _cut_off(joints, beds, rests):
         return [], "cut"
+
     pieces = [("bed", _bed(rng, bank, use, points, rests)) for use in beds]
     places: list[Rest] = []
     for rest in rests:
@@ -643,6 +676,7 @@ def fitted(
         on_bed = any(found is not None and carries(found, rest) for _, found in pieces)
         if apart and rest.position[2] > _ON_THE_FLOOR and not on_bed:
             places.append(rest)
+
     pieces += [("seat", _seat_under(rng, bank, place, points)) for place in places]
     missing = next((kind for kind, found in pieces if found is None), "")
     if not missing:
@@ -660,10 +694,12 @@ def fitted(
                 pieces.append((kind, _worked_at(rng, bank, use, room)))
                 if pieces[-1][1] is not None:
                     break
+
         place = places[0] if places else _standing_place(path)
         bare = all(kind not in ("desk", "bed") or found is None for kind, found in pieces)
         if place is not None and bare and rng.random() < _LIKELY["spare desk"]:
             pieces.append(("spare desk", _furnishing(_spare_desk(rng, place, points))))
+
     return pieces, missing
 
 
@@ -717,6 +753,7 @@ def furnished(
     pieces, missing = fitted(rng, joints, path, points, bank, seen)
     if missing:
         return None, missing
+
     count = int(rng.integers(1, 5)) if rng.random() < 0.8 else 0
     real = rng.binomial(count, _REAL_STRAY) if len(bank) else 0
     room = Furnishing(scattered(rng, points, path, count - real), bank=bank)
@@ -725,6 +762,7 @@ def furnished(
     for _, found in pieces:
         if found is not None:
             room = found + room
+
     return room, ""
 
 

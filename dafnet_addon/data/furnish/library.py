@@ -90,6 +90,7 @@ def read_library(folder: Path) -> tuple[list[Piece], list[str]]:
             pieces.append(found)
         else:
             left_out.append(found)
+
     if not pieces:
         why = f" ({left_out[0]})" if left_out else ""
         raise InputError(
@@ -97,6 +98,7 @@ def read_library(folder: Path) -> tuple[list[Piece], list[str]]:
             "libraries, an index.json, or "
             "meshes and a pieces.json that states their licence."
         )
+
     return pieces, left_out
 
 
@@ -110,6 +112,7 @@ def _found(folder: Path) -> Iterator[Piece | str]:
     for file in files:
         if file.suffix.lower() == ".sh3f":
             yield from _sweet_home(file)
+
     stated = _stated(folder)
     for file in files:
         if file.suffix.lower() in _LOOSE:
@@ -129,6 +132,7 @@ def _checked(piece: Piece) -> Piece | str:
         return f"{name} is of no known kind ({', '.join(KINDS)})"
     if not piece.licence:
         return f"{name} states no licence"
+
     vertices, triangles = piece.vertices, piece.triangles
     if (
         vertices.ndim != 2
@@ -138,11 +142,14 @@ def _checked(piece: Piece) -> Piece | str:
         or not len(triangles)
     ):
         return f"{name} has no triangles"
+
     if not np.isfinite(vertices).all() or triangles.min() < 0 or triangles.max() >= len(vertices):
         return f"{name} has a coordinate that is not a number, or a triangle of a missing vertex"
+
     size = np.ptp(vertices, axis=0)
     if not 0.1 < size.max() < 10.0:
         return f"{name} is {size.max():.2g} m large; is its unit right?"
+
     return piece
 
 
@@ -155,6 +162,7 @@ def _compact(index: Path) -> Iterator[Piece | str]:
             f"The index '{index}' does not list pieces ({error!r}); each needs "
             f"{', '.join(_COMPACT_TEXTS)}."
         ) from None
+
     for row in known:
         file = index.with_name(f"{PurePosixPath(row['name']).name}.npz")
         try:
@@ -188,11 +196,13 @@ def _catalogue(text: str) -> tuple[dict[str, str], dict[int, dict[str, str]]]:
         key, found, value = line.partition("=")
         if not found or key.lstrip().startswith(("#", "!")):
             continue
+
         name, numbered, number = key.strip().partition("#")
         if numbered and number.isdigit():
             pieces.setdefault(int(number), {})[name] = value.strip()
         elif not numbered:
             own[name] = value.strip()
+
     return own, pieces
 
 
@@ -231,9 +241,11 @@ def _of_catalogue(
             return f"'{title}' of '{file.name}' is not an OBJ model"
         if archive.getinfo(model).file_size > _LARGEST:
             return f"'{title}' of '{file.name}' is larger than {_LARGEST >> 20} MB"
+
         vertices, triangles = _mesh_of(io.BytesIO(archive.read(model)), ".obj")
     except (KeyError, ValueError, IndexError) as error:
         return f"'{title}' of '{file.name}' cannot be read ({error})"
+
     vertices = vertices @ turn.T @ _SH3F_TO_OURS.T
     low, extent = vertices.min(0), np.maximum(np.ptp(vertices, axis=0), 1e-9)
     vertices = (vertices - low) / extent * size - (0.5 * size[0], 0.5 * size[1], 0.0)
@@ -259,6 +271,7 @@ def _stated(folder: Path) -> list[tuple[str, dict[str, Any]]]:
     file = folder / "pieces.json"
     if not file.exists():
         return []
+
     try:
         rows = [
             (str(pattern), dict(fields))
@@ -268,12 +281,14 @@ def _stated(folder: Path) -> list[tuple[str, dict[str, Any]]]:
         raise InputError(
             f"The file '{file}' does not list pieces by file name ({error})."
         ) from None
+
     for pattern, fields in rows:
         if wrong := sorted(set(fields) - _STATED):
             raise InputError(
                 f"The file '{file}' states for '{pattern}' what cannot be used "
                 f"({', '.join(wrong)})."
             )
+
     return rows
 
 
@@ -284,14 +299,18 @@ def _loose(folder: Path, file: Path, stated: list[tuple[str, dict[str, Any]]]) -
     for pattern, given in stated:
         if path.as_posix() == pattern or fnmatch(path.as_posix(), pattern):
             fields |= given
+
     if not fields.get("licence"):
         return f"'{path}' states no licence"
+
     try:
         vertices, triangles = _mesh_of(io.BytesIO(file.read_bytes()), file.suffix.lower())
     except (ValueError, KeyError, IndexError) as error:
         return f"'{path}' cannot be read ({error})"
+
     if fields.get("up", "y") != "z":
         vertices = vertices @ _SH3F_TO_OURS.T
+
     unit = 1.0 if file.suffix.lower() in _TRUE_TO_SIZE else float(fields.get("unit", 1.0))
     vertices = vertices * unit
     vertices[:, 2] -= vertices[:, 2].min()

@@ -111,6 +111,7 @@ def seat_shape_for(
             found = Furnishing(shapes=row, bank=bank).moved(rest.position[:2], yaw)
             if clearance(found, points, GIVES, sunk(seat.pelvis - seat.height)) >= 0.0:
                 return found
+
     return None
 
 
@@ -146,6 +147,7 @@ def bed_shape_for(
             spot[0] += rng.uniform(-room, room)
         else:
             spot[1] = seat.position[1] - rng.uniform(0.0, 0.12)
+
         head = 0.0 if long_axis == 1 else -side * np.pi / 2
         row = np.array([[number, *(-spot), 0.0, top / seat.height]])
         found = Furnishing(shapes=row, bank=bank).moved(
@@ -159,6 +161,7 @@ def bed_shape_for(
             and all(carries(found, rest) for rest in rests)
         ):
             return found
+
     return None
 
 
@@ -176,6 +179,7 @@ def desk_shape_for(
         for edge in shape.seats if shape.kind in _WORKED_AT else ():
             if abs(top / edge.height - 1.0) <= STRETCH:
                 pieces.setdefault(shape.name, []).append((i, edge))
+
     for _ in range(_PIECES if pieces else 0):
         edges = pieces[sorted(pieces)[rng.integers(len(pieces))]]
         for place in range(_PLACES):
@@ -192,6 +196,7 @@ def desk_shape_for(
             on_it = (bank.distances(found.shapes, under) < 0.02).mean()
             if on_it > _ON_TOP and clearance(found, points, ON_DESK) >= 0.0:
                 return found
+
     return None
 
 
@@ -221,4 +226,5 @@ def stray_shape(
         found = Furnishing(shapes=row, bank=bank)
         if clearance(found, points, -rng.uniform(-0.02, 0.03)) >= 0.0:
             return found
+
     return Furnishing(bank=bank)

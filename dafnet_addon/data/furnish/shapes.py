@@ -159,6 +159,7 @@ class ShapeBank:
             ).all(-1)
             if near.any():
                 out[near] = np.minimum(out[near], _sampled(shape, local[near]))
+
         return out
 
     def occupancy(self, placed: np.ndarray, path: RootPath) -> np.ndarray:
@@ -184,6 +185,7 @@ class ShapeBank:
                 ] * (1, 1, 0)
                 found = occupancy_of_distance(self.distances(row[None], spheres.reshape(-1, 3)))
                 out[some] = np.maximum(out[some], found.reshape(len(some), -1))
+
         return out
 
     def meshes(self, placed: np.ndarray, name: str = "") -> list[Mesh]:
@@ -198,6 +200,7 @@ class ShapeBank:
             grid = shape.grid if stretch == 1.0 else _stretched(shape, float(stretch))
             corners = grid.origin + grid.spacing * (np.array(grid.values.shape) - 1) * _CORNERS
             solids.append(Mesh(corners, _SIDES, matrix, name or shape.name, grid))
+
         return solids
 
     def write(self, file: Path) -> None:
@@ -225,11 +228,13 @@ class ShapeBank:
             texts, places, seats, sizes, values = (
                 z[name] for name in ("texts", "places", "seats", "sizes", "values")
             )
+
         if seats.shape[1] != _SEAT_NUMBERS:
             raise InputError(
                 f"The furniture in '{file}' was made by an earlier version; make the dataset anew "
                 "with 'dafnet prepare'."
             )
+
         shapes, at = [], 0
         for number, (text, place, size) in enumerate(zip(texts, places, sizes, strict=True)):
             count = int(np.prod(size))
@@ -249,6 +254,7 @@ class ShapeBank:
                 )
             )
             at += count
+
         return ShapeBank(tuple(shapes))
 
 
@@ -295,12 +301,14 @@ def _seats(piece: Piece, grid: DistanceGrid) -> list[Seat]:
     across = np.ptp(piece.vertices[:, :2], axis=0).min()
     if piece.kind not in PELVIS_OVER or across < _NARROWEST:
         return found
+
     mesh = Mesh(piece.vertices, piece.triangles, name=piece.title)
     for side in _SIDES_TO_COME_FROM:
         try:
             place = seat_of([mesh], side, 0.0, piece.title)
         except InputError:
             return []
+
         # A piece's front faces −y: a back that is elsewhere is none.
         misjudged = place.back and np.cos(place.yaw - np.pi) < _ASTRAY
         known = any(np.cos(place.yaw - seat.yaw) > _SAME_WAY for seat in found)
@@ -316,6 +324,7 @@ def _seats(piece: Piece, grid: DistanceGrid) -> list[Seat]:
                     edge=place.edge,
                 )
             )
+
     return found
 
 
@@ -346,6 +355,7 @@ def surface_under(
     near = gap < _UNDER_IT
     if near.any(-1).mean() < _CARRIED:
         return None
+
     # The first height from above that touches, less how far it still is.
     first = near.argmax(-1)
     touched = heights[first] - gap[np.arange(len(spots)), first]
@@ -379,6 +389,7 @@ def shapes_of(piece: Piece, factors: Sequence[float] = FACTORS) -> list[Shape]:
                 ),
             )
         )
+
     return found
 
 

@@ -124,11 +124,13 @@ def test_motions(folder: Path) -> dict[str, Motion]:
     for clip in read_clips(folder):
         if clip.source in _TEST_ONLY:
             bodies[clip.subject].append(clip)
+
     for clips in bodies.values():
         body, wanted = calibrate(clips), [c for c in clips if c.category in _ACTIVITY]
         found += [
             motion_of(c.name, c.source, c.subject, c.category, canonical(c, body)) for c in wanted
         ]
+
     return {f"{m.source}/{m.name}": m for m in found}
 
 
@@ -152,6 +154,7 @@ def _clip(frozen: dict[str, Any], motion: Motion) -> HeldClip:
             "use the motion files and the readers that 'captured.json' was made with, or freeze "
             "the test anew."
         )
+
     path = raw_root_from_joints(joints)
     rests = tuple(rest_of(joints, path, a, b) for a, b in frozen["rests"])
     return HeldClip(
@@ -183,7 +186,9 @@ def held_out(folder: Path) -> list[HeldClip]:
                     f"The held-out clip '{name}' is not in '{folder}'; give the folder with all "
                     "files."
                 )
+
         clips.append(
             _clip(frozen, _composed(recipe, motions) if recipe else motions[frozen["name"]])
         )
+
     return clips

@@ -204,8 +204,10 @@ def _picked(recipe: Recipe, part: str, motions: dict[str, Motion]) -> np.ndarray
         )
     else:
         found = _pieces(motion, part == "sit")[words["piece"] :]
+
     if not found:
         raise InputError(_changed(recipe["name"]))
+
     return mirrored(found[0]) if words.get("mirrored") else found[0]
 
 
@@ -234,12 +236,14 @@ def _replayed(recipe: Recipe, motions: dict[str, Motion]) -> np.ndarray:
     if "stand" in recipe:
         joints = at_board(rng, joints, _COMES + 8, len(joints) - 4)[: _COMES + _WRITES]
         return mirrored(joints) if recipe["mirrored"] else joints
+
     top = recipe.get("top")
     body, rest = seated_work(
         rng, joints, _picked(recipe, "upper", motions), _AT_DESKS if top else LEANS
     )
     if top:
         body = at_top(rng, body, rest + 5, len(body) + 60, top, recipe["farther"])
+
     return body[: len(joints) + (_WORKS if top else _USES)]
 
 
@@ -288,10 +292,13 @@ def paper_test(folder: Path) -> list[HeldClip]:
                     f"'{folder}'; "
                     "give the folder with all files."
                 )
+
         joints = _replayed(recipe, motions)
         if not is_frozen(joints, recipe):
             raise InputError(_changed(recipe["name"]))
+
         clips.append(_held(recipe, motions, joints))
+
     return clips
 
 
@@ -394,6 +401,7 @@ def _desk_of(
     ]
     if not hands or ((mostly >= _OVER) & (mostly < _HOVERS)).any():
         return None
+
     use = Use("desk", works, len(joints), np.concatenate(hands), rest.yaw)
     for _ in range(_TRIES):
         desk = desk_for(rng, use, points)
@@ -405,6 +413,7 @@ def _desk_of(
             continue
         if distances(desk, _filled(chair)).min() > 0.0:
             return desk
+
     return None
 
 
@@ -422,6 +431,7 @@ def _board_of(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndar
             continue
         if np.median(distances(board, use.points)) < _AT_BOARD:
             return board
+
     return None
 
 
@@ -468,6 +478,7 @@ def _furnished(
         ]
         if not after:
             return None
+
         rest = rest_of(joints, path, after[0], len(joints))
         works, rests = (
             len(joints) - (_WORKS if about.top else _USES) + _SEATED_HANDS,
@@ -477,8 +488,10 @@ def _furnished(
         if boxes is not None and about.top:
             desk = _desk_of(rng, recipe["top"], joints, works, rest, points, boxes)
             boxes = None if desk is None else np.concatenate([boxes, desk])
+
     if boxes is None or not _sound(joints, boxes):
         return None
+
     return recipe | {
         "frames": len(joints),
         "works": works,
@@ -536,6 +549,7 @@ def freeze_paper_test(folder: Path, seed: int = SEED) -> dict[str, Any]:
                 f"The motion in '{folder}' gives only {count} clips of a {kind}; give the folder "
                 "with all files."
             )
+
     return {"version": 1, "seed": seed, "clips": clips}
 
 
@@ -556,6 +570,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
+
     FROZEN.write_text(frozen_text(frozen), encoding="utf-8")
     return 0
 

@@ -88,7 +88,9 @@ def freeze_real(folder: Path, library: Path) -> dict[str, Any]:
                 bodies.setdefault(f"{motion.source}/{motion.subject}", []).append(motion)
         for body, theirs in sorted(bodies.items()):
             clips += _frozen_sitting(rng, role, body, theirs, bank)
+
         clips += _frozen_lying(rng, role, folder, bank)
+
     return {"version": 4, "clips": clips}
 
 
@@ -103,6 +105,7 @@ def _frozen_sitting(
     for e in rng.permutation(len(episodes)):
         if len(found) == _EPISODES:
             break
+
         motion, first, end, rest = episodes[e]
         # The kinds that this body has had least come first.
         had = {kind: sum(clip["kind"] == kind for clip in found) for kind in kinds}
@@ -112,6 +115,7 @@ def _frozen_sitting(
             if clip:
                 found.append(clip | {"role": role, "body": body})
                 break
+
     return found
 
 
@@ -130,6 +134,7 @@ def _on_piece(
     was = float(np.median(motion.joints[rest.start : rest.end, PELVIS, 2]))
     if abs(seat.pelvis - was) > _MOVED:
         return None
+
     joints = at_seat_height(motion.joints[first:end], was, seat.pelvis)
     path = raw_root_from_joints(joints)
     start, stop = rest.start - first, min(rest.end, end) - first
@@ -139,6 +144,7 @@ def _on_piece(
     under = seat_shape_for(rng, ShapeBank((shape,)), moved, points)
     if under is None:
         return None
+
     return {
         "name": f"{motion.source}/{motion.name}",
         "start": first,
@@ -167,6 +173,7 @@ def _beside(
     for _ in range(int(rng.integers(0, _STRAYS + 1))):
         for row in stray_shape(rng, bank, points, path).shapes:
             rows.append([bank.shapes[int(row[0])].name, *row[1:]])
+
     return {
         "piece": bank.shapes[number].name,
         "kind": bank.shapes[number].kind,
@@ -216,6 +223,7 @@ def _frozen_lying(
                     }
                 )
                 break
+
     return found
 
 
@@ -243,6 +251,7 @@ def real_test(folder: Path, library: Path, role: str) -> list[HeldClip]:
             f"The furniture library '{library}' lacks '{missing[0]}'; give the one that the test "
             "was made with."
         )
+
     bank = bank_of([pieces[name] for name in sorted(wanted)], factors=(1.0,))
     numbers = {shape.name: i for i, shape in enumerate(bank.shapes)}
     return [_clip(clip, motions, beds, bank, numbers) for clip in frozen]
@@ -265,11 +274,13 @@ def _clip(
         raise InputError(
             f"The test's motion '{name}' is not in the folder; give the folder with all files."
         )
+
     if not is_frozen(joints, frozen):
         raise InputError(
             f"The motion '{name}' is not the one that the test was made with; use its files, or "
             "freeze it anew."
         )
+
     path = raw_root_from_joints(joints)
     rows = np.array([[numbers[row[0]], *row[1:]] for row in frozen["rows"]], float)
     return HeldClip(
@@ -303,6 +314,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
+
     FROZEN_REAL.write_text(frozen_text(frozen), encoding="utf-8")
     return 0
 

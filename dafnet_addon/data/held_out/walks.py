@@ -68,6 +68,7 @@ def freeze_walks(library: Path) -> dict[str, Any]:
         seats = bank_of([piece], (1.0,)).shapes[0].seats if role != "train" else ()
         if not any(LOWEST <= seat.pelvis <= HIGHEST for seat in seats):
             continue
+
         turn = rng.uniform(0.0, 2.0 * np.pi)
         for k in range(_STARTS):
             angle, away = turn + 2.0 * np.pi * k / _STARTS, rng.uniform(*_FROM)
@@ -83,6 +84,7 @@ def freeze_walks(library: Path) -> dict[str, Any]:
                     "yaw": yaw,
                 }
             )
+
     return {"version": 4, "clips": walks}
 
 
@@ -99,6 +101,7 @@ def real_walks(library: Path, role: str) -> Walks:
             f"The furniture library '{library}' lacks '{missing[0]}'; give the one that the test "
             "was made with."
         )
+
     bank = bank_of([pieces[name] for name in sorted({walk["piece"] for walk in asked})], (1.0,))
     numbers = {shape.name: i for i, shape in enumerate(bank.shapes)}
     clips, refused = [], Counter[str]()
@@ -108,6 +111,7 @@ def real_walks(library: Path, role: str) -> Walks:
             refused[walk["kind"]] += 1
         else:
             clips.append(clip)
+
     return Walks(tuple(clips), dict(Counter(walk["kind"] for walk in asked)), dict(refused))
 
 
@@ -124,9 +128,11 @@ def _sent(
         made = walk_to(solids, start, end)
     except InputError:
         return None
+
     height = surface_under(bank.shapes[number].grid, spot.position, spot.yaw, spot.height)
     if height is None:
         return None
+
     rest = made.rests[-1]
     first, last = rest.start + _SETTLES, rest.stop
     pelvis = height + PELVIS_OVER[piece.kind]
@@ -165,6 +171,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
+
     save_text(FROZEN_WALKS, frozen_text(frozen))
     return 0
 

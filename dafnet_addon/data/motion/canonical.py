@@ -89,6 +89,7 @@ def calibrate(clips: list[Clip]) -> Calibration:
         upright = (j[:, 0, 2] - _toe_floor(j) > 0.9 * min(tallest, 1.1)) & (trunk[:, 2] > 0.92)
         if upright.sum() < 5:
             continue
+
         yaw = root_from_joints(j).rotation
         raw_pelvis, raw_chest = _raw_frames(j)
         step = max(1, int(upright.sum()) // 400)
@@ -114,12 +115,14 @@ def calibrate(clips: list[Clip]) -> Calibration:
             d = (toe - ankle)[planted]
             pitch.append(np.arctan2(d[:, 2], np.linalg.norm(d[:, :2], axis=-1)))
             ankles.append((ankle[:, 2] - _toe_floor(j))[planted])
+
     if not legs:
         raise InputError(
             f"The body '{clips[0].source}/{clips[0].subject}' never stands upright in its motion "
             "files; "
             "add a clip in which it stands or walks, so that its skeleton can be fitted."
         )
+
     scale = LEG / float(np.median(np.concatenate(legs)))
     chest_mean = _mean_rotation(np.concatenate(chest))
     pitches = np.concatenate(pitch)
@@ -216,6 +219,7 @@ def canonical(clip: Clip, c: Calibration) -> np.ndarray:
         # to ours.
         bend = j[:, knee] - (j[:, hip] + j[:, ankle]) / 2
         out[:, knee] = (out[:, hip] + out[:, ankle]) / 2 + bend + pelvis[..., :, 1] * 0.02
+
     return pose_legs(out)
 
 

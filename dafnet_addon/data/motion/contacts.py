@@ -47,6 +47,7 @@ def contacts(joints: np.ndarray) -> np.ndarray:
     out = np.zeros((len(joints), len(CONTACTS)), dtype=bool)
     if len(joints) < 2:
         return out
+
     height = _median(joints[..., 2])
     speed = _median(np.linalg.norm(np.gradient(joints, axis=0), axis=-1) * MODEL_FPS)
     for column, side in enumerate(("left_", "right_")):
@@ -60,6 +61,7 @@ def contacts(joints: np.ndarray) -> np.ndarray:
         hangs = drop > 0.85 * np.linalg.norm(joints[:, elbow] - joints[:, wrist], axis=-1)
         there = (height[:, wrist] > _AT_WORK[0]) & (height[:, wrist] < _AT_WORK[1])
         out[:, 2 + column] = _lasting((speed[:, wrist] < _HAND_SLOW) & there & ~hangs, _HAND_FRAMES)
+
     pelvis, ankles = joint("pelvis"), ANKLES
     to_feet = joints[:, ankles].mean(1) - joints[:, pelvis]
     carried = (np.linalg.norm(to_feet[:, :2], axis=-1) > 0.15) | (to_feet[:, 2] > -0.2)

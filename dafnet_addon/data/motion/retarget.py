@@ -254,6 +254,7 @@ def at_top_height(joints: np.ndarray, use: Use, rise: float) -> np.ndarray:
         target = wrist + part * rise * share * _UP
         if (_length(target - shoulders) <= own + 1e-9).all():
             break
+
     right = normalised(
         (joints[:, _HIPS[1]] - joints[:, _HIPS[0]]) * (1, 1, 0), fallback=np.array([1.0, 0.0, 0.0])
     )

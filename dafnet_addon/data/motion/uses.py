@@ -107,6 +107,7 @@ def lying(joints: np.ndarray) -> list[Use]:
         )
         if not known:
             found.append(Use("bed", a, b, line, _away(normalised(trunk[a:b, :2]))))
+
     return found
 
 
@@ -117,6 +118,7 @@ def working(joints: np.ndarray, path: RootPath) -> list[Use]:
     frames = len(joints)
     if frames < _SECOND:
         return []
+
     local = to_root(path, joints[:, WRISTS])
     forearm = normalised(joints[:, WRISTS] - joints[:, ELBOWS])[..., 2]
     height = joints[:, WRISTS, 2]
@@ -140,6 +142,7 @@ def working(joints: np.ndarray, path: RootPath) -> list[Use]:
                     break
             else:
                 tops.append([part])
+
     found = []
     for top in tops:
         wrists = np.concatenate([w for _, _, w in top])
@@ -155,6 +158,7 @@ def working(joints: np.ndarray, path: RootPath) -> list[Use]:
                 _away(heading + 0.1 * away),
             )
         )
+
     return found
 
 
@@ -165,6 +169,7 @@ def stroking(joints: np.ndarray, path: RootPath) -> list[Use]:
     frames = len(joints)
     if frames < _SECOND:
         return []
+
     local = to_root(path, joints[:, WRISTS])
     stays = _speed(path.position[:, :2]) < 0.45
     moves = _speed(joints[:, WRISTS]) > 0.05
@@ -191,6 +196,7 @@ def stroking(joints: np.ndarray, path: RootPath) -> list[Use]:
                 and reach > 0.22
             ):
                 found.append(Use("board", a, b, points, _away(normal[None])))
+
     return found
 
 
@@ -210,6 +216,7 @@ def reaching(joints: np.ndarray, path: RootPath) -> list[Use]:
     """
     if len(joints) < _SHORT:
         return []
+
     wrists, shoulders = joints[:, WRISTS], joints[:, SHOULDERS]
     arm = wrists - shoulders
     stretched = np.linalg.norm(arm, axis=-1) > 0.42
@@ -236,4 +243,5 @@ def reaching(joints: np.ndarray, path: RootPath) -> list[Use]:
             found.append(
                 Use("shelf", a, b, points, _away(heading + 0.5 * normalised(arm[a:b, hand, :2])))
             )
+
     return found

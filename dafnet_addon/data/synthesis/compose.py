@@ -135,6 +135,7 @@ def at_top(
                 origin + rotate(turn, local),
                 presence(len(joints), first, end - int(rng.integers(0, 12))),
             )
+
     return out
 
 
@@ -252,6 +253,7 @@ def _lying_down(motions: list[Motion]) -> list[np.ndarray]:
                 before = sits[(sits < start) & (sits > start - 60)]
                 if len(before):
                     found.append(joints[before[-1] : start + 75])
+
     return found
 
 
@@ -268,6 +270,7 @@ def _lifted(joints: np.ndarray, height: float) -> np.ndarray:
         out[:, elbow], out[:, hand] = two_bone(
             out[:, shoulder], wrist, out[:, elbow], LENGTHS[elbow], LENGTHS[hand]
         )
+
     return out
 
 
@@ -281,6 +284,7 @@ def _onto_the_bed(seated: np.ndarray, lying: np.ndarray, turn: float, inward: fl
     for pose in (seated, lying):
         path = root_from_joints(np.repeat(pose[None], 2, axis=0))
         poses.append(to_root(path, np.repeat(pose[None], 2, axis=0))[0])
+
     a, b = poses
     local = a + (b - a) * place
     feet = [j for pair in FEET for j in pair]
@@ -305,6 +309,7 @@ def _lying(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed]:
         top = sit.joints[-1, PELVIS, 2] - SEAT_TO_PELVIS
         if top > _HIGHEST_BED:
             continue
+
         piece = pieces[rng.integers(len(pieces))]
         lies = _lifted(piece if rng.random() < 0.5 else mirrored(piece), top)
         turn, inward = rng.choice([-1.0, 1.0]) * rng.uniform(1.3, 1.7), rng.uniform(0.1, 0.25)

@@ -54,6 +54,7 @@ def _handwriting(rng: np.random.Generator, frames: int, side: float) -> np.ndarr
             np.array([left, y - 0.01 * (line + 1), 0.05]),
         ]
         times += [int(rng.integers(80, 150)), int(rng.integers(18, 30))]
+
     letters = wandering(rng, frames, 2, 2.5) * (0.004, 0.005)
     return course_through(np.array(stops), times)[:frames] + np.pad(letters, ((0, 0), (0, 1)))
 
@@ -65,6 +66,7 @@ def _handling(rng: np.random.Generator, frames: int, side: float) -> np.ndarray:
     while sum(times) < frames:
         stops += [(side * rng.uniform(0.02, 0.34), rng.uniform(0.24, 0.40), 0.05)] * 2
         times += [int(rng.integers(8, 75)), int(rng.integers(16, 36))]
+
     course = course_through(np.array(stops), times[:-1])
     speed = np.linalg.norm(np.gradient(course[:, :2], axis=0), axis=-1)
     course[:, 2] += rng.uniform(0.02, 0.08) * speed / speed.max()
@@ -111,6 +113,7 @@ def lettering(rng: np.random.Generator, frames: int) -> np.ndarray:
             np.array([left, y, top - down * ((len(stops) // 2 + 1) % 5)]),
         ]
         times += [int(rng.integers(50, 110)), int(rng.integers(20, 32))]
+
     course = course_through(np.array(stops), times)[:frames]
     off = np.maximum(0.0, np.gradient(-course[:, 0]))  # on its way back the hand is off the board
     letters = wandering(rng, frames, 2, 4) * (0.010, 0.018)

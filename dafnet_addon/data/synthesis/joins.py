@@ -73,6 +73,7 @@ def on_the_body(joints: np.ndarray) -> np.ndarray:
         )
     for ankle, foot in FEET:
         out[:, ankle] = out[:, foot] - normalised(joints[:, foot] - joints[:, ankle]) * FOOT
+
     return pose_legs(out)
 
 
@@ -124,6 +125,7 @@ def joined(first: np.ndarray, then: np.ndarray) -> np.ndarray:
         for j in (ankle, foot):
             out[:, j, :2] = after[:, j, :2] + offset[j, :2] * left
             out[:, j, 2] = after[:, j, 2] + offset[j, 2] * fade[:, 0, 0]
+
     return np.concatenate([first[:-1], on_the_body(out)])
 
 
@@ -169,11 +171,13 @@ def lent(joints: np.ndarray, upper: np.ndarray, share: np.ndarray) -> np.ndarray
     chest = frame_from(m[..., :, 0], m[..., :, 2], "xz") @ _REST_CHEST
     for name in ("neck", "left_collar", "right_collar"):
         out[:, joint(name)] = out[:, joint("spine3")] + rotate(chest, OFFSETS[joint(name)])
+
     for j in (joint("head"), *_ARMS):
         ours, theirs = (normalised(x[:, j] - x[:, PARENTS[j]]) for x in (joints, other))
         out[:, j] = (
             out[:, PARENTS[j]] + normalised(ours + (theirs - ours) * share[:, None]) * LENGTHS[j]
         )
+
     return on_the_body(out)
 
 

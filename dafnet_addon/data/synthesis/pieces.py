@@ -172,6 +172,7 @@ def upper_bodies(motions: list[Motion], categories: set[str]) -> list[np.ndarray
                     and fluent(piece).all()
                 ):
                     found.append(piece)
+
     return found
 
 
@@ -238,6 +239,7 @@ def pool_of(
                 features.append(features_of(joints)[frames].astype(np.float32))
                 clips.append(joints)
                 names.append((f"{m.source}/{m.name}", mirror))
+
     if not clips:
         return Pool(
             arriving,
@@ -247,6 +249,7 @@ def pool_of(
             np.zeros((0, 48), np.float32),
             np.zeros((0, len(offsets), 2)),
         )
+
     return Pool(
         arriving,
         clips,
