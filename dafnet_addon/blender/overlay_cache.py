@@ -78,4 +78,4 @@ def _may_be_furniture(update: bpy.types.DepsgraphUpdate) -> bool:
 
 
 cache = OverlayCache()
-"""The one of this session."""
+"""The only one."""

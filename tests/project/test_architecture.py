@@ -179,8 +179,7 @@ def test_what_users_keep_is_written_whole(file: Path) -> None:
         for c in calls
         if getattr(c.func, "attr", "") in written
     }
-    the_projects_own = file.parent.name == "held_out"
-    assert to <= {"part", "str(part)"} or file.name == "weights.py" or the_projects_own
+    assert to <= {"part", "str(part)"} or file.name == "weights.py"
 
 
 def test_importing_the_package_loads_its_core_and_numpy_alone() -> None:

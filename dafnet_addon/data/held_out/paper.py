@@ -60,7 +60,8 @@ from ..synthesis.pieces import (
     sit_downs,
     upper_bodies,
 )
-from .captured import HeldClip, fingerprint, frozen_text, is_frozen
+from .captured import HeldClip, fingerprint, is_frozen
+from .freezing import freeze
 
 __all__ = ["FROZEN", "freeze_paper_test", "paper_test", "side_of"]
 
@@ -557,22 +558,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Make ``paper.json`` anew; 0 if all went well, else 1 and a sentence on standard
     error.
     """
-    parser = argparse.ArgumentParser(
-        prog="python -m dafnet_addon.data.held_out.paper", description="Makes the test set anew."
-    )
+    parser = argparse.ArgumentParser("python -m dafnet_addon.data.held_out.paper")
     parser.add_argument("folder", type=Path, help="the motion files")
     parser.add_argument(
         "--seed", type=int, default=SEED, help="the test that ships has %(default)s"
     )
-    options = parser.parse_args(arguments)
-    try:
-        frozen = freeze_paper_test(options.folder, options.seed)
-    except InputError as error:
-        print(error, file=sys.stderr)
-        return 1
-
-    FROZEN.write_text(frozen_text(frozen), encoding="utf-8")
-    return 0
+    return freeze(
+        parser, arguments, lambda options: freeze_paper_test(options.folder, options.seed), FROZEN
+    )
 
 
 if __name__ == "__main__":

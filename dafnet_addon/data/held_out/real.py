@@ -32,7 +32,8 @@ from ..motion.motion import Motion
 from ..motion.rests import Rest, rest_of
 from ..motion.retarget import at_seat_height
 from ..motion.uses import lying
-from .captured import HeldClip, fingerprint, frozen_text, held_out, is_frozen, test_motions
+from .captured import HeldClip, fingerprint, held_out, is_frozen, test_motions
+from .freezing import freeze
 
 __all__ = ["FROZEN_REAL", "freeze_real", "real_test"]
 
@@ -303,20 +304,12 @@ def _clip(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Make ``real.json`` anew; 0 if all went well, else 1 and a sentence on standard error."""
-    parser = argparse.ArgumentParser(
-        prog="python -m dafnet_addon.data.held_out.real", description="Makes the test set anew."
-    )
+    parser = argparse.ArgumentParser("python -m dafnet_addon.data.held_out.real")
     parser.add_argument("folder", type=Path, help="the motion files")
     parser.add_argument("library", type=Path, help="the furniture library")
-    options = parser.parse_args(arguments)
-    try:
-        frozen = freeze_real(options.folder, options.library)
-    except InputError as error:
-        print(error, file=sys.stderr)
-        return 1
-
-    FROZEN_REAL.write_text(frozen_text(frozen), encoding="utf-8")
-    return 0
+    return freeze(
+        parser, arguments, lambda options: freeze_real(options.folder, options.library), FROZEN_REAL
+    )
 
 
 if __name__ == "__main__":

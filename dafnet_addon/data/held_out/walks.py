@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import InputError
-from ...core.files import save_text
 from ...core.paths import Stop
 from ...core.rotations import rotate
 from ...core.skeleton import PELVIS, REST
@@ -32,7 +31,8 @@ from ..furnish.flesh import Furnishing
 from ..furnish.library import Piece, read_library
 from ..furnish.shapes import PELVIS_OVER, ShapeBank, bank_of, surface_under
 from ..motion.rests import Rest
-from .captured import HeldClip, frozen_text
+from .captured import HeldClip
+from .freezing import freeze
 
 __all__ = ["FROZEN_WALKS", "Walks", "freeze_walks", "real_walks"]
 
@@ -161,19 +161,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Make ``walks.json`` anew; 0 if all went well, else 1 and a sentence on standard
     error.
     """
-    parser = argparse.ArgumentParser(
-        prog="python -m dafnet_addon.data.held_out.walks", description="Makes the test set anew."
-    )
+    parser = argparse.ArgumentParser("python -m dafnet_addon.data.held_out.walks")
     parser.add_argument("library", type=Path, help="the furniture library")
-    options = parser.parse_args(arguments)
-    try:
-        frozen = freeze_walks(options.library)
-    except InputError as error:
-        print(error, file=sys.stderr)
-        return 1
-
-    save_text(FROZEN_WALKS, frozen_text(frozen))
-    return 0
+    return freeze(parser, arguments, lambda options: freeze_walks(options.library), FROZEN_WALKS)
 
 
 if __name__ == "__main__":

@@ -2,10 +2,8 @@
 every convention.
 """
 
-from collections.abc import Iterator
 from types import ModuleType
 
-import addon_utils
 import bpy
 import numpy as np
 import pytest
@@ -24,26 +22,9 @@ from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.take import Take
 
 from kit import humanoids
-from kit.rig_stage import MEASURED, RigStage, made_takes
+from kit.rig_stage import MEASURED, RigStage
 
 CENTIMETRE = 0.01
-
-
-@pytest.fixture(scope="module")
-def takes() -> dict[str, Take]:
-    return made_takes()
-
-
-@pytest.fixture(scope="module", autouse=True)
-def without_rigify_afterwards() -> Iterator[None]:
-    yield
-    if addon_utils.check("rigify")[1]:
-        addon_utils.disable("rigify")
-
-
-@pytest.fixture
-def stage(blender: ModuleType, takes: dict[str, Take]) -> RigStage:
-    return RigStage(takes)
 
 
 def test_a_body_of_its_own_keeps_the_motion(takes: dict[str, Take]) -> None:

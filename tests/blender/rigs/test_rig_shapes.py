@@ -2,11 +2,8 @@
 and limbs point as they did.
 """
 
-from collections.abc import Iterator
-from types import ModuleType
 from typing import Any
 
-import addon_utils
 import bpy
 import numpy as np
 import pytest
@@ -25,30 +22,12 @@ from bl_ext.user_default.dafnet.dafnet_addon.core import (
 )
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import JOINTS
-from bl_ext.user_default.dafnet.dafnet_addon.core.take import Take
 
 from kit import humanoids
 from kit.places import SHARED
-from kit.rig_stage import RigStage, made_takes
+from kit.rig_stage import RigStage
 
 CENTIMETRE = 0.01
-
-
-@pytest.fixture(scope="module")
-def takes() -> dict[str, Take]:
-    return made_takes()
-
-
-@pytest.fixture(scope="module", autouse=True)
-def without_rigify_afterwards() -> Iterator[None]:
-    yield
-    if addon_utils.check("rigify")[1]:
-        addon_utils.disable("rigify")
-
-
-@pytest.fixture
-def stage(blender: ModuleType, takes: dict[str, Take]) -> RigStage:
-    return RigStage(takes)
 
 
 @pytest.mark.parametrize("kind", ["mixamo", "rigify", "odd"])

@@ -1,10 +1,7 @@
 """What a bake does to the rig and to the file, what it refuses, and what it reports."""
 
-from collections.abc import Iterator
-from types import ModuleType
 from typing import Any
 
-import addon_utils
 import bpy
 import numpy as np
 import pytest
@@ -15,30 +12,12 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender import (
 )
 from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import create_character
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
-from bl_ext.user_default.dafnet.dafnet_addon.core.take import Take
 from bl_ext.user_default.dafnet.operators.bake_to_rig import DAFNET_OT_bake_to_rig
 from bl_ext.user_default.dafnet.panels.rig import DAFNET_PT_rig
 
-from kit.rig_stage import RigStage, made_takes
+from kit.rig_stage import RigStage
 
 CENTIMETRE = 0.01
-
-
-@pytest.fixture(scope="module")
-def takes() -> dict[str, Take]:
-    return made_takes()
-
-
-@pytest.fixture(scope="module", autouse=True)
-def without_rigify_afterwards() -> Iterator[None]:
-    yield
-    if addon_utils.check("rigify")[1]:
-        addon_utils.disable("rigify")
-
-
-@pytest.fixture
-def stage(blender: ModuleType, takes: dict[str, Take]) -> RigStage:
-    return RigStage(takes)
 
 
 def test_hand_edits_are_baked(stage: RigStage) -> None:

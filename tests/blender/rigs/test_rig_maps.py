@@ -1,10 +1,7 @@
 """Which bones are which joints: detected by name, guessed, chosen by hand, kept as presets."""
 
-from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 
-import addon_utils
 import bpy
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender import (
@@ -13,31 +10,13 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender import (
 )
 from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import is_character
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
-from bl_ext.user_default.dafnet.dafnet_addon.core.take import Take
 from bl_ext.user_default.dafnet.panels.rig import DAFNET_PT_rig, DAFNET_UL_rig
 
 from kit import humanoids
 from kit.panels import Layout, drawn_by
-from kit.rig_stage import RigStage, made_takes
+from kit.rig_stage import RigStage
 
 CENTIMETRE = 0.01
-
-
-@pytest.fixture(scope="module")
-def takes() -> dict[str, Take]:
-    return made_takes()
-
-
-@pytest.fixture(scope="module", autouse=True)
-def without_rigify_afterwards() -> Iterator[None]:
-    yield
-    if addon_utils.check("rigify")[1]:
-        addon_utils.disable("rigify")
-
-
-@pytest.fixture
-def stage(blender: ModuleType, takes: dict[str, Take]) -> RigStage:
-    return RigStage(takes)
 
 
 DETECTED = {
