@@ -18,11 +18,13 @@ def register() -> None:
 
     from . import operators, panels
     from .dafnet_addon import cli
-    from .dafnet_addon.blender import overlays, preferences, properties, translations
+    from .dafnet_addon.blender import preferences, translations
+    from .dafnet_addon.blender.character import properties
+    from .dafnet_addon.blender.overlay import display
 
     preferences.register()
     properties.register()
-    overlays.register()
+    display.register()
     bpy.utils.register_preset_path(_FILES)
     translations.register()
     for cls in operators.CLASSES + panels.CLASSES:
@@ -41,7 +43,9 @@ def unregister() -> None:
     import bpy
 
     from . import operators, panels
-    from .dafnet_addon.blender import overlays, preferences, properties, translations
+    from .dafnet_addon.blender import preferences, translations
+    from .dafnet_addon.blender.character import properties
+    from .dafnet_addon.blender.overlay import display
 
     while _commands:
         bpy.utils.unregister_cli_command(_commands.pop())
@@ -52,6 +56,6 @@ def unregister() -> None:
 
     translations.unregister()
     bpy.utils.unregister_preset_path(_FILES)
-    overlays.unregister()
+    display.unregister()
     properties.unregister()
     preferences.unregister()

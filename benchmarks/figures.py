@@ -19,8 +19,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from dafnet_addon import Controls, InputError, Scene, generate, load_weights
-from dafnet_addon.blender.demo_room import FURNITURE, Part
-from dafnet_addon.blender.stage import Colour, Stage, mixed, solids
+from dafnet_addon.blender.showcase.demo_room import FURNITURE, Part
+from dafnet_addon.blender.showcase.stage import Colour, Stage, mixed, solids
 from dafnet_addon.core.conditions import PREROLL, shot_steps
 from dafnet_addon.core.files import whole_file
 from dafnet_addon.core.kinematics import fit, forward_kinematics

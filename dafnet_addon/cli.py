@@ -531,7 +531,7 @@ def _frames(text: str) -> tuple[int, int]:
 
 
 def _demo(options: argparse.Namespace, bar: "_Bar") -> _Result:
-    from .blender.demo_room import run_demo
+    from .blender.showcase.demo_room import run_demo
 
     report = run_demo(
         options.output,
@@ -550,7 +550,7 @@ def _demo(options: argparse.Namespace, bar: "_Bar") -> _Result:
 
 
 def _bake(options: argparse.Namespace, bar: "_Bar") -> _Result:
-    from .blender.batch import bake_takes
+    from .blender.pipeline.batch import bake_takes
     from .core.weights import load_weights
 
     weights = load_weights(options.weights) if options.weights else None

@@ -3,7 +3,7 @@
 import bpy
 from bpy.props import FloatProperty, StringProperty
 
-from ..dafnet_addon.blender.armature import create_character
+from ..dafnet_addon.blender.character.armature import create_character
 from ..dafnet_addon.core.skeleton import STATURE
 from .base import DafnetOperator
 

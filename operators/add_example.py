@@ -5,7 +5,7 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty
 
-from ..dafnet_addon.blender.examples import EXAMPLES, add_example
+from ..dafnet_addon.blender.showcase.examples import EXAMPLES, add_example
 from .base import DafnetOperator, idle
 
 __all__ = ["DAFNET_OT_add_example"]

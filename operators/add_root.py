@@ -2,8 +2,8 @@
 
 import bpy
 
-from ..dafnet_addon.blender.armature import character_of
-from ..dafnet_addon.blender.targets import add_root, lacks_root
+from ..dafnet_addon.blender.character.armature import character_of
+from ..dafnet_addon.blender.character.targets import add_root, lacks_root
 from .base import DafnetOperator, idle
 
 __all__ = ["DAFNET_OT_add_root"]

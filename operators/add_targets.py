@@ -2,8 +2,8 @@
 
 import bpy
 
-from ..dafnet_addon.blender.armature import sent
-from ..dafnet_addon.blender.targets import add_targets, missing_targets
+from ..dafnet_addon.blender.character.armature import sent
+from ..dafnet_addon.blender.character.targets import add_targets, missing_targets
 from .base import DafnetOperator
 from .follow_path import may_direct
 

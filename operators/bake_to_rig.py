@@ -4,8 +4,8 @@ from typing import Any
 
 import bpy
 
-from ..dafnet_addon.blender.onto_rig import Baked, bake_onto_rig
-from ..dafnet_addon.blender.rig_properties import character_for, map_of, rig_of
+from ..dafnet_addon.blender.rig.baker import Baked, bake_onto_rig
+from ..dafnet_addon.blender.rig.properties import character_for, map_of, rig_of
 from .base import DafnetOperator, idle
 
 __all__ = ["DAFNET_OT_bake_to_rig"]

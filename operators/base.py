@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from ..dafnet_addon.blender.running import running_job
+from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.core.errors import DafnetError
 
 __all__ = ["DafnetOperator", "idle", "reported"]

@@ -2,8 +2,8 @@
 
 import bpy
 
-from ..dafnet_addon.blender.armature import sent
-from ..dafnet_addon.blender.surroundings import find_furniture
+from ..dafnet_addon.blender.character.armature import sent
+from ..dafnet_addon.blender.directing.surroundings import find_furniture
 from .base import DafnetOperator
 from .follow_path import may_direct
 

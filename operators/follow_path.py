@@ -5,8 +5,8 @@ from collections.abc import Callable, Generator
 import bpy
 from bpy.props import BoolProperty, FloatProperty
 
-from ..dafnet_addon.blender.armature import sent
-from ..dafnet_addon.blender.path_sources import (
+from ..dafnet_addon.blender.character.armature import sent
+from ..dafnet_addon.blender.directing.path_sources import (
     along_curve,
     as_moved,
     chosen,
@@ -15,7 +15,7 @@ from ..dafnet_addon.blender.path_sources import (
     may_move,
     through_points,
 )
-from ..dafnet_addon.blender.walking import Walk
+from ..dafnet_addon.blender.directing.walking import Walk
 from ..dafnet_addon.core.trails import FASTEST, SLOWEST
 from .base import idle
 from .walking import WalkOperator

@@ -7,10 +7,11 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ..dafnet_addon.blender import job, overlays
-from ..dafnet_addon.blender.armature import character_of
-from ..dafnet_addon.blender.running import running_job
-from ..dafnet_addon.blender.takes import active_take, draw_of, frames_of
+from ..dafnet_addon.blender.character.armature import character_of
+from ..dafnet_addon.blender.character.takes import active_take, draw_of, frames_of
+from ..dafnet_addon.blender.overlay import display
+from ..dafnet_addon.blender.pipeline import job
+from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.core.errors import InputError
 from .base import DafnetOperator, idle
 from .long import LongOperator
@@ -122,13 +123,13 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
         begun = super().invoke(context, event)
         if begun == {"RUNNING_MODAL"}:
             running = self._running
-            overlays.show_live_pose(lambda: running.joints)
+            display.show_live_pose(lambda: running.joints)
         return begun
 
     def cancel(self, context: bpy.types.Context) -> None:
         """End the job, which leaves the scene untouched unless it has finished."""
         super().cancel(context)
-        overlays.hide_live_pose()
+        display.hide_live_pose()
 
     def tell(self, result: job.Result) -> None:
         """Say what was generated, and what is to be seen to."""

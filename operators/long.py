@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import bpy
 
-from ..dafnet_addon.blender.running import RunningJob, begin_job, end_job
+from ..dafnet_addon.blender.pipeline.running import RunningJob, begin_job, end_job
 from ..dafnet_addon.core.progress import run_to_end
 from .base import DafnetOperator, reported
 

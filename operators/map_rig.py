@@ -7,8 +7,7 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from ..dafnet_addon.blender.rig_properties import map_of, presets, rig_of, show_map
-from ..dafnet_addon.blender.rigs import (
+from ..dafnet_addon.blender.rig.maps import (
     NEEDED,
     detected,
     in_names_of,
@@ -17,6 +16,7 @@ from ..dafnet_addon.blender.rigs import (
     required,
     save_map,
 )
+from ..dafnet_addon.blender.rig.properties import map_of, presets, rig_of, show_map
 from .base import DafnetOperator
 
 __all__ = ["DAFNET_OT_detect_rig", "DAFNET_OT_load_rig_map", "DAFNET_OT_save_rig_map"]

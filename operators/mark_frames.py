@@ -4,10 +4,10 @@ from typing import Any
 
 import bpy
 
-from ..dafnet_addon.blender import overlays
-from ..dafnet_addon.blender.armature import character_of
-from ..dafnet_addon.blender.overlay_faults import faults_of
-from ..dafnet_addon.blender.takes import PACKED, played_take, takes_of
+from ..dafnet_addon.blender.character.armature import character_of
+from ..dafnet_addon.blender.character.takes import PACKED, played_take, takes_of
+from ..dafnet_addon.blender.overlay import display
+from ..dafnet_addon.blender.overlay.faults import faults_of
 from .base import DafnetOperator, idle
 
 __all__ = ["DAFNET_OT_mark_frames"]
@@ -34,15 +34,15 @@ class DAFNET_OT_mark_frames(DafnetOperator, bpy.types.Operator):
         """Measure all takes of the character, or hide what was measured."""
         character: Any = character_of(context)
         plays = played_take(character)
-        if overlays.shown_faults(plays) is not None:
-            overlays.hide_faults()
+        if display.shown_faults(plays) is not None:
+            display.hide_faults()
             return
 
         takes = dict.fromkeys(
             [plays, *(action for action in takes_of(character) if PACKED in action)]
         )
         found = faults_of(context, character, (action for action in takes if action is not None))
-        overlays.show_faults(found)
+        display.show_faults(found)
         faults = found[plays.session_uid] if plays is not None else None
         if faults is not None:
             sliding, touching = (

@@ -5,7 +5,7 @@ from typing import ClassVar
 import bpy
 from bl_operators.presets import AddPresetBase
 
-from ..dafnet_addon.blender.settings import CLEAN_UP
+from ..dafnet_addon.blender.character.settings import CLEAN_UP
 
 __all__ = ["DAFNET_OT_add_preset", "PRESETS"]
 

@@ -1,5 +1,5 @@
-"""What is done with the takes in a character's list; each of these is one line of ``blender.takes``
-or ``blender.job``.
+"""What is done with the takes in a character's list; each of these is one line of
+``blender.character.takes`` or ``blender.pipeline.job``.
 """
 
 from typing import Any
@@ -7,9 +7,9 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty, IntProperty
 
-from ..dafnet_addon.blender import job
-from ..dafnet_addon.blender.armature import character_of
-from ..dafnet_addon.blender.takes import active_take, drop_take, play_take, takes_of
+from ..dafnet_addon.blender.character.armature import character_of
+from ..dafnet_addon.blender.character.takes import active_take, drop_take, play_take, takes_of
+from ..dafnet_addon.blender.pipeline import job
 from ..dafnet_addon.core.errors import InputError
 from .base import DafnetOperator, idle
 

@@ -5,8 +5,8 @@ from collections.abc import Generator
 import bpy
 from bpy.props import EnumProperty, FloatProperty
 
-from ..dafnet_addon.blender.armature import sent
-from ..dafnet_addon.blender.walking import Walk, walk
+from ..dafnet_addon.blender.character.armature import sent
+from ..dafnet_addon.blender.directing.walking import Walk, walk
 from ..dafnet_addon.core.errors import InputError
 from .base import idle
 from .walking import WalkOperator

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from ..dafnet_addon.blender.walking import Walk
+from ..dafnet_addon.blender.directing.walking import Walk
 from .long import LongOperator
 
 __all__ = ["WalkOperator"]

@@ -4,10 +4,10 @@ and Generate.
 
 import bpy
 
-from ..dafnet_addon.blender.armature import character_of, sent
+from ..dafnet_addon.blender.character.armature import character_of, sent
+from ..dafnet_addon.blender.character.targets import lacks_root, missing_targets
 from ..dafnet_addon.blender.compat import action_curves
-from ..dafnet_addon.blender.running import running_job
-from ..dafnet_addon.blender.targets import lacks_root, missing_targets
+from ..dafnet_addon.blender.pipeline.running import running_job
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.add_root import DAFNET_OT_add_root
 from ..operators.add_targets import DAFNET_OT_add_targets

@@ -2,10 +2,10 @@
 
 import bpy
 
-from ..dafnet_addon.blender import overlays
-from ..dafnet_addon.blender.armature import character_of
-from ..dafnet_addon.blender.overlay_data import KINDS
-from ..dafnet_addon.blender.takes import played_take
+from ..dafnet_addon.blender.character.armature import character_of
+from ..dafnet_addon.blender.character.takes import played_take
+from ..dafnet_addon.blender.overlay import display
+from ..dafnet_addon.blender.overlay.contents import KINDS
 from ..operators.mark_frames import DAFNET_OT_mark_frames
 from .main import CharacterPanel
 
@@ -26,5 +26,5 @@ class DAFNET_PT_overlays(CharacterPanel, bpy.types.Panel):
         for kind in KINDS:
             grid.prop(context.window_manager.dafnet_overlays, kind, toggle=True)
         character = character_of(context)
-        marked = overlays.shown_faults(played_take(character) if character else None) is not None
+        marked = display.shown_faults(played_take(character) if character else None) is not None
         layout.operator(DAFNET_OT_mark_frames.bl_idname, icon="MARKER_HLT", depress=marked)

@@ -4,9 +4,9 @@ from typing import Any
 
 import bpy
 
-from ..dafnet_addon.blender.rig_properties import rig_of
-from ..dafnet_addon.blender.rigs import NEEDED
-from ..dafnet_addon.blender.running import running_job
+from ..dafnet_addon.blender.pipeline.running import running_job
+from ..dafnet_addon.blender.rig.maps import NEEDED
+from ..dafnet_addon.blender.rig.properties import rig_of
 from ..operators.bake_to_rig import DAFNET_OT_bake_to_rig
 from ..operators.map_rig import DAFNET_OT_detect_rig, DAFNET_OT_load_rig_map, DAFNET_OT_save_rig_map
 

@@ -2,10 +2,10 @@
 
 import bpy
 
-from ..dafnet_addon.blender.armature import sent
-from ..dafnet_addon.blender.examples import EXAMPLES
-from ..dafnet_addon.blender.path_sources import chosen, floor_points, is_curve, may_move
-from ..dafnet_addon.blender.running import running_job
+from ..dafnet_addon.blender.character.armature import sent
+from ..dafnet_addon.blender.directing.path_sources import chosen, floor_points, is_curve, may_move
+from ..dafnet_addon.blender.pipeline.running import running_job
+from ..dafnet_addon.blender.showcase.examples import EXAMPLES
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.add_example import DAFNET_OT_add_example
 from ..operators.add_targets import DAFNET_OT_add_targets

@@ -4,8 +4,8 @@ from typing import Any
 
 import bpy
 
-from ..dafnet_addon.blender.armature import character_of
-from ..dafnet_addon.blender.takes import active_take
+from ..dafnet_addon.blender.character.armature import character_of
+from ..dafnet_addon.blender.character.takes import active_take
 from ..operators.generate import DAFNET_OT_generate
 from ..operators.takes import (
     DAFNET_OT_clean_again,

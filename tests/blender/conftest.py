@@ -1,8 +1,8 @@
 """A real Blender, in which this working tree is an extension, for the tests of this folder.
 
 It is there before they are collected, so that they import the very modules that Blender has loaded,
-by their names: ``from bl_ext.user_default.dafnet.dafnet_addon.blender import baker``. Without the
-module ``bpy`` they are skipped.
+by their names: ``from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import baker``.
+Without the module ``bpy`` they are skipped.
 """
 
 import importlib

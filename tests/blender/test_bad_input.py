@@ -17,11 +17,9 @@ import bpy
 import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon import load_weights
-from bl_ext.user_default.dafnet.dafnet_addon.blender import job
-from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import (
-    metres_per_unit,
-)
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import metres_per_unit
 from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import job
 from bl_ext.user_default.dafnet.dafnet_addon.cli import main
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender import compat
-from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import (
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import (
     character_scale,
     create_character,
 )
-from bl_ext.user_default.dafnet.dafnet_addon.blender.baker import bake
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
 from bl_ext.user_default.dafnet.dafnet_addon.core import root, rotations, skeleton
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.take import Take

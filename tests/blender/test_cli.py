@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon import cli, demo
-from bl_ext.user_default.dafnet.dafnet_addon.blender.demo_room import build_room
+from bl_ext.user_default.dafnet.dafnet_addon.blender.showcase.demo_room import build_room
 
 from kit.places import ROOT
 from kit.stage import Stage, keys_of

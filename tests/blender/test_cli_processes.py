@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon import cli
-from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import create_character
-from bl_ext.user_default.dafnet.dafnet_addon.blender.preview import render_film
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import create_character
+from bl_ext.user_default.dafnet.dafnet_addon.blender.showcase.preview import render_film
 
 from dafnet_addon.cli import main
 from kit.messages import without_blenders
@@ -296,7 +296,7 @@ def test_the_demos_environment_is_enough_for_bake_and_seats(scene: Path, tmp_pat
     code, said, err = ran("bake", scene, "-o", tmp_path / "out.blend", "--json", first=hidden)
     assert code == 0 and json.loads(said)["takes"], err
     for command in (
-        "import dafnet_addon.blender.demo_room",
+        "import dafnet_addon.blender.showcase.demo_room",
         "import runpy; runpy.run_path('benchmarks/seats.py')",
     ):
         subprocess.run(

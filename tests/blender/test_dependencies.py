@@ -9,12 +9,12 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender import job
-from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import create_character
-from bl_ext.user_default.dafnet.dafnet_addon.blender.furniture import furniture_now
-from bl_ext.user_default.dafnet.dafnet_addon.blender.path_sources import places_of
-from bl_ext.user_default.dafnet.dafnet_addon.blender.scene_reader import read_scene
-from bl_ext.user_default.dafnet.dafnet_addon.blender.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import create_character
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.path_sources import places_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import job
+from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.furniture import furniture_now
+from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.scene_reader import read_scene
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 
 from kit.stage import Stage

@@ -8,10 +8,10 @@ import bpy
 import numpy as np
 import pytest
 from bl_ext.user_default.dafnet import dafnet_addon
-from bl_ext.user_default.dafnet.dafnet_addon.blender import job, running
-from bl_ext.user_default.dafnet.dafnet_addon.blender.baker import bake
-from bl_ext.user_default.dafnet.dafnet_addon.blender.job import run
-from bl_ext.user_default.dafnet.dafnet_addon.blender.scene_reader import read_scene
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import job, running
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.job import run
+from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.scene_reader import read_scene
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.panels.main import DAFNET_PT_character
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender import overlay_data, overlay_faults, overlays
-from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay_cache import cache
-from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay_drawing import compose
-from bl_ext.user_default.dafnet.dafnet_addon.blender.takes import add_take
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.takes import add_take
+from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay import contents, display, faults
+from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.cache import cache
+from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.drawing import compose
 from bl_ext.user_default.dafnet.dafnet_addon.core.generate import Draw
 from bl_ext.user_default.dafnet.dafnet_addon.core.root import RootPath
 from bl_ext.user_default.dafnet.dafnet_addon.core.sensor import RADIUS, SPHERES
@@ -49,7 +49,7 @@ class Shot(Stage):
         )
 
     def drawn(self, kind: str) -> tuple:
-        return overlay_data.drawings(bpy.context, [kind]).get(kind, ())
+        return contents.drawings(bpy.context, [kind]).get(kind, ())
 
     def add(self, joints: np.ndarray, start: int = 1, play: bool = True, **given):
         """An action that holds a take of these joints (T, 22, 3), metres."""
@@ -80,11 +80,11 @@ class Shot(Stage):
 def shot(blender):
     made = Shot()
     yield made
-    for kind in overlay_data.KINDS:
-        overlays.switch(kind, False)
-    overlays.hide_live_pose()
-    overlays.hide_faults()
-    overlay_data.forget()
+    for kind in contents.KINDS:
+        display.switch(kind, False)
+    display.hide_live_pose()
+    display.hide_faults()
+    contents.forget()
 
 
 def standing(frames: int, speed: float = 0.0) -> np.ndarray:
@@ -96,32 +96,32 @@ def standing(frames: int, speed: float = 0.0) -> np.ndarray:
 
 def test_nothing_is_touched_before_a_switch_goes_on(shot: Shot) -> None:
     switches = bpy.context.window_manager.dafnet_overlays
-    assert not any(getattr(switches, kind) for kind in overlay_data.KINDS)
+    assert not any(getattr(switches, kind) for kind in contents.KINDS)
 
     def hooks() -> list[int]:
-        told = [getattr(bpy.app.handlers, event) for event in overlays._LISTENERS]
-        ours = [sum(f.__module__ == overlays.__name__ for f in each) for each in told]
-        return [len(overlays._drawers), sum(ours)]
+        told = [getattr(bpy.app.handlers, event) for event in display._LISTENERS]
+        ours = [sum(f.__module__ == display.__name__ for f in each) for each in told]
+        return [len(display._drawers), sum(ours)]
 
     assert hooks() == [0, 0]
     switches.path = True
     assert (
         switches.path
-        and overlays.switched_on() == {"path"}
-        and hooks() == [2, len(overlays._LISTENERS)]
+        and display.switched_on() == {"path"}
+        and hooks() == [2, len(display._LISTENERS)]
     )
     switches.circle = True
-    assert hooks() == [2, len(overlays._LISTENERS)], "one hook for all"
+    assert hooks() == [2, len(display._LISTENERS)], "one hook for all"
     switches.path = switches.circle = False
     assert hooks() == [0, 0] and not len(cache)
-    overlays.show_live_pose(lambda: None)
+    display.show_live_pose(lambda: None)
     assert hooks() == [2, 0]
-    overlays.hide_live_pose()
-    overlays.show_faults({1: overlay_faults.Faults(np.ones(2), np.ones(2))})
-    assert hooks() == [1, len(overlays._LISTENERS)]
-    overlays.hide_faults()
+    display.hide_live_pose()
+    display.show_faults({1: faults.Faults(np.ones(2), np.ones(2))})
+    assert hooks() == [1, len(display._LISTENERS)]
+    display.hide_faults()
     assert hooks() == [0, 0]
-    body = ast.parse(Path(overlays.__file__).read_text(encoding="utf-8")).body
+    body = ast.parse(Path(display.__file__).read_text(encoding="utf-8")).body
     top = [node for node in body if isinstance(node, ast.Import | ast.ImportFrom)]
     named = {alias.name for node in top for alias in node.names} | {
         getattr(node, "module", "") for node in top
@@ -130,31 +130,31 @@ def test_nothing_is_touched_before_a_switch_goes_on(shot: Shot) -> None:
 
 
 def test_switches_live_in_no_file_and_outlast_another(shot: Shot, tmp_path) -> None:
-    overlays.switch("ghosts", True)
-    overlays.show_faults({1: overlay_faults.Faults(np.ones(2), np.ones(2))})
+    display.switch("ghosts", True)
+    display.show_faults({1: faults.Faults(np.ones(2), np.ones(2))})
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "on.blend"))
-    overlays.switch("ghosts", False)
-    overlays.hide_faults()
+    display.switch("ghosts", False)
+    display.hide_faults()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "on.blend"))
-    assert not bpy.context.window_manager.dafnet_overlays.ghosts and not overlays._drawers
-    overlays.switch("ghosts", True)
-    overlays.show_faults({1: overlay_faults.Faults(np.ones(2), np.ones(2))})
+    assert not bpy.context.window_manager.dafnet_overlays.ghosts and not display._drawers
+    display.switch("ghosts", True)
+    display.show_faults({1: faults.Faults(np.ones(2), np.ones(2))})
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "on.blend"))
     assert bpy.context.window_manager.dafnet_overlays.ghosts
-    assert set(overlays._drawers) == {"scene", "corner"}, "faults are of the file that was left"
-    assert overlays._edited in bpy.app.handlers.depsgraph_update_post
+    assert set(display._drawers) == {"scene", "corner"}, "faults are of the file that was left"
+    assert display._edited in bpy.app.handlers.depsgraph_update_post
 
 
 def test_unregistering_switches_off(shot: Shot) -> None:
-    overlays.switch("spheres", True)
-    overlays.show_live_pose(lambda: None)
-    overlays.unregister()
+    display.switch("spheres", True)
+    display.show_live_pose(lambda: None)
+    display.unregister()
     try:
-        assert not overlays._drawers and not overlays.switched_on()
-        assert overlays._edited not in bpy.app.handlers.depsgraph_update_post
+        assert not display._drawers and not display.switched_on()
+        assert display._edited not in bpy.app.handlers.depsgraph_update_post
         assert not hasattr(bpy.types.WindowManager, "dafnet_overlays")
     finally:
-        overlays.register()
+        display.register()
     assert not bpy.context.window_manager.dafnet_overlays.spheres
 
 
@@ -178,7 +178,7 @@ def test_a_box_occupies_the_spheres_that_it_covers(shot: Shot, unit: float) -> N
 
 
 def test_spheres_go_with_the_root_and_the_furniture(shot: Shot) -> None:
-    overlays.switch("spheres", True)
+    display.switch("spheres", True)
     before = shot.drawn("spheres")
     assert shot.drawn("spheres") is before, "nothing has changed"
     read = list(cache._results["furniture"].values())
@@ -203,7 +203,7 @@ def test_spheres_go_with_the_root_and_the_furniture(shot: Shot) -> None:
 
 
 def test_furniture_that_moves_over_time_is_seen_where_it_is(shot: Shot) -> None:
-    overlays.switch("spheres", True)
+    display.switch("spheres", True)
     for frame, x in ((1, -0.4), (11, 0.4)):
         shot.cube.location.x = x
         shot.cube.keyframe_insert("location", frame=frame)
@@ -251,7 +251,7 @@ def test_planted_feet_and_collisions_are_marked(shot: Shot) -> None:
         (drawn,) = shot.drawn("marks")
         return drawn.beads[np.isclose(drawn.bead_colours[:, :3], colour).all(axis=1)]
 
-    overlays.switch("marks", True)
+    display.switch("marks", True)
     shot.scene.frame_set(10)
     assert np.allclose(beads(green)[:, :2], joints[10, [10, 11], :2], atol=1e-5)
     shot.scene.frame_set(30)
@@ -333,23 +333,23 @@ def test_ghosts_are_the_other_takes_that_are_ticked(shot: Shot) -> None:
 
 def test_the_live_pose_is_in_scene_units(blender) -> None:
     Shot(0.01)
-    (drawn,) = overlay_data.live_pose(bpy.context, standing(1)[0])
+    (drawn,) = contents.live_pose(bpy.context, standing(1)[0])
     assert drawn.lines.shape == (21, 2, 3) and np.allclose(
         drawn.lines[:, 1], 100.0 * standing(1)[0, 1:]
     )
 
 
 def test_what_is_deleted_while_it_is_shown_does_no_harm(shot: Shot) -> None:
-    kinds = list(overlay_data.KINDS)
+    kinds = list(contents.KINDS)
     for kind in kinds:
-        overlays.switch(kind, True)
+        display.switch(kind, True)
     ghost = shot.add(standing(20), play=False)
     ghost.dafnet.ghost = True
     shot.add(standing(20))
     shot.scene.frame_set(5)
 
     def shown() -> set[str]:
-        return {kind for kind, drawn in overlay_data.drawings(bpy.context, kinds).items() if drawn}
+        return {kind for kind, drawn in contents.drawings(bpy.context, kinds).items() if drawn}
 
     assert shown() == set(kinds)
     bpy.data.actions.remove(ghost)
@@ -363,15 +363,15 @@ def test_what_is_deleted_while_it_is_shown_does_no_harm(shot: Shot) -> None:
     shot.update()
     assert shown() == set()
     bpy.data.objects.remove(shot.ann)
-    assert overlay_data.drawings(bpy.context, kinds) == {}
-    assert overlays._wanted(bpy.context) == {}, "nor is there a view"
-    overlays._draw_scene()
-    overlays._draw_flat()
-    overlays._draw_timeline()
+    assert contents.drawings(bpy.context, kinds) == {}
+    assert display._wanted(bpy.context) == {}, "nor is there a view"
+    display._draw_scene()
+    display._draw_flat()
+    display._draw_timeline()
 
 
 def test_undo_leaves_overlays_on_and_right(shot: Shot) -> None:
-    overlays.switch("circle", True)
+    display.switch("circle", True)
     shot.add(standing(20), action=np.eye(10)[np.zeros(20, int)])
     shot.scene.frame_set(5)
     bpy.ops.ed.undo_push(message="Take")
@@ -381,7 +381,7 @@ def test_undo_leaves_overlays_on_and_right(shot: Shot) -> None:
     assert shot.drawn("circle") == ()
     bpy.ops.ed.undo()
     assert shot.drawn("circle")[1].line_colours[0, 3] == 1.0
-    assert overlays.switched_on() == {"circle"}
+    assert display.switched_on() == {"circle"}
 
 
 def test_another_object_may_be_active(shot: Shot) -> None:
@@ -389,14 +389,14 @@ def test_another_object_may_be_active(shot: Shot) -> None:
     shot.scene.frame_set(5)
     objects = bpy.context.view_layer.objects
     objects.active = shot.cube
-    assert overlay_data.watched_character(bpy.context) == shot.ann, "the only character"
+    assert contents.watched_character(bpy.context) == shot.ann, "the only character"
     objects.active = shot.ann
     bpy.ops.dafnet.add_character(name="Bob")
-    assert overlay_data.watched_character(bpy.context).name == "Bob"
+    assert contents.watched_character(bpy.context).name == "Bob"
     bpy.ops.object.select_all(action="DESELECT")
     objects.active = shot.cube
     cache.note_edit(None)
-    assert overlay_data.watched_character(bpy.context).name == "Bob", (
+    assert contents.watched_character(bpy.context).name == "Bob", (
         "the last one, while the furniture is worked on"
     )
 
@@ -412,29 +412,29 @@ def test_faulty_frames_are_marked_and_unmarked(shot: Shot) -> None:
     shot.scene.frame_set(17)
     bpy.context.view_layer.objects.active = shot.ann
     assert bpy.ops.dafnet.mark_frames() == {"FINISHED"}
-    faults = overlays.shown_faults(action)
+    shown = display.shown_faults(action)
     assert shot.scene.frame_current == 17
-    assert np.flatnonzero(faults.sliding).tolist() == list(range(10, 15)) and set(
-        faults.sliding[10:15]
+    assert np.flatnonzero(shown.sliding).tolist() == list(range(10, 15)) and set(
+        shown.sliding[10:15]
     ) == {2}
-    assert faults.collisions[:19].max() == 0 and faults.collisions[20:].min() >= 1
-    bars = overlay_faults.fault_bars(faults, 11)
+    assert shown.collisions[:19].max() == 0 and shown.collisions[20:].min() >= 1
+    bars = faults.fault_bars(shown, 11)
     assert bars.first[0] == 21 and bars.last[0] == 25 and bars.row[0] == 0
     assert (
         bars.first[1] == 31
         and bars.last[bars.row == 1].max() == 40
         and bars.colours.shape == (len(bars.row), 4)
     )
-    assert set(overlays._drawers) == {"timeline"}
+    assert set(display._drawers) == {"timeline"}
     assert bpy.ops.dafnet.mark_frames() == {"FINISHED"}
-    assert overlays.shown_faults(action) is None and not overlays._drawers
+    assert display.shown_faults(action) is None and not display._drawers
     shot.ann.animation_data.action = None
     assert not bpy.ops.dafnet.mark_frames.poll()
 
 
 def test_beads_are_closed_and_lit(shot: Shot) -> None:
     drawn = compose(beads=[(np.array([[1.0, 2.0, 3.0]]), (1.0, 1.0, 1.0, 1.0), 0.5)])
-    corners, colours = overlays.beads_of(drawn)
+    corners, colours = display.beads_of(drawn)
     faces = corners.reshape(8, 3, 3)
     normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     assert ((normals * (faces.mean(axis=1) - (1.0, 2.0, 3.0))).sum(-1) > 0).all(), (
@@ -455,14 +455,14 @@ def test_the_corner_avoids_the_sidebar(shot: Shot) -> None:
     area = type(
         "Area", (), {"regions": [window, Region("TOOLS", 100, 50), Region("UI", 700, 200)]}
     )()
-    assert overlays.corner_of(area, window, 50.0) == (550.0, 50.0)
+    assert display.corner_of(area, window, 50.0) == (550.0, 50.0)
     area.regions[2].width, area.regions[2].x = 1, 899
-    assert overlays.corner_of(area, window, 50.0) == (750.0, 50.0)
+    assert display.corner_of(area, window, 50.0) == (750.0, 50.0)
 
 
 def test_the_panel_draws_all_switches(shot: Shot) -> None:
 
     assert DAFNET_PT_overlays.poll(bpy.context)
     layout = drawn_by(DAFNET_PT_overlays, bpy.context)
-    assert set(overlay_data.KINDS) <= set(layout.words())
+    assert set(contents.KINDS) <= set(layout.words())
     assert any(options.get("depress") is False for _, _, options in layout.calls)

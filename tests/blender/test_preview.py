@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender.preview import (
+from bl_ext.user_default.dafnet.dafnet_addon.blender.showcase.preview import (
     look_at,
     render_film,
     render_sheet,

@@ -8,7 +8,7 @@ from types import ModuleType
 import bpy
 import numpy as np
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender import job, running
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import job, running
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 
 

@@ -5,10 +5,10 @@ from types import ModuleType
 import bpy
 import numpy as np
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import create_character
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import create_character
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.settings import settings_of
 from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
-from bl_ext.user_default.dafnet.dafnet_addon.blender.scene_reader import read_scene
-from bl_ext.user_default.dafnet.dafnet_addon.blender.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.scene_reader import read_scene
 from bl_ext.user_default.dafnet.dafnet_addon.core import skeleton
 
 from kit.stage import Stage, box_corners, key

@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 import pytest
 from bl_ext.user_default import dafnet
-from bl_ext.user_default.dafnet.dafnet_addon.blender.path_sources import along_curve
-from bl_ext.user_default.dafnet.dafnet_addon.blender.surroundings import find_furniture
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.path_sources import along_curve
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.surroundings import find_furniture
 from bl_ext.user_default.dafnet.panels import CLASSES, setup
 from bl_ext.user_default.dafnet.panels.setup import add_menu
 

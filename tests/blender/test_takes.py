@@ -11,16 +11,17 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import bpy
 import numpy as np
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender import job, preferences
-from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
-from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay_data import drawings
-from bl_ext.user_default.dafnet.dafnet_addon.blender.properties import _is_take
-from bl_ext.user_default.dafnet.dafnet_addon.blender.takes import (
+from bl_ext.user_default.dafnet.dafnet_addon.blender import preferences
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.properties import _is_take
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.takes import (
     PACKED,
     frames_of,
     stored_take,
     takes_of,
 )
+from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
+from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.contents import drawings
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import job
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import UPPER
 

@@ -10,18 +10,18 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender import (
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import sent
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import (
     path_sources,
     root_keys,
-    running,
     walking,
 )
-from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import sent
-from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
-from bl_ext.user_default.dafnet.dafnet_addon.blender.demo_room import build_room
-from bl_ext.user_default.dafnet.dafnet_addon.blender.examples import add_example
-from bl_ext.user_default.dafnet.dafnet_addon.blender.scene_reader import read_scene
-from bl_ext.user_default.dafnet.dafnet_addon.blender.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import running
+from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.scene_reader import read_scene
+from bl_ext.user_default.dafnet.dafnet_addon.blender.showcase.demo_room import build_room
+from bl_ext.user_default.dafnet.dafnet_addon.blender.showcase.examples import add_example
 from bl_ext.user_default.dafnet.dafnet_addon.core.conditions import shot_steps
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end

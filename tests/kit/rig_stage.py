@@ -5,8 +5,8 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender import onto_rig, rigs
-from bl_ext.user_default.dafnet.dafnet_addon.blender.baker import bake
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
+from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, maps
 from bl_ext.user_default.dafnet.dafnet_addon.core.generate import generate
 from bl_ext.user_default.dafnet.dafnet_addon.core.paths import Route, Stop, route
 from bl_ext.user_default.dafnet.dafnet_addon.core.solids import Box, Scene
@@ -119,12 +119,12 @@ class RigStage(Stage):
     def map(self, kind: str, rig: Any) -> Any:
         """Its bones: detected, but for the odd one."""
         if kind == "odd":
-            return rigs.RigMap("Odd", joints=humanoids.ODD, root="Wurzel")
-        return rigs.detected(rig)
+            return maps.RigMap("Odd", joints=humanoids.ODD, root="Wurzel")
+        return maps.detected(rig)
 
     def bake(self, kind: str, rig: Any, **options: Any) -> Any:
         """Bake what she plays onto the rig."""
-        return onto_rig.bake_onto_rig(bpy.context, self.ann, rig, self.map(kind, rig), **options)
+        return baker.bake_onto_rig(bpy.context, self.ann, rig, self.map(kind, rig), **options)
 
     def heads(self, rig: Any, names: list[str], frame: int) -> np.ndarray:
         return bone_heads(rig, frame, names)

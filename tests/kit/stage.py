@@ -10,9 +10,9 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.settings import settings_of
 from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
-from bl_ext.user_default.dafnet.dafnet_addon.blender.scene_reader import read_scene
-from bl_ext.user_default.dafnet.dafnet_addon.blender.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.scene_reader import read_scene
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import JOINTS
 

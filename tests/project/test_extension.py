@@ -93,13 +93,13 @@ def test_the_zip_holds_what_an_animator_needs(zipped: Path) -> None:
         if "__pycache__" in name.parts or name.suffix in {".pyc", ".zip", ".blend"}
     ]
     shipped = {str(name) for name in names}
-    for folder in ("rig_maps", "presets/dafnet"):
+    for folder in ("rig/shipped_maps", "presets/dafnet"):
         files = {
             path for path in (ROOT / "dafnet_addon/blender" / folder).iterdir() if path.is_file()
         }
         assert files and {str(path.relative_to(ROOT)) for path in files} <= shipped
     for package in ("dafnet_addon/core", "dafnet_addon/blender", "operators", "panels"):
-        assert {str(path.relative_to(ROOT)) for path in (ROOT / package).glob("*.py")} <= shipped
+        assert {str(path.relative_to(ROOT)) for path in (ROOT / package).rglob("*.py")} <= shipped
     assert any(name.parts[0] == "weights_stub" and name.suffix == ".safetensors" for name in names)
 
 
@@ -176,7 +176,7 @@ def test_what_is_translated_is_said_somewhere() -> None:
     sources = "\n".join(
         file.read_text(encoding="utf-8")
         for folder in ("operators", "panels", "dafnet_addon/blender")
-        for file in (ROOT / folder).glob("*.py")
+        for file in (ROOT / folder).rglob("*.py")
         if file.name != "translations.py"
     )
     tables = ast.parse((ROOT / "dafnet_addon/blender/translations.py").read_text(encoding="utf-8"))

@@ -15,7 +15,9 @@ __all__ = ["first_shot", "progress"]
 
 def progress() -> float | None:
     """How far the running job is, as the panel knows it."""
-    module: Any = next(m for name, m in sys.modules.items() if name.endswith(".blender.running"))
+    module: Any = next(
+        m for name, m in sys.modules.items() if name.endswith(".blender.pipeline.running")
+    )
     running = module.running_job()
     return None if running is None else running.progress
 

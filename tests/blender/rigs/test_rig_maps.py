@@ -4,11 +4,8 @@ from pathlib import Path
 
 import bpy
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender import (
-    rig_properties,
-    rigs,
-)
-from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import is_character
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import is_character
+from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import maps, properties
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.panels.rig import DAFNET_PT_rig, DAFNET_UL_rig
 
@@ -32,7 +29,7 @@ DETECTED = {
 @pytest.mark.parametrize("kind", DETECTED)
 def test_conventions_are_detected(stage: RigStage, kind: str) -> None:
     rig = stage.build(kind)
-    found = rigs.detected(rig)
+    found = maps.detected(rig)
     assert (found.name, len(found.joints)) == DETECTED[kind]
     assert not is_character(rig)
     assert is_character(stage.ann)
@@ -40,14 +37,14 @@ def test_conventions_are_detected(stage: RigStage, kind: str) -> None:
 
 @pytest.mark.parametrize("prefix", ["", "mixamorig1:", "mixamorig_", "Mia:"])
 def test_prefixes_do_not_matter(stage: RigStage, prefix: str) -> None:
-    found = rigs.detected(humanoids.mixamo(bpy, prefix=prefix))
+    found = maps.detected(humanoids.mixamo(bpy, prefix=prefix))
     assert (found.name, len(found.joints)) == ("Mixamo", 22)
     assert found.joints["left_hip"] == f"{prefix}LeftUpLeg"
 
 
 def test_five_spine_bones_of_unreal(stage: RigStage) -> None:
     rig = humanoids.unreal(bpy, spines=5)
-    found = rigs.detected(rig)
+    found = maps.detected(rig)
     assert found.name == "Unreal mannequin (UE5)" and found.joints["spine3"] == "spine_05"
     stage.play("write")
     stage.bake("unreal", rig)
@@ -74,7 +71,7 @@ GUESSED = {
 
 def test_names_of_no_convention_are_guessed(stage: RigStage) -> None:
     rig = humanoids.mixamo(bpy)
-    meant = rigs.detected(rig).joints
+    meant = maps.detected(rig).joints
     new = {}
     for joint, bone in meant.items():
         for word, side in (("Left", "L"), ("Right", "R")):
@@ -85,14 +82,14 @@ def test_names_of_no_convention_are_guessed(stage: RigStage) -> None:
     new["left_ankle"], new["right_ankle"] = (
         rig.data.bones[new[f"{side}_ankle"]].name for side in ("left", "right")
     )
-    found = rigs.detected(rig)
+    found = maps.detected(rig)
     assert found.name == "Guessed"
     assert found.joints == new
 
 
 @pytest.fixture
 def user_maps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(rigs, "user_folder", lambda create=False: tmp_path)
+    monkeypatch.setattr(maps, "user_folder", lambda create=False: tmp_path)
     return tmp_path
 
 
@@ -110,19 +107,19 @@ def test_presets_are_saved_and_found_again(stage: RigStage, user_maps: Path) -> 
     assert bpy.ops.dafnet.save_rig_map(name="Otto's Rig") == {"FINISHED"}
     assert [file.suffix for file in user_maps.iterdir()] == [".json"]
     other = humanoids.odd(bpy)
-    found = rigs.detected(other)
+    found = maps.detected(other)
     assert (found.name, found.joints, found.root) == ("Otto's Rig", humanoids.ODD, "Wurzel")
-    key = next(key for key, name, _ in rig_properties.presets(None, None) if name == "Otto's Rig")
+    key = next(key for key, name, _ in properties.presets(None, None) if name == "Otto's Rig")
     assert key.startswith("my_") and "mixamo" in {
-        key for key, _, _ in rig_properties.presets(None, None)
+        key for key, _, _ in properties.presets(None, None)
     }
     bpy.context.view_layer.objects.active = other
     assert bpy.ops.dafnet.load_rig_map(preset=key) == {"FINISHED"}
-    assert rig_properties.map_of(other).joints == humanoids.ODD
+    assert properties.map_of(other).joints == humanoids.ODD
     (user_maps / "broken.json").write_text("{}", encoding="utf-8")
-    assert rigs.detected(other).name == "Otto's Rig"
+    assert maps.detected(other).name == "Otto's Rig"
     with pytest.raises(InputError, match=r"'broken\.json'"):
-        rigs.load_map(user_maps / "broken.json")
+        maps.load_map(user_maps / "broken.json")
 
 
 def test_the_panel_shows_a_row_for_each_joint(stage: RigStage) -> None:
@@ -153,9 +150,9 @@ def test_the_panel_shows_a_row_for_each_joint(stage: RigStage) -> None:
 
 
 def test_presets_lie_in_the_extensions_folder(stage: RigStage) -> None:
-    folder = rigs.user_folder(create=True)
+    folder = maps.user_folder(create=True)
     assert folder.is_dir() and "dafnet" in folder.parts and folder.name == "rig_maps"
-    assert rigs.load_map(rigs.map_files()["mixamo"]).name == "Mixamo"
+    assert maps.load_map(maps.map_files()["mixamo"]).name == "Mixamo"
 
 
 def test_a_corrected_row_of_rigify_keeps_the_rest(stage: RigStage) -> None:
@@ -163,10 +160,10 @@ def test_a_corrected_row_of_rigify_keeps_the_rest(stage: RigStage) -> None:
     controls only.
     """
     rig = stage.build("rigify")
-    rig_properties.show_map(rig, rigs.detected(rig))
-    assert rig_properties.map_of(rig) == rigs.detected(rig)
+    properties.show_map(rig, maps.detected(rig))
+    assert properties.map_of(rig) == maps.detected(rig)
     rig.dafnet_rig.rows["left_wrist"].bone = "hand_tweak.L"
-    changed = rig_properties.map_of(rig)
+    changed = properties.map_of(rig)
     assert (
         changed.place("left_wrist") == "hand_tweak.L"
         and changed.place("right_wrist") == "ORG-hand.R"

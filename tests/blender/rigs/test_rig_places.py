@@ -7,11 +7,8 @@ from types import ModuleType
 import bpy
 import numpy as np
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender import (
-    onto_rig,
-    rigs,
-)
-from bl_ext.user_default.dafnet.dafnet_addon.blender.baker import bake
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
+from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, maps
 from bl_ext.user_default.dafnet.dafnet_addon.core import (
     kinematics,
     retargeting,
@@ -276,7 +273,7 @@ def test_hips_beside_the_trunk_do_not_tear_it(stage: RigStage) -> None:
     hip.head, hip.tail = bones["pelvis"].head, bones["pelvis"].tail
     bones["pelvis"].parent = bones["abdomenLower"].parent = hip
     bpy.ops.object.mode_set(mode="OBJECT")
-    found = rigs.detected(rig)
+    found = maps.detected(rig)
     assert (found.name, found.joints["pelvis"], found.joints["spine1"]) == (
         "Guessed",
         "hip",
@@ -290,11 +287,11 @@ def test_hips_beside_the_trunk_do_not_tear_it(stage: RigStage) -> None:
         mine.slots.new(id_type="OBJECT", name="Another")
     torn = type(found)("Mine", joints=found.joints | {"pelvis": "pelvis"})
     with pytest.raises(InputError, match="'pelvis' does not carry 'abdomenLower'"):
-        onto_rig.bake_onto_rig(bpy.context, stage.ann, rig, torn)
+        baker.bake_onto_rig(bpy.context, stage.ann, rig, torn)
     assert data.action == mine and getattr(data, "action_slot", None) == slot
     assert all(bone.matrix_basis == bone.matrix_basis.Identity(4) for bone in rig.pose.bones)
 
-    onto_rig.bake_onto_rig(bpy.context, stage.ann, rig, found)
+    baker.bake_onto_rig(bpy.context, stage.ann, rig, found)
     assert (
         np.abs(stage.heads(rig, ["Head", "LeftHand"], 30) - stage.take.joints[29, [15, 20]]).max()
         < CENTIMETRE

@@ -7,14 +7,10 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender import (
-    rig_properties,
-    rig_reading,
-    rigs,
-)
-from bl_ext.user_default.dafnet.dafnet_addon.blender.armature import create_character
-from bl_ext.user_default.dafnet.dafnet_addon.blender.scene_reader import read_scene
-from bl_ext.user_default.dafnet.dafnet_addon.blender.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import create_character
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import maps, properties, reading
+from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.scene_reader import read_scene
 from bl_ext.user_default.dafnet.dafnet_addon.core import (
     kinematics,
     rotations,
@@ -44,7 +40,7 @@ def test_full_mode_copies_from_any_rig(stage: RigStage, kind: str) -> None:
     stage.ann, source = bob, stage.ann
     rig = stage.build(kind)
     stage.bake(kind, rig)
-    rig_properties.show_map(rig, stage.map(kind, rig))
+    properties.show_map(rig, stage.map(kind, rig))
     source.dafnet.mode = "FULL"
     stage.scene.frame_start, stage.scene.frame_end = 1, len(stage.take)
     read = {}
@@ -121,7 +117,7 @@ class World:
     """Where a rig's joints are in the room, and what FULL reads from it."""
 
     def __init__(self, stage: RigStage, rig: Any) -> None:
-        self.stage, self.rig, self.map = stage, rig, rigs.detected(rig)
+        self.stage, self.rig, self.map = stage, rig, maps.detected(rig)
 
     def played(self, frames: range) -> np.ndarray:
         known = [j for j, name in enumerate(JOINTS) if self.map.place(name)]
@@ -140,9 +136,9 @@ class World:
             evaluated = self.rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
             bodies.append(np.array(evaluated.matrix_world))
             poses.append(
-                rig_reading.pose_matrices(evaluated, [self.map.place(name) for name in JOINTS])
+                reading.pose_matrices(evaluated, [self.map.place(name) for name in JOINTS])
             )
-        return rig_reading.joints_of(self.rig, self.map, np.array(bodies), np.array(poses), 1.0)[0]
+        return reading.joints_of(self.rig, self.map, np.array(bodies), np.array(poses), 1.0)[0]
 
 
 @pytest.mark.parametrize("rest", humanoids.RESTS)
@@ -155,7 +151,7 @@ def test_the_rest_pose_does_not_matter(stage: RigStage, kind: str, rest: str) ->
     """
     stage.play("write")
     rig = stage.build(kind)
-    humanoids.rested(bpy, rig, *humanoids.rest_pose(rest, rigs.detected(rig).joints))
+    humanoids.rested(bpy, rig, *humanoids.rest_pose(rest, maps.detected(rig).joints))
     baked = stage.bake(kind, rig)
     for part, distances in stage.errors(kind, rig).items():
         assert distances.mean() < CENTIMETRE, part
@@ -291,7 +287,7 @@ def test_hands_feet_and_face_turn_the_same_from_any_rest_pose(stage: RigStage, r
         60
     ]
     rig = stage.build("mixamo")
-    humanoids.rested(bpy, rig, *humanoids.rest_pose(rest, rigs.detected(rig).joints))
+    humanoids.rested(bpy, rig, *humanoids.rest_pose(rest, maps.detected(rig).joints))
     stage.bake("mixamo", rig)
 
     def way(start: str, end: str) -> np.ndarray:
@@ -329,12 +325,12 @@ def test_full_mode_tells_what_it_cannot_follow(stage: RigStage) -> None:
 
     rig.pose.bones["mixamorig:Spine1"].rotation_quaternion = (0.966, 0.259, 0.0, 0.0)
     assert "is copied" not in warnings()
-    known = rigs.detected(rig)
+    known = maps.detected(rig)
     joints = {
         joint: bone
         for joint, bone in known.joints.items()
         if "spine" not in joint and "collar" not in joint
     }
-    rig_properties.show_map(rig, type(known)("Mine", joints=joints))
+    properties.show_map(rig, type(known)("Mine", joints=joints))
     rig.pose.bones["mixamorig:Spine1"].rotation_quaternion = (0.383, 0.0, 0.924, 0.0)
     assert "'Mixamo' is copied, but the trunk by" in warnings() and "degrees off" in warnings()

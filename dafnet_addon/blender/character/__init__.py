@@ -1,0 +1,1 @@
+"""The character: its bones and body, what the animator has set on it, and its takes."""

@@ -1,0 +1,374 @@
+"""What the animator sets, kept on the character's armature (``Object.dafnet``) and on the actions
+of its takes (``Action.dafnet``).
+"""
+
+import atexit
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+)
+
+from ..rig import properties as rig_properties
+from .settings import MAX_TAKES
+from .takes import PACKED
+
+__all__ = ["CharacterSettings", "TakeSettings", "ensure_registered", "register", "unregister"]
+
+
+def _is_armature(_settings: "CharacterSettings", candidate: bpy.types.Object) -> bool:
+    return candidate.type == "ARMATURE" and candidate != _settings.id_data
+
+
+def _is_take(_settings: "CharacterSettings", candidate: bpy.types.Action) -> bool:
+    return PACKED in candidate
+
+
+def _is_not_the_character(settings: "CharacterSettings", candidate: bpy.types.Object) -> bool:
+    return candidate != settings.id_data
+
+
+class TakeSettings(bpy.types.PropertyGroup):
+    """What is known of an action that holds a take (``Action.dafnet``); the motion itself is packed
+    into it as well (``takes``).
+    """
+
+    seed: IntProperty(name="Seed", options=set(), description="The seed that it was generated with")
+    lower_seed: IntProperty(
+        name="Legs' Seed", options=set(), description="The seed that its legs were generated with"
+    )
+    temperature: FloatProperty(
+        name="Temperature", options=set(), description="The temperature that it was generated at"
+    )
+    lower_temperature: FloatProperty(
+        name="Legs' Temperature",
+        options=set(),
+        description="The temperature that its legs were generated at",
+    )
+    frame_start: IntProperty(name="Start", options=set(), description="The take's first frame")
+    accepted: BoolProperty(name="Accepted", options=set(), description="Keep this take")
+    ghost: BoolProperty(
+        name="Ghost",
+        options=set(),
+        description="Show this take as a stick figure next to the one that plays",
+    )
+    log_likelihood: FloatProperty(
+        name="Likelihood",
+        options=set(),
+        description=(
+            "How likely the model finds its poses, in nats per frame; higher is more typical"
+        ),
+    )
+    sliding: FloatProperty(
+        name="Sliding", options=set(), description="Sliding feet per frame, 0 to 2"
+    )
+    collisions: FloatProperty(
+        name="Collisions", options=set(), description="Joints that touch furniture, per frame"
+    )
+    miss: FloatProperty(
+        name="Miss",
+        options=set(),
+        subtype="DISTANCE",
+        description="Mean distance of the head and hands from their targets",
+    )
+    jerk: FloatProperty(
+        name="Jerk", options=set(), description="How jerky the motion is, in m/s\u00b3"
+    )
+    raw_sliding: FloatProperty(
+        name="Sliding before",
+        options=set(),
+        description="Sliding feet per frame before the clean-up",
+    )
+    raw_collisions: FloatProperty(
+        name="Collisions before",
+        options=set(),
+        description="Joints that touch furniture, per frame, before the clean-up",
+    )
+    raw_miss: FloatProperty(
+        name="Miss before",
+        options=set(),
+        subtype="DISTANCE",
+        description="Mean distance from the targets before the clean-up",
+    )
+    raw_jerk: FloatProperty(
+        name="Jerk before",
+        options=set(),
+        description="How jerky the motion was before the clean-up",
+    )
+
+
+class TakeLink(bpy.types.PropertyGroup):
+    """A row in a character's list of takes."""
+
+    action: PointerProperty(type=bpy.types.Action, options=set())
+
+
+class CharacterSettings(bpy.types.PropertyGroup):
+    """Settings of one character."""
+
+    mode: EnumProperty(
+        name="Mode",
+        default="FREE",
+        description="What drives the upper body. Keyframe it to change it during the shot",
+        items=[
+            ("FREE", "FREE", "Only the root is given; the whole body follows from it"),
+            (
+                "EE",
+                "EE",
+                "End effectors: the head and hands reach for their targets. Any of the three may "
+                "be left empty",
+            ),
+            (
+                "FULL",
+                "FULL",
+                "The whole upper body is copied from another armature; only the legs are generated",
+            ),
+        ],
+    )
+    furniture: PointerProperty(
+        name="Furniture",
+        type=bpy.types.Collection,
+        options=set(),
+        description=(
+            "Collection of everything the character may touch or must avoid. Leave it empty for a "
+            "bare floor"
+        ),
+    )
+    root: PointerProperty(
+        name="Root",
+        type=bpy.types.Object,
+        poll=_is_not_the_character,
+        options=set(),
+        description="Animated object on the ground under the pelvis: X right, Y forward, Z up",
+    )
+    head: PointerProperty(
+        name="Head",
+        type=bpy.types.Object,
+        poll=_is_not_the_character,
+        options=set(),
+        description=(
+            "Target of the head joint. Once it is rotated, it turns the head as well: Y is where "
+            "the face looks, Z points to the crown"
+        ),
+    )
+    hand_left: PointerProperty(
+        name="Left Hand",
+        type=bpy.types.Object,
+        poll=_is_not_the_character,
+        options=set(),
+        description=(
+            "Target of the left wrist. Once it is rotated, it turns the hand as well: Y points "
+            "along the fingers, Z out of the back of the hand"
+        ),
+    )
+    hand_right: PointerProperty(
+        name="Right Hand",
+        type=bpy.types.Object,
+        poll=_is_not_the_character,
+        options=set(),
+        description=(
+            "Target of the right wrist. Once it is rotated, it turns the hand as well: Y points "
+            "along the fingers, Z out of the back of the hand"
+        ),
+    )
+    upper_body_source: PointerProperty(
+        name="Source",
+        type=bpy.types.Object,
+        poll=_is_armature,
+        options=set(),
+        description=(
+            "Armature whose upper body is copied: another character, or any rig whose bones are "
+            "mapped (see Your Rig)"
+        ),
+    )
+    upper_body_take: PointerProperty(
+        name="Take",
+        type=bpy.types.Action,
+        poll=_is_take,
+        options=set(),
+        description="Take whose upper body is copied when no source armature is chosen",
+    )
+    use_scene_range: BoolProperty(
+        name="Scene Range",
+        default=True,
+        options=set(),
+        description="Generate the frames from the scene's start to its end",
+    )
+    frame_start: IntProperty(
+        name="Start", default=1, options=set(), description="First frame to generate"
+    )
+    frame_end: IntProperty(
+        name="End", default=250, options=set(), description="Last frame to generate"
+    )
+    seed: IntProperty(
+        name="Seed",
+        default=0,
+        min=0,
+        options=set(),
+        description=("Another number gives another take, if the temperature is above zero"),
+    )
+    take_count: IntProperty(
+        name="Takes",
+        default=1,
+        min=1,
+        max=MAX_TAKES,
+        soft_max=16,
+        options=set(),
+        description=(
+            "How many takes to generate at once. Each further take uses the next seed, and "
+            "temperature 1 if the temperature is 0"
+        ),
+    )
+    takes: CollectionProperty(type=TakeLink, options=set(), description="Takes of this character")
+    active_take: IntProperty(
+        name="Take", options=set(), description="The take that the buttons below act on"
+    )
+    blend_frames: IntProperty(
+        name="Blend",
+        default=10,
+        min=0,
+        max=120,
+        options=set(),
+        description="Number of frames over which the body blends into the new mode",
+    )
+    head_influence: FloatProperty(
+        name="Head Influence",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        description=(
+            "How much the head's target counts; at 0 the head is free. Keyframe it to reach for a "
+            "target and to let go of it"
+        ),
+    )
+    hand_left_influence: FloatProperty(
+        name="Left Hand Influence",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        description=(
+            "How much the left hand's target counts; at 0 the hand is free. Keyframe it to reach "
+            "for the target and to let go of it"
+        ),
+    )
+    hand_right_influence: FloatProperty(
+        name="Right Hand Influence",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        description=(
+            "How much the right hand's target counts; at 0 the hand is free. Keyframe it to reach "
+            "for the target and to let go of it"
+        ),
+    )
+    temperature: FloatProperty(
+        name="Temperature",
+        default=0.0,
+        min=0.0,
+        max=2.5,
+        step=10,
+        precision=2,
+        options=set(),
+        description=(
+            "How much takes differ: 0 always gives the same calm take, 1 gives as much variety as "
+            "real motion has, above 2 they become strange"
+        ),
+    )
+    plant_feet: FloatProperty(
+        name="Plant Feet",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        options=set(),
+        description=(
+            "How firmly a standing foot is held in place, so that it does not slide; 0 leaves the "
+            "raw motion"
+        ),
+    )
+    rest_on_seats: FloatProperty(
+        name="Rest on Seats",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        options=set(),
+        description=(
+            "How far a pelvis that has sunk into a seat is lifted out of it; 0 leaves the raw "
+            "motion"
+        ),
+    )
+    reach_targets: FloatProperty(
+        name="Reach Targets",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        options=set(),
+        description=(
+            "How exactly the head and hands are brought onto their targets, as far as arms and "
+            "back allow; 0 leaves the raw motion"
+        ),
+    )
+    clear_furniture: FloatProperty(
+        name="Clear Furniture",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        options=set(),
+        description=(
+            "How far hands and feet that are inside furniture are moved out of it; 0 leaves the "
+            "raw motion"
+        ),
+    )
+    smooth: FloatProperty(
+        name="Smooth",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        options=set(),
+        description=(
+            "How much abrupt changes of the motion are smoothed out, before feet and hands are "
+            "put in place; 0 leaves the raw motion"
+        ),
+    )
+
+
+_GROUPS = (TakeSettings, TakeLink, CharacterSettings)
+
+
+def register() -> None:
+    """Add the settings to every object and every action."""
+    for cls in _GROUPS:
+        bpy.utils.register_class(cls)
+    bpy.types.Object.dafnet = PointerProperty(type=CharacterSettings, name="DAFNet")
+    bpy.types.Action.dafnet = PointerProperty(type=TakeSettings, name="DAFNet")
+    rig_properties.register()
+
+
+def unregister() -> None:
+    """Undo ``register``."""
+    rig_properties.unregister()
+    del bpy.types.Action.dafnet
+    del bpy.types.Object.dafnet
+    for cls in reversed(_GROUPS):
+        bpy.utils.unregister_class(cls)
+
+
+def ensure_registered() -> None:
+    """Register the settings where no add-on has done so, as with the ``bpy`` module outside
+    Blender; undone at exit.
+    """
+    if not hasattr(bpy.types.Object, "dafnet"):
+        register()
+        atexit.register(unregister)

@@ -1,0 +1,373 @@
+"""Keys on a character's root from what the animator has already: a drawn curve, something that
+moves, points on the floor.
+"""
+
+import re
+from collections.abc import Callable, Generator, Sequence
+
+import bpy
+import numpy as np
+
+from ...core.errors import InputError
+from ...core.passage import SatOn, met_along
+from ...core.paths import AFTER_SEAT, Route, Stop, facing, route
+from ...core.progress import stepwise, within
+from ...core.root import forward_of
+from ...core.trails import FASTEST, followed, trail
+from ...director.walks import doubted, ways
+from ..character.armature import is_character, parts_of, sent
+from ..character.settings import Settings, settings_of
+from ..compat import action_curves
+from ..scene.dependencies import Dependencies
+from ..scene.lookup import find_object
+from ..scene.playback import play_steps
+from .root_keys import MOVES, keyable_root, keyed_along, unchanged_on_failure
+from .walking import Start, Walk, extended_to, rest_at, start_of, told_of, walk
+
+__all__ = [
+    "along_curve",
+    "as_moved",
+    "chosen",
+    "floor_points",
+    "is_curve",
+    "may_move",
+    "places_of",
+    "through_points",
+]
+
+_READ = 0.1  # progress when the scene is read
+_FOUND = 0.7  # progress when the way is found
+_SPACING = 0.05  # metres between points on the furniture
+_THERE = 0.1  # metres between a root and the line's beginning that need no walk
+
+
+def is_curve(candidate: bpy.types.Object) -> bool:
+    """Whether it is a curve that was drawn."""
+    return candidate.type == "CURVE"
+
+
+def may_move(candidate: bpy.types.Object) -> bool:
+    """Whether keys, drivers, constraints or a parent may move it."""
+    return bool(
+        any(curve.data_path == "location" for curve in action_curves(candidate))
+        or candidate.parent
+        or candidate.constraints
+        or (
+            candidate.animation_data
+            and (candidate.animation_data.drivers or candidate.animation_data.nla_tracks)
+        )
+    )
+
+
+def chosen(
+    context: bpy.types.Context, fits: Callable[[bpy.types.Object], bool]
+) -> tuple[bpy.types.Object | None, bpy.types.Object | None]:
+    """The character to direct (``armature.sent``), and the active or else the only selected other
+    object that ``fits``.
+    """
+    character = sent(context)[0]
+    if character is None:
+        return None, None
+    parts = parts_of(character)
+    others = [o for o in context.selected_objects if o not in parts and fits(o)]
+    active = context.object
+    return character, active if active in others else others[0] if len(others) == 1 else None
+
+
+def floor_points(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected empties that are not part of a character, in the order of their names; 10 comes
+    after 9.
+    """
+    characters = [o for o in context.scene.objects if is_character(o)]
+    parts = {part for character in characters for part in parts_of(character)}
+    found = [o for o in context.selected_objects if o.type == "EMPTY" and o not in parts]
+    return sorted(
+        found,
+        key=lambda o: [
+            (not t.isdigit(), int(t) if t.isdigit() else 0, t.lower())
+            for t in re.split(r"(\d+)", o.name)
+        ],
+    )
+
+
+def _written(
+    context: bpy.types.Context,
+    settings: Settings,
+    start: Start,
+    walked: Route,
+    end: Sequence[SatOn] | None = None,
+    warnings: Sequence[str] = (),
+) -> Generator[float, None, Walk]:
+    """Key a route over what the root has from its first frame on, and tell what is to be seen to;
+    before that it moves as it did. ``end``: see ``met_along``.
+    """
+    met = yield from within(met_along.steps(start.scene, walked.path, start.fps, end=end), 0.0, 0.9)
+    places = walked.path.position[:, :2]
+    doubt = yield from within(
+        doubted.steps(start.scene.solids, places, start.floor, start.size), 0.9, 1.0
+    )
+    root, first = keyable_root(settings), start.first
+    armature = find_object(settings, settings.armature, "character")
+    with unchanged_on_failure(root):
+        kept = _cut(root, first)
+        keyed_along(context, root, walked, first=first, scale=1.0 / start.unit, fps=start.fps)
+        for curve in action_curves(root):
+            for frame, value in kept.get((curve.data_path, curve.array_index), []):
+                if abs(curve.evaluate(frame) - value) > 1e-5:
+                    curve.keyframe_points.insert(frame, value).interpolation = "LINEAR"
+            curve.update()
+
+    last = first + len(walked.path) - 1
+    extended = extended_to(context.scene, armature, last)
+    told = (*told_of(met, first), *warnings, *([doubt] if doubt else []))
+    return Walk(first, last, extended, told)
+
+
+def _cut(root: bpy.types.Object, first: int) -> dict[tuple[str, int], list[tuple[int, float]]]:
+    """Remove a root's keys from frame ``first`` on; returns by curve the values of the frames after
+    the last key that stays.
+    """
+    kept: dict[tuple[str, int], list[tuple[int, float]]] = {}
+    for curve in action_curves(root):
+        if curve.data_path not in MOVES:
+            continue
+
+        earlier = [point for point in curve.keyframe_points if point.co[0] < first]
+        if earlier:
+            last = earlier[-1]
+            # else the next key would bend what leads to this one
+            last.handle_left_type = last.handle_right_type = "FREE"
+            between = range(int(np.floor(last.co[0])) + 1, first)
+            kept[curve.data_path, curve.array_index] = [
+                (frame, curve.evaluate(frame)) for frame in between
+            ]
+
+        for k in reversed(
+            [k for k, point in enumerate(curve.keyframe_points) if point.co[0] >= first]
+        ):
+            curve.keyframe_points.remove(curve.keyframe_points[k], fast=True)
+
+        curve.update()
+
+    return kept
+
+
+def _line_of(context: bpy.types.Context, curve: bpy.types.Object) -> np.ndarray:
+    """The longest line (N, 3) of a curve as the scene evaluates it, world, Blender units."""
+    if curve.type != "CURVE":
+        raise InputError(f"'{curve.name}' is not a curve; select a Bezier, poly or NURBS curve.")
+
+    evaluated = curve.evaluated_get(context.evaluated_depsgraph_get())
+    lines = _lines(evaluated)
+    if not lines:  # it has a bevel or another surface: the bare line, without its modifiers
+        bare = bpy.data.objects.new(curve.name, curve.data.copy())
+        data = bare.data
+        try:
+            data.bevel_mode, data.bevel_depth, data.extrude, data.bevel_object, data.dimensions = (
+                "ROUND",
+                0.0,
+                0.0,
+                None,
+                "3D",
+            )
+            lines = _lines(bare)
+        finally:
+            bpy.data.objects.remove(bare)
+            bpy.data.curves.remove(data)
+
+    matrix = np.array(evaluated.matrix_world, float)
+    world = [line @ matrix[:3, :3].T + matrix[:3, 3] for line in lines]
+    if not world:
+        raise InputError(f"The curve '{curve.name}' has no line; draw one on the floor.")
+
+    return max(world, key=lambda line: float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()))
+
+
+def _lines(owner: bpy.types.Object) -> list[np.ndarray]:
+    """The chains of edges (N, 3) that a curve is drawn with, in its own space; none where it has
+    faces.
+    """
+    mesh = owner.to_mesh()
+    try:
+        if mesh is None or len(mesh.polygons) or not len(mesh.edges):
+            return []
+
+        flat, edges = np.empty(3 * len(mesh.vertices)), np.empty(2 * len(mesh.edges), int)
+        mesh.vertices.foreach_get("co", flat)
+        mesh.edges.foreach_get("vertices", edges)
+    finally:
+        owner.to_mesh_clear()
+
+    points, pairs = (
+        flat.reshape(-1, 3),
+        {tuple(sorted(pair)) for pair in edges.reshape(-1, 2).tolist()},
+    )
+    lines, start = [], 0
+    for k in range(1, len(points) + 1):
+        if k == len(points) or (k - 1, k) not in pairs:
+            closed = (start, k - 1) in pairs and k - start > 2
+            lines.append(points[[*range(start, k), *([start] if closed else [])]])
+            start = k
+
+    return [line for line in lines if len(line) > 1]
+
+
+@stepwise
+def along_curve(
+    context: bpy.types.Context,
+    armature: bpy.types.Object,
+    curve: bpy.types.Object,
+    *,
+    speed: float = 1.1,
+    seconds: float = 1.0,
+    keep_facing: bool = False,
+    backwards: bool = False,
+) -> Generator[float, None, Walk]:
+    """Let the character walk along a curve from the current frame on, and stand at its end for some
+    ``seconds``.
+
+    Where the root has keys before that, it goes from where it is to the curve first; else the walk
+    begins on the curve. Later keys are replaced. ``keep_facing``: it looks where it looks now all
+    the way. ``backwards``: from the curve's end. ``InputError``: no curve, too short, or the root
+    cannot be keyed; nothing is changed then, nor where the job is closed.
+    """
+    settings, name = settings_of(armature, context.scene), curve.name
+    line = _line_of(context, curve)[:: -1 if backwards else 1]
+    keys = [
+        p.co[0]
+        for c in action_curves(keyable_root(settings))
+        if c.data_path in MOVES
+        for p in c.keyframe_points
+    ]
+    at = yield from within(start_of(context, settings, context.scene.frame_current), 0.0, _READ)
+    points = line[:, :2] * at.unit
+    away = float(np.linalg.norm(points[0] - at.place[:2]))
+    start = None
+    if away < _THERE or (keys and min(keys) < at.first):
+        start = yield from within(rest_at(at), _READ, _READ)
+    if start is not None and away >= _THERE:
+        way = yield from within(_way(at, start, [points[0]]), _READ, _FOUND)
+        points = np.concatenate([way[:-1], points])
+
+    walked = trail(
+        points,
+        start,
+        speed=speed,
+        fps=at.fps,
+        floor=at.floor,
+        yaw=at.yaw if keep_facing else None,
+        seconds=seconds,
+        name=f"curve '{name}'",
+    )
+    return (yield from within(_written(context, settings, at, walked, ()), _FOUND, 1.0))
+
+
+def _way(at: Start, start: Stop, goals: Sequence[np.ndarray]) -> Generator[float, None, np.ndarray]:
+    """Corners (N, 2) of the way round the furniture from ``start`` through the places ``goals``
+    (2,), with these.
+    """
+    forward = forward_of(start.yaw)
+    here = np.array(start.position) + (AFTER_SEAT if start.seated else 0.0) * forward
+    legs = yield from ways.steps(
+        at.scene.solids, [here, *goals], floor=at.floor, size=at.size, spacing=_SPACING
+    )
+    return np.array(
+        [corner for leg, goal in zip(legs, goals, strict=True) for corner in (*leg, goal)]
+    )
+
+
+@stepwise
+def places_of(
+    context: bpy.types.Context, source: bpy.types.Object, frames: Sequence[int]
+) -> Generator[float, None, np.ndarray]:
+    """Where an object is in some rising frames (N, 3), world, Blender units; the current frame
+    stays. ``InputError``: it is deleted while it is looked at.
+    """
+    places: dict[int, tuple[float, ...]] = {}
+
+    def look(frame: int, depsgraph: bpy.types.Depsgraph, _shaped: set[bpy.types.Object]) -> None:
+        places[frame] = tuple(source.evaluated_get(depsgraph).matrix_world.translation)
+
+    simulations = Dependencies(context.scene).simulations([source], shaped=False)
+    try:
+        yield from play_steps(context, frames, simulations, look)
+    except ReferenceError as error:
+        raise InputError("Something was deleted while the scene was read; try again.") from error
+
+    return np.array([places[frame] for frame in frames], float)
+
+
+@stepwise
+def as_moved(
+    context: bpy.types.Context, armature: bpy.types.Object, source: bpy.types.Object
+) -> Generator[float, None, Walk]:
+    """Let the root go where ``source`` goes over the floor, at the same frames: those of its keys,
+    else of the scene's range.
+
+    The root's keys from there on are replaced. ``InputError``: it hardly moves, or the root cannot
+    be keyed; nothing is changed then, nor where the job is closed.
+    """
+    scene, name = context.scene, source.name
+    settings = settings_of(armature, scene)
+    keys = [
+        p.co[0]
+        for c in action_curves(source)
+        if c.data_path == "location"
+        for p in c.keyframe_points
+    ]
+    first, last = (
+        (int(np.floor(min(keys))), int(np.ceil(max(keys))))
+        if keys
+        else (scene.frame_start, scene.frame_end)
+    )
+    moves = places_of.steps(context, source, range(first, last + 1))
+    at = yield from within(start_of(context, settings, first), 0.0, _READ)
+    places = (yield from within(moves, _READ, _FOUND))[:, :2] * at.unit
+    moved = followed(places, at.fps, at.yaw, at.floor)
+    fastest = float(np.linalg.norm(np.diff(moved.path.position, axis=0), axis=1).max() * at.fps)
+    hurried = (
+        f"'{name}' moves at up to {fastest:.1f} m/s, faster than this character can walk; "
+        "slow it down."
+    )
+    warnings = [hurried] if fastest > FASTEST else []
+    written = _written(context, settings, at, moved, None, warnings)
+    return (yield from within(written, _FOUND, 1.0))
+
+
+@stepwise
+def through_points(
+    context: bpy.types.Context,
+    armature: bpy.types.Object,
+    points: list[bpy.types.Object],
+    *,
+    speed: float = 1.1,
+    seconds: float = 1.0,
+    to_cursor: bool = False,
+) -> Generator[float, None, Walk]:
+    """Let the character walk through the places of ``points`` and stand at the last.
+
+    ``to_cursor``: the 3D cursor is the last; it is the only one where there are no points. Goes on
+    from the root's last key, else from the current frame, round the furniture and without rests in
+    between. ``InputError``: no way, or the root cannot be keyed; nothing is changed then, nor where
+    the job is closed.
+    """
+    if not points:
+        return (yield from walk.steps(context, armature, None, seconds, speed))
+
+    settings = settings_of(armature, context.scene)
+    spots = [point.matrix_world.translation for point in points] + [
+        context.scene.cursor.location
+    ] * to_cursor
+    flat = [np.array(spot, float)[:2] for spot in spots]
+    at = yield from within(start_of(context, settings), 0.0, _READ)
+    places = [spot * at.unit for spot in flat]
+    if len(places) > 1 and np.linalg.norm(places[0] - at.place[:2]) < 0.3:
+        del places[0]  # it stands there already
+
+    start = yield from within(rest_at(at), _READ, _READ)
+    way = yield from within(_way(at, start, places), _READ, _FOUND)
+    last = way[-1] - (way[-2] if len(way) > 1 else np.array(start.position))
+    via = [(float(x), float(y)) for x, y in way]
+    goal = Stop(via.pop(), facing(last), seconds)
+    walked = route(start, *via, goal, speed=speed, fps=at.fps, floor=at.floor)
+    return (yield from within(_written(context, settings, at, walked, ()), _FOUND, 1.0))

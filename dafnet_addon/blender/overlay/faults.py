@@ -1,0 +1,104 @@
+"""Where takes are at fault, frame by frame, and the bars that mark it in the timeline."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...core.distance import prepared, scaled
+from ...core.metrics import BAD_COLLISION_JOINTS, bad_collisions, foot_sliding
+from ...core.nearby import REACH_OF_A_BODY, solids_near
+from ...core.occupancy import distance
+from ..character.settings import settings_of
+from ..character.takes import frames_of, stored_take
+from ..scene.scene_reader import read_scene
+
+__all__ = ["FaultBars", "Faults", "fault_bars", "faults_of"]
+
+_SLIDING = (1.0, 0.78, 0.15, 0.45)
+"""Colour of a frame in which one foot slides."""
+_COLLIDING = (1.0, 0.15, 0.15, 0.45)
+"""Colour of a frame in which one joint touches furniture."""
+_STRONGER = 0.25
+"""Opacity that every further fault of the frame adds."""
+
+
+@dataclass(frozen=True)
+class Faults:
+    """Of each frame of a take: ``sliding`` (T,), how many feet slide; ``collisions`` (T,), how many
+    joints touch furniture.
+    """
+
+    sliding: np.ndarray
+    collisions: np.ndarray
+
+
+@dataclass(frozen=True)
+class FaultBars:
+    """Bars over time: ``first`` and ``last`` frame (R,), both marked; ``row`` (R,): 0 sliding, 1
+    collisions; ``colours`` (R, 4).
+    """
+
+    first: np.ndarray
+    last: np.ndarray
+    row: np.ndarray
+    colours: np.ndarray
+
+
+def faults_of(
+    context: bpy.types.Context,
+    armature: bpy.types.Object,
+    actions: Iterable[bpy.types.Action],
+) -> dict[int, Faults]:
+    """Faults of takes by their actions' ``session_uid``, among the furniture as the scene has it in
+    each frame.
+
+    ``InputError`` as for ``read_scene``, and where an action holds no take.
+    """
+    found, scenes = {}, {}
+    for action in actions:
+        take, _ = stored_take(action)
+        first, last = frames = frames_of(action)
+        if frames not in scenes:
+            settings = settings_of(
+                armature, context.scene, frame_start=first, frame_end=last, mode="FREE"
+            )
+            scenes[frames] = read_scene(context, settings).scene
+
+        floor = take.root[:, 2, 3] / take.scale
+        joints = take.joints / take.scale
+        near = solids_near(scenes[frames], take.root[:, :3, 3], REACH_OF_A_BODY, take.scale)
+        solids, _ = prepared(scaled(near, 1.0 / take.scale), float(np.median(floor)))
+        apart = distance(solids, joints[:, list(BAD_COLLISION_JOINTS)], floor)
+        found[action.session_uid] = Faults(
+            foot_sliding(joints, take.fps, floor), bad_collisions(apart)
+        )
+
+    return found
+
+
+def fault_bars(faults: Faults, frame_start: int) -> FaultBars:
+    """A bar for each run of frames with the same number of faults, stronger where there are more.
+
+    ``frame_start``: the take's first frame in the scene.
+    """
+    bars: list[tuple[int, int, int]] = []
+    colours = []
+    for row, (counts, colour) in enumerate(
+        ((faults.sliding, _SLIDING), (faults.collisions, _COLLIDING))
+    ):
+        edges = np.concatenate([[0], np.flatnonzero(np.diff(counts)) + 1, [len(counts)]])
+        for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+            if stop > start and counts[start] > 0:
+                bars.append((frame_start + start, frame_start + stop - 1, row))
+                opacity = colour[3] + _STRONGER * (float(counts[start]) - 1.0)
+                colours.append((*colour[:3], min(1.0, opacity)))
+
+    table = np.array(bars, int).reshape(-1, 3)
+    return FaultBars(
+        first=table[:, 0],
+        last=table[:, 1],
+        row=table[:, 2],
+        colours=np.array(colours).reshape(-1, 4),
+    )

@@ -1,0 +1,243 @@
+"""From the scene to keyframes: the one code path under the operator, the command line and batches.
+
+A job knows objects by name only and looks them up at each stage, since they may be deleted or
+undone while it runs.
+"""
+
+from collections.abc import Callable, Generator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ... import load_weights
+from ...core.cleanup import CleanUp
+from ...core.errors import InputError
+from ...core.generate import Draw, clean_again_steps, takes_steps
+from ...core.progress import run_to_end, stepwise, within
+from ...core.take import Controls, Take
+from ..character.armature import metres_per_unit
+from ..character.settings import CLEAN_UP, Settings, settings_of
+from ..character.takes import add_take, draw_of, play_take, stored_take
+from ..preferences import device_of, weights_path
+from ..scene.lookup import find_action, find_object, find_scene, names_in_use
+from ..scene.scene_reader import read_scene
+from .baker import bake
+from .rollback import state_restorer, undone_on_failure
+
+if TYPE_CHECKING:
+    from ...core.weights import Weights
+
+__all__ = ["Result", "Settings", "clean_again_of", "draws_of", "settings_of", "steps", "run"]
+
+_READ = 0.1
+"""Progress once the scene is read."""
+_GENERATED = 0.95
+"""Progress once the takes are generated."""
+_FURTHER_TAKES = 1.0
+"""Temperature of every take but the first where it is set to 0, at which all would be the same."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """Baked takes of one shot.
+
+    ``actions``: new, the first one played by the armature; ``takes``, ``draws``: of each.
+    ``warnings``: sentences for the user. ``seconds`` by stage: ``reading``, those of
+    ``Take.seconds`` (``conditions``, ``sampling``, …) and ``baking``.
+    """
+
+    actions: tuple[bpy.types.Action, ...]
+    takes: tuple[Take, ...]
+    draws: tuple[Draw, ...]
+    warnings: tuple[str, ...]
+    seconds: dict[str, float]
+
+    @property
+    def action(self) -> bpy.types.Action:
+        """The first take's action."""
+        return self.actions[0]
+
+    @property
+    def take(self) -> Take:
+        """The first take."""
+        return self.takes[0]
+
+
+def draws_of(settings: Settings) -> list[Draw]:
+    """The seeds and temperatures of the takes: each further one has the next seed."""
+    first = Draw(
+        settings.seed, settings.lower_seed, settings.temperature, settings.lower_temperature
+    )
+    further = settings.temperature or _FURTHER_TAKES
+    return [first, *(Draw(settings.seed + k, None, further) for k in range(1, settings.take_count))]
+
+
+def _clean_up(settings: Settings) -> CleanUp:
+    return CleanUp(**{strength: getattr(settings, name) for name, strength in CLEAN_UP.items()})
+
+
+@stepwise
+def run(
+    context: bpy.types.Context,
+    settings: Settings,
+    weights: "Weights | None" = None,
+    watch: Callable[[int, np.ndarray], None] | None = None,
+) -> Generator[float, None, Result]:
+    """Read the scene, generate, bake; yields progress in [0, 1] and returns the ``Result``.
+
+    ``settings`` comes from ``settings_of(armature, scene, **overrides)``. Without ``weights`` those
+    of the preferences, else the shipped ones, are loaded. ``watch``: see ``takes_steps``. The
+    current frame is as it was at every yield (but see ``read_scene`` for simulations). Any error
+    (``InputError``, ``WeightsError`` or whatever else), and ``close()``, leaves the scene as it
+    was.
+    """
+    if weights is None:
+        weights = load_weights(weights_path(context))
+
+    started = perf_counter()
+    used = names_in_use(settings)
+    resume, resume_frame = _kept_take(settings)
+    try:
+        read = yield from within(read_scene.steps(context, settings), 0.0, _READ)
+    except ReferenceError as error:
+        raise InputError(
+            "Something was deleted while the scene was read; generate again."
+        ) from error
+
+    seconds = {"reading": perf_counter() - started}
+
+    draws = draws_of(settings)
+    takes = yield from within(
+        takes_steps(
+            read.scene,
+            read.controls,
+            weights,
+            draws,
+            resume=resume,
+            resume_frame=resume_frame,
+            device=device_of(context),
+            clean_up=_clean_up(settings),
+            watch=watch,
+        ),
+        _READ,
+        _GENERATED,
+    )
+
+    started = perf_counter()
+    if gone := used - names_in_use(settings):
+        raise InputError(f"'{min(gone)}' is no longer in the scene; generate again.")
+
+    actions = yield from within(_bake_steps(settings, takes, read.controls, draws), _GENERATED, 1.0)
+    seconds |= takes[0].seconds | {"fitting": sum(take.seconds["fitting"] for take in takes)}
+    seconds["baking"] = perf_counter() - started
+    yield 1.0
+    return Result(
+        actions=tuple(actions),
+        takes=tuple(takes),
+        draws=tuple(draws),
+        warnings=read.warnings + takes[0].warnings,
+        seconds=seconds,
+    )
+
+
+steps = run.steps
+
+
+def _kept_take(settings: Settings) -> tuple[Take | None, int]:
+    """The take of which a part is kept, and its first frame to generate anew; None and 0 where none
+    is kept.
+    """
+    if settings.kept is None:
+        return None, 0
+
+    action = find_action(settings.kept)
+    take, _ = stored_take(action)
+    index = settings.kept_until - settings.frame_start
+    if action.dafnet.frame_start != settings.frame_start:
+        raise InputError(
+            f"The take '{action.name}' begins at another frame than the range; let the range "
+            "start there."
+        )
+
+    render = find_scene(settings).render
+    if not 0.0 < index * render.fps_base / render.fps < len(take) / take.fps:
+        raise InputError(
+            f"Frame {settings.kept_until} is not inside the take '{action.name}'; go to a "
+            "frame in it."
+        )
+
+    return take, index
+
+
+def _bake_steps(
+    settings: Settings, takes: list[Take], controls: Controls, draws: list[Draw]
+) -> Generator[float, None, list[bpy.types.Action]]:
+    """An action for each take, listed; the first one plays. All are made, or none: whatever stops
+    it, nothing has changed.
+    """
+    names: list[str] = []
+    with ExitStack() as undo:
+        undo.callback(_unbake, settings, names, state_restorer(_character(settings)))
+        for take, draw in zip(takes, draws, strict=True):
+            armature = _character(settings)
+            with undone_on_failure(armature):
+                unit = metres_per_unit(find_scene(settings))
+                start = settings.frame_start
+                action = bake(take, armature, start, name=f"{armature.name} take", unit=unit)
+                add_take(
+                    armature, action, take=take, controls=controls, draw=draw, frame_start=start
+                )
+                names.append(action.name_full)
+            if len(names) < len(takes):
+                yield len(names) / len(takes)
+
+        actions = [find_action(name) for name in names]
+        play_take(armature, actions[0])
+        undo.pop_all()
+
+    return actions
+
+
+def _character(settings: Settings) -> bpy.types.Object:
+    return find_object(settings, settings.armature, "character")
+
+
+def _unbake(
+    settings: Settings, names: list[str], restore: Callable[[bpy.types.Object], None]
+) -> None:
+    """Give the character its state back if it is there, and remove the actions of these names."""
+    for armature in (o for o in bpy.data.objects if o.name_full == settings.armature):
+        restore(armature)
+    for action in [action for action in bpy.data.actions if action.name_full in names]:
+        bpy.data.actions.remove(action)
+
+
+def clean_again_of(
+    context: bpy.types.Context, armature: bpy.types.Object, action: bpy.types.Action
+) -> Result:
+    """The take of ``action`` with the character's present clean-up as a new action, without
+    sampling again.
+
+    Targets, root and mode count as they were when it was generated, furniture as it is now.
+    ``InputError`` as for ``steps``, and where the action holds no take; nothing is changed then.
+    """
+    take, controls = stored_take(action)
+    start = action.dafnet.frame_start
+    settings = settings_of(
+        armature, context.scene, frame_start=start, frame_end=start + len(take) - 1, mode="FREE"
+    )
+    read = read_scene(context, settings)
+    again = run_to_end(clean_again_steps(read.scene, controls, take, _clean_up(settings)))
+    draw = draw_of(action)
+    actions = run_to_end(_bake_steps(settings, [again], controls, [draw]))
+    return Result(
+        actions=tuple(actions),
+        takes=(again,),
+        draws=(draw,),
+        warnings=again.warnings,
+        seconds=again.seconds,
+    )

@@ -1,0 +1,1 @@
+"""The scene as plain arrays: what is in it, what it follows, how it plays."""

@@ -1,0 +1,76 @@
+"""What the settings name, found again in the file: a job keeps names, since objects may be deleted,
+or replaced by an undo, while it runs.
+"""
+
+import bpy
+
+from ...core.errors import InputError
+from ..character.settings import Settings
+
+__all__ = ["find_action", "find_collection", "find_object", "find_scene", "names_in_use"]
+
+
+def find_scene(settings: Settings) -> bpy.types.Scene:
+    """The scene of the settings; ``InputError`` where it is gone."""
+    scene = next((s for s in bpy.data.scenes if s.name_full == settings.scene), None)
+    if scene is None:
+        raise InputError(
+            f"The scene '{settings.scene}' is no longer in this file; generate again from another."
+        )
+    return scene
+
+
+def find_object(settings: Settings, name: str, role: str) -> bpy.types.Object:
+    """The scene's object of this ``name_full``; ``role`` says in the ``InputError`` what it was
+    for.
+
+    An object that was deleted in the scene may live on in the file as long as a property names it:
+    it counts as gone.
+    """
+    found = next((o for o in find_scene(settings).objects if o.name_full == name), None)
+    if found is None:
+        raise InputError(
+            f"The {role} '{name}' is not in the scene; choose another one in the DAFNet panel."
+        )
+    return found
+
+
+def find_action(name: str) -> bpy.types.Action:
+    """The action of this ``name_full``; ``InputError`` where it is gone."""
+    found = next((a for a in bpy.data.actions if a.name_full == name), None)
+    if found is None:
+        raise InputError(
+            f"The take '{name}' is no longer in this file; choose another one in the list."
+        )
+    return found
+
+
+def find_collection(name: str) -> bpy.types.Collection:
+    """The collection of this ``name_full``; ``InputError`` where it is gone."""
+    found = next((c for c in bpy.data.collections if c.name_full == name), None)
+    if found is None:
+        raise InputError(
+            f"The furniture collection '{name}' is not in this file; choose another in the DAFNet "
+            "panel."
+        )
+    return found
+
+
+def names_in_use(settings: Settings) -> set[str]:
+    """Names of all that a generation with these settings uses and that is there: objects,
+    furniture, its collection.
+    """
+    named = {
+        settings.armature,
+        settings.root,
+        settings.head,
+        settings.hand_left,
+        settings.hand_right,
+    }
+    named.add(settings.upper_body_source)
+    used = {o.name_full for o in find_scene(settings).objects if o.name_full in named}
+    for collection in bpy.data.collections:
+        if collection.name_full == settings.furniture:
+            used |= {collection.name_full, *(o.name_full for o in collection.all_objects)}
+
+    return used

@@ -1,0 +1,478 @@
+"""The scene as plain arrays: evaluated furniture, the root, targets, mode and source pose, frame by
+frame, in metres.
+
+One unit of Blender is ``metres_per_unit`` metres; everything that the core gets is in metres. The
+evaluated scene is read, so keys, constraints, drivers, modifiers and instances all count; what is
+hidden in the viewport does not exist.
+"""
+
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...core.errors import InputError
+from ...core.progress import stepwise
+from ...core.root import (
+    POSITION_SIGMA,
+    YAW_SIGMA,
+    root_from_joints,
+    root_from_matrices,
+    smoothed,
+    to_root,
+    to_world,
+)
+from ...core.rotations import normalised
+from ...core.series import MODEL_FPS
+from ...core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
+from ...core.solids import Scene
+from ...core.take import Controls
+from ..character.armature import is_character, metres_per_unit
+from ..character.mannequin import FACING
+from ..character.settings import Settings
+from ..character.takes import stored_take
+from ..compat import action_curves
+from ..pipeline.baker import has_bone_overrides, require_bakeable
+from ..rig.maps import RigMap, required
+from ..rig.properties import map_of
+from ..rig.reading import joints_of, pose_matrices
+from .dependencies import Dependencies, Simulation
+from .furniture import Furniture, array, furniture_of
+from .lookup import find_action, find_object, find_scene
+from .playback import play_steps
+
+__all__ = ["ReadScene", "read_scene"]
+
+_UNTURNED = np.radians(0.1)
+"""Radians of rotation up to which a target counts as not turned."""
+_LIMB_TOLERANCE = 8.0
+"""Degrees in the mean that limbs of a copied upper body may be off before the user is warned."""
+_TARGETS = {
+    "head": "head target",
+    "hand_left": "left hand target",
+    "hand_right": "right hand target",
+}
+
+
+@dataclass(frozen=True)
+class ReadScene:
+    """What generation needs: the furniture, the controls at the scene's frame rate, and sentences
+    for the user.
+    """
+
+    scene: Scene
+    controls: Controls
+    warnings: tuple[str, ...]
+
+
+@stepwise
+def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[float, None, ReadScene]:
+    """Read the scene; yields progress in [0, 1], at which the current frame is as it was.
+
+    Only where a simulation that is not baked moves what is read, the frames run on in order from
+    the simulation's start, and the current one comes back at the end, also of a generator that is
+    closed.
+
+    Furniture: every mesh of the collection and of the collections in it, as the viewport evaluates
+    it at the first frame, with its matrix for each frame if it moves; shapes that change over time
+    are warned about. The character, whatever follows it in any way, the root and the targets are
+    never furniture, nor are helpers: see ``furniture``.
+
+    Targets: the empties' places. Their rotations count where they are keyed, or where a target was
+    ever turned in its parent's space; a target that was only moved leaves head and hands free to
+    turn.
+
+    Upper body: the source's bones, carried from the source's root onto this character's and to its
+    size. The source is another character or any rig whose bones are known
+    (``rig.properties.map_of``). Its root is its object if it is one of our characters, else it is
+    found from hips and shoulders.
+
+    ``InputError``: something that is needed is missing, gone, linked, empty or not a number, or
+    follows the character itself.
+    """
+    scene = find_scene(settings)
+    if context.scene != scene:
+        raise InputError(
+            f"The scene '{settings.scene}' is not the active one; make it active and generate "
+            "again."
+        )
+
+    if scene.render.frame_map_old != scene.render.frame_map_new:
+        raise InputError(
+            f"The scene '{settings.scene}' uses time stretching; set it back to 100 : 100."
+        )
+
+    unit = metres_per_unit(scene)
+    armature = find_object(settings, settings.armature, "character")
+    size = require_bakeable(armature, unit)
+
+    if settings.root is None:
+        raise InputError(
+            f"The character '{armature.name}' has no root; choose its root object in the DAFNet "
+            "panel."
+        )
+
+    root = find_object(settings, settings.root, "root")
+    names = {role: name for role in _TARGETS if (name := getattr(settings, role))}
+    targets = {role: find_object(settings, name, _TARGETS[role]) for role, name in names.items()}
+
+    source, source_map = _upper_body_source(settings, armature)
+    places = [source_map.place(name) if source_map else name for name in JOINTS]
+
+    dependencies = Dependencies(scene)
+    leading = {f"root '{root.name}'": root}
+    leading |= {f"{_TARGETS[role]} '{target.name}'": target for role, target in targets.items()}
+    _require_independent(dependencies, armature, leading)
+
+    furniture = furniture_of(settings, dependencies)
+    sources, members = [source] if source else [], furniture.members if furniture else set()
+    frames = range(settings.frame_start, settings.frame_end + 1)
+    simulations = dependencies.simulations([root, *targets.values(), *members], shaped=False)
+    simulations += dependencies.simulations(sources)
+    # it has a shape by then
+    simulations += [each for each in dependencies.simulations(members) if each.since < frames[0]]
+    tracks = _Tracks(armature, root=root, targets=targets, source=source, places=places)
+
+    def look(frame: int, depsgraph: bpy.types.Depsgraph, shaped: set[bpy.types.Object]) -> None:
+        if frame == frames[0]:
+            _require_alive(depsgraph, [armature, root, *targets.values(), *sources])
+        if furniture and frame == frames[0]:
+            furniture.begin(depsgraph)
+        elif furniture:
+            furniture.add(depsgraph, shaped)
+        tracks.add(depsgraph)
+
+    yield from play_steps(context, frames, simulations, look)
+
+    modes = [settings.mode] * len(frames) if settings.mode else tracks.modes
+    warnings = tuple(_warnings(armature, furniture, dependencies, simulations))
+    fps = scene.render.fps / scene.render.fps_base
+    root_matrices = _rigid(np.array(tracks.root), unit, f"root '{root.name}'")
+
+    given: dict[str, Any] = {}
+    for role, target in targets.items():
+        matrices = _rigid(np.array(tracks.targets[role]), unit, f"{_TARGETS[role]} '{target.name}'")
+        given[role] = matrices[:, :3, 3]
+        if _is_turned(target, np.array(tracks.local[role])):
+            given[f"{role}_rotation"] = matrices[:, :3, :3]
+
+    if source and "FULL" in modes:
+        if dependencies.follows(source, armature):
+            raise InputError(
+                f"The upper body's source '{source.name}' follows the character itself; mute what "
+                "links the two."
+            )
+
+        bones, bodies = np.array(tracks.bones), np.array(tracks.bodies)
+        given["upper_body"], off = _upper_body_of_source(
+            source,
+            source_map,
+            bones=bones,
+            bodies=bodies,
+            unit=unit,
+            root=root_matrices,
+            size=size,
+            fps=fps,
+        )
+        if off:
+            warnings += (f"'{source.name}' is copied, but {off}; check its bones in Your Rig.",)
+    elif settings.upper_body_take and "FULL" in modes:
+        given["upper_body"] = _upper_body_of_take(
+            settings,
+            full=np.array([mode == "FULL" for mode in modes]),
+            root=root_matrices,
+            size=size,
+            fps=fps,
+        )
+    elif "FULL" in modes:
+        raise InputError(
+            f"The mode of '{armature.name}' is FULL but no source is set; choose one to copy from."
+        )
+
+    for role in targets:
+        if min(tracks.influences[role]) < 1.0:
+            given[f"{role}_influence"] = np.array(tracks.influences[role])
+
+    mode = modes[0] if len(set(modes)) == 1 else tuple(modes)
+    controls = Controls(
+        fps=fps,
+        root=root_matrices,
+        mode=mode,
+        blend=settings.blend_frames / fps,
+        scale=size,
+        **given,
+    )
+
+    solids = furniture.solids(unit) if furniture else ()
+    yield 1.0
+    return ReadScene(Scene(solids), controls, warnings)
+
+
+class _Tracks:
+    """What is read of a character and of what leads it, frame by frame; matrices (4, 4) in Blender
+    units.
+    """
+
+    def __init__(
+        self,
+        armature: bpy.types.Object,
+        root: bpy.types.Object,
+        targets: dict[str, bpy.types.Object],
+        source: bpy.types.Object | None,
+        places: list[str | None],
+    ) -> None:
+        self._armature = armature
+        self._root = root
+        self._targets = targets
+        self._source = source
+        self._places = places
+
+        self.modes: list[str] = []
+        self.influences: dict[str, list[float]] = {role: [] for role in targets}
+        self.root: list[np.ndarray] = []
+        self.targets: dict[str, list[np.ndarray]] = {role: [] for role in targets}
+        self.local: dict[str, list[np.ndarray]] = {role: [] for role in targets}
+        self.bodies: list[np.ndarray] = []
+        self.bones: list[np.ndarray] = []
+
+    def add(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Note the frame that the scene shows now."""
+        own = self._armature.dafnet
+        self.modes.append(own.mode)
+        self.root.append(array(self._root.evaluated_get(depsgraph).matrix_world))
+        for role, target in self._targets.items():
+            evaluated = target.evaluated_get(depsgraph)
+            self.influences[role].append(getattr(own, f"{role}_influence"))
+            self.targets[role].append(array(evaluated.matrix_world))
+            self.local[role].append(array(evaluated.matrix_local))
+
+        if self._source:
+            evaluated = self._source.evaluated_get(depsgraph)
+            self.bodies.append(array(evaluated.matrix_world))
+            self.bones.append(pose_matrices(evaluated, self._places))
+
+
+def _require_independent(
+    dependencies: Dependencies,
+    armature: bpy.types.Object,
+    leading: dict[str, bpy.types.Object],
+) -> None:
+    """What leads the character must not follow it, nor be pushed by it, or each take would change
+    the next.
+    """
+    if dependencies.setting_follows(armature, "dafnet.", armature):
+        raise InputError(
+            f"A driver of the mode or an influence of '{armature.name}' reads the character "
+            "itself; remove the driver."
+        )
+
+    for what, leader in leading.items():
+        if dependencies.follows(leader, armature, shaped=False):
+            raise InputError(
+                f"The {what} follows the character itself; let it follow something else."
+            )
+        for simulation in dependencies.simulations([leader], shaped=False):
+            if _may_push(simulation, dependencies, armature):
+                raise InputError(
+                    f"The character itself may push '{simulation.name}', which moves the {what}; "
+                    "bake the simulation first."
+                )
+
+
+def _may_push(
+    simulation: Simulation, dependencies: Dependencies, armature: bpy.types.Object
+) -> bool:
+    return any(dependencies.follows(each, armature) for each in simulation.colliders)
+
+
+def _require_alive(depsgraph: bpy.types.Depsgraph, needed: list[bpy.types.Object]) -> None:
+    """Blender does not move objects that are disabled in viewports; those hidden with H it does."""
+    alive = {each.original for each in depsgraph.ids}
+    for each in needed:
+        if each not in alive:
+            raise InputError(
+                f"'{each.name}' or its collection is disabled in viewports; enable it, or hide it "
+                "with H."
+            )
+
+
+def _warnings(
+    armature: bpy.types.Object,
+    furniture: Furniture | None,
+    dependencies: Dependencies,
+    simulations: list[Simulation],
+) -> Iterator[str]:
+    """Warnings about what can be used, but probably not as it was meant."""
+    if has_bone_overrides(armature):
+        yield (
+            f"Bones of '{armature.name}' have constraints or drivers, which change the take; mute "
+            "them to see it as generated."
+        )
+
+    if furniture:
+        yield from furniture.warnings()
+
+    pushed = (
+        simulation.name
+        for simulation in simulations
+        if _may_push(simulation, dependencies, armature)
+    )
+    for name in dict.fromkeys(pushed):
+        yield (
+            f"The character itself may push '{name}', so each take would change the next; bake "
+            "the simulation first."
+        )
+
+
+def _rigid(matrices: np.ndarray, unit: float, what: str) -> np.ndarray:
+    """Matrices (T, 4, 4) in metres, without scale and shear: the y axis stays as it is, z and then
+    x are made orthogonal to it.
+    """
+    if not np.isfinite(matrices).all():
+        raise InputError(
+            f"The {what} has a transform that is not a number; clear its transform or fix what "
+            "drives it."
+        )
+
+    length = np.linalg.norm(matrices[:, :3, :3], axis=1, keepdims=True)
+    if (length < 1e-9).any():
+        raise InputError(f"The {what} is scaled to zero; give it a scale.")
+
+    out = matrices.copy()
+    out[:, :3, :3] /= length
+    y, z = out[:, :3, 1], out[:, :3, 2]
+    out[:, :3, 2] = normalised(z - (y * z).sum(axis=1, keepdims=True) * y)
+    out[:, :3, 0] = np.cross(out[:, :3, 1], out[:, :3, 2])
+    out[:, :3, 3] *= unit
+    return out
+
+
+def _is_turned(target: bpy.types.Object, local: np.ndarray) -> bool:
+    """Whether a target's rotation is meant to count: it is keyed, or differs from its parent's."""
+    if any("rotation" in curve.data_path for curve in action_curves(target)):
+        return True
+    axes = local[:, :3, :3] / np.maximum(
+        np.linalg.norm(local[:, :3, :3], axis=1, keepdims=True), 1e-9
+    )
+    return bool(np.abs(axes - np.eye(3)).max() > _UNTURNED)
+
+
+def _upper_body_source(
+    settings: Settings,
+    armature: bpy.types.Object,
+) -> tuple[bpy.types.Object | None, RigMap | None]:
+    """The upper body's source, and which of its bones are which joints if it is not one of our
+    characters.
+    """
+    if settings.upper_body_source is None:
+        return None, None
+
+    source = find_object(settings, settings.upper_body_source, "upper body's source")
+    if source.type != "ARMATURE" or source == armature:
+        raise InputError(
+            f"'{source.name}' cannot be the upper body's source; choose another armature."
+        )
+    if is_character(source):
+        return source, None
+
+    rig_map = map_of(source)
+    required(source, rig_map)
+    return source, rig_map
+
+
+def _upper_body_of_take(
+    settings: Settings, *, full: np.ndarray, root: np.ndarray, size: float, fps: float
+) -> np.ndarray:
+    """Upper body (T, 14, 3) of the chosen take, frame by frame of the scene, on this character's
+    root and of its ``size``.
+
+    ``InputError``: it is of another frame rate, or does not cover the frames that are ``full``
+    (T,).
+    """
+    action = find_action(settings.upper_body_take or "")
+    take, _ = stored_take(action)
+    if abs(take.fps - fps) > 1e-3:
+        raise InputError(
+            f"The take '{action.name}' has {take.fps:g} frames per second, the scene {fps:g}; "
+            "generate it again."
+        )
+
+    at = np.arange(len(full)) + settings.frame_start - action.dafnet.frame_start
+    if ((at < 0) | (at >= len(take)))[full].any():
+        raise InputError(
+            f"The take '{action.name}' does not cover all frames whose mode is FULL; choose a "
+            "longer take."
+        )
+
+    at = np.clip(at, 0, len(take) - 1)
+    path, _ = root_from_matrices(take.root[at])
+    local = size / take.scale * to_root(path, take.joints[at][:, list(UPPER)])
+    return _on_root(root, fps, local)
+
+
+def _on_root(root: np.ndarray, fps: float, local: np.ndarray) -> np.ndarray:
+    """Points (T, N, 3) of a root's frames in the world, that root being this character's, ``root``
+    (T, 4, 4).
+    """
+    return to_world(
+        smoothed(
+            root_from_matrices(root)[0],
+            POSITION_SIGMA * fps / MODEL_FPS,
+            YAW_SIGMA * fps / MODEL_FPS,
+        ),
+        local,
+    )
+
+
+def _upper_body_of_source(
+    source: bpy.types.Object,
+    rig_map: RigMap | None,
+    *,
+    bones: np.ndarray,
+    bodies: np.ndarray,
+    unit: float,
+    root: np.ndarray,
+    size: float,
+    fps: float,
+) -> tuple[np.ndarray, str]:
+    """Upper body (T, 14, 3), world metres, on this character's ``root`` (T, 4, 4) and of its
+    ``size``; and which limbs are off by how much, in words, empty where none is.
+
+    ``bones`` (T, 22, 4, 4): the source's bones in its own space; ``bodies`` (T, 4, 4): its object's
+    matrices; both in Blender units.
+    """
+    what = f"upper body's source '{source.name}'"
+    there = np.array([rig_map is None or rig_map.place(name) is not None for name in JOINTS])
+    if not np.isfinite(bones[:, there]).all() or not np.isfinite(bodies).all():
+        raise InputError(
+            f"The {what} has a transform that is not a number; clear its transform or fix what "
+            "drives it."
+        )
+
+    off: dict[str, float] = {}
+    if rig_map is None:
+        joints = unit * (bodies[:, None] @ bones)[..., :3, 3]
+    else:
+        joints, off = joints_of(source, rig_map, bodies=bodies, poses=bones, size=size / unit)
+        joints = unit * joints
+
+    if rig_map is None and source.dafnet.root:
+        frames = _rigid(bodies, unit, what)
+        frames[:, :3, :3] = frames[:, :3, :3] @ FACING
+        path, _ = root_from_matrices(frames)
+    else:
+        path = root_from_joints(joints, floor=float(unit * bodies[0, 2, 3]))
+
+    offsets = joints[:, 1:] - joints[:, list(PARENTS[1:])]
+    upper = [j - 1 for j in UPPER[1:]]
+    lengths = np.linalg.norm(offsets[:, upper], axis=-1).mean(axis=0).sum()
+    ratio = size * np.linalg.norm(OFFSETS[1:][upper], axis=-1).sum() / lengths
+    far = ", ".join(
+        f"the {limb} by {degrees:.0f} degrees"
+        for limb, degrees in off.items()
+        if degrees > _LIMB_TOLERANCE
+    )
+    local = ratio * to_root(path, joints[:, list(UPPER)])
+    return _on_root(root, fps, local), f"{far} off" if far else ""

@@ -1,0 +1,1 @@
+"""Example scenes, the demo's room, and pictures of them."""
