@@ -22,8 +22,8 @@ import bpy
 from math import pi
 from mathutils import Matrix
 import numpy as np
-from dafnet_addon.blender.armature import create_character
-from dafnet_addon.blender.properties import ensure_registered
+from dafnet_addon.blender.character.armature import create_character
+from dafnet_addon.blender.character.properties import ensure_registered
 from dafnet_addon.core.paths import Stop, route
 
 bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
