@@ -1,7 +1,7 @@
 """What each addition to the paper's model gives: narrow models, trained alike but for one thing,
 measured on held-out clips.
 
-    dafnet bench ablation DATASET FOLDER -o RUNS --minutes 5 [--from WEIGHTS]
+    dafnet bench ablation DATASET FOLDER -o RUNS --minutes 5 [--from WEIGHTS] [--only VARIANT …]
 
 ``DATASET`` is made by ``dafnet prepare``, ``FOLDER`` holds its motion files. Every variant gets the
 same minutes, seeds and predictor; what is finished is kept. Writes ``ablation.md`` and
@@ -59,6 +59,9 @@ VARIANTS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"ahead": 0, "shared_encoder": False, "mask": False},
         {"free_run": 0.0, "dropout_windows": 1.0},
     ),
+    "six coupling layers a part": ({"steps_upper": 6, "steps_lower": 6}, {}),
+    "batches of 50": ({}, {"batch": 50}),
+    "Noam's schedule": ({}, {"noam": True, "cool_down": 0.0}),
 }
 FIGURES = (
     "sits_within_6cm",
@@ -286,6 +289,9 @@ def main(arguments: Sequence[str]) -> str:
     )
     parser.add_argument("--from", dest="begin_with", type=Path, metavar="WEIGHTS")
     parser.add_argument(
+        "--only", nargs="+", choices=tuple(VARIANTS), default=tuple(VARIANTS), metavar="VARIANT"
+    )
+    parser.add_argument(
         "--furniture", type=Path, metavar="LIBRARY", help="measure what its real pieces give"
     )
     options = parser.parse_args(arguments)
@@ -312,7 +318,8 @@ def main(arguments: Sequence[str]) -> str:
 
     results: dict[str, dict[str, Any]] = {}
     for name, (changed, _) in VARIANTS.items():
-        if begin_with is not None and changed.keys() & {"shared_encoder", "mask"}:
+        resized = changed.keys() & {"shared_encoder", "mask", "steps_upper", "steps_lower"}
+        if name not in options.only or (begin_with is not None and resized):
             continue
 
         predictor = checkpoint_file(first, "predictor")

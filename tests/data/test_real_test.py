@@ -35,6 +35,12 @@ def test_who_chooses_and_who_tells_are_apart(role: str) -> None:
     assert pieces.isdisjoint(row[0] for clip in others for row in clip["rows"])
 
 
+def test_what_two_makers_made_together_is_held_out_with_either() -> None:
+    assert role_of_maker("Ann & Jay-Artist") == role_of_maker("Jay-Artist & Ann") == "choose"
+    assert role_of_maker("Kator Legaz & Ann") == "tell"
+    assert role_of_maker("Ann & Bob") == "train"
+
+
 def test_pieces_are_at_their_true_size() -> None:
     for clip in FROZEN:
         assert all(abs(row[4] - 1.0) <= 0.05 for row in clip["rows"])

@@ -37,8 +37,9 @@ def role_of_body(source: str, subject: str) -> str:
 
 def role_of_maker(maker: str) -> str:
     """ "train", "choose" or "tell": pieces of one maker resemble each other, so makers are held out
-    whole.
+    whole, with what they made together with others ("Ann & Bob").
     """
-    if maker in _TELLING_MAKERS:
+    makers = set(maker.split(" & "))
+    if makers & _TELLING_MAKERS:
         return "tell"
-    return "choose" if maker in _CHOOSING_MAKERS else "train"
+    return "choose" if makers & _CHOOSING_MAKERS else "train"
