@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 from dafnet_addon.cli import main
+from dafnet_addon.commands import COMMANDS
 from dafnet_addon.core.weights import load_weights
+from kit.places import ROOT
 
 
 def test_wrong_command_lines_return_2_and_help_returns_0(
@@ -38,3 +40,9 @@ def test_info_says_what_a_file_is(capsys: pytest.CaptureFixture[str]) -> None:
     assert described["parameters"] == sum(tensor.size for tensor in weights.tensors.values())
     assert main(["info", str(weights.path)]) == 0
     assert f"parameters: {described['parameters']}" in capsys.readouterr().out
+
+
+def test_every_command_is_a_file_of_its_name() -> None:
+    names = {command.name for command in COMMANDS}
+    files = {file.stem for file in (ROOT / "dafnet_addon" / "commands").glob("*.py")}
+    assert files - {"__init__", "command", "console"} == names

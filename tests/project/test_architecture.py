@@ -211,7 +211,8 @@ LAYERS = {
     "baselines": {"core", "data", "model", "training"},
     "demo": {"core"},
     "blender": {"core", "director", "demo"},
-    "cli": {"core", "data", "training", "baselines", "blender"},
+    "commands": {"core", "data", "training", "baselines", "blender"},
+    "cli": {"core", "commands"},
     "__main__": {"core", "cli"},
     "__init__": {"core"},
 }

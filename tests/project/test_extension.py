@@ -31,6 +31,7 @@ SHIPPED = {
     "docs",
 }
 LEFT_OUT = {"model", "data", "training", "baselines"}
+PACKAGES = ("core", "director", "blender", "commands")
 
 LIFE = """
 import os, sys, bpy, addon_utils
@@ -98,7 +99,7 @@ def test_the_zip_holds_what_an_animator_needs(zipped: Path) -> None:
             path for path in (ROOT / "dafnet_addon/blender" / folder).iterdir() if path.is_file()
         }
         assert files and {str(path.relative_to(ROOT)) for path in files} <= shipped
-    for package in ("dafnet_addon/core", "dafnet_addon/blender", "operators", "panels"):
+    for package in (*(f"dafnet_addon/{part}" for part in PACKAGES), "operators", "panels"):
         assert {str(path.relative_to(ROOT)) for path in (ROOT / package).rglob("*.py")} <= shipped
     assert any(name.parts[0] == "weights_stub" and name.suffix == ".safetensors" for name in names)
 

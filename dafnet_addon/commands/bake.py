@@ -1,0 +1,148 @@
+"""``dafnet bake``: motion for the character of a .blend file, without a window."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ..core.take import MODES
+from ..core.text import printable
+from .command import Command, Progress, Result, add_noise, add_weights, frame_range, number
+from .console import MAX_SHOWN
+
+__all__ = ["COMMAND"]
+
+_OBJECTS = {
+    "root": "root",
+    "furniture": "furniture",
+    "head": "head",
+    "hand-left": "hand_left",
+    "hand-right": "hand_right",
+    "upper-body": "upper_body_source",
+}
+"""Options that name an object or a collection, and the character's settings that they override."""
+
+_SHARES = {
+    "plant-feet": "0 leaves the feet as generated, 1 holds standing feet in place",
+    "rest-on-seats": (
+        "0 leaves the body as generated, 1 lifts it out of a seat that it has sunk into"
+    ),
+    "reach-targets": "0 leaves head and hands as generated, 1 puts them onto their targets",
+    "clear-furniture": "0 leaves hands and feet as generated, 1 moves them out of furniture",
+    "smooth": "0 leaves the motion as generated, 1 smooths out abrupt changes",
+}
+"""Options of the clean-up, each from 0 to 1, and what they do."""
+
+_SETTINGS = (
+    *_OBJECTS.values(),
+    "mode",
+    "temperature",
+    "seed",
+    *(name.replace("-", "_") for name in _SHARES),
+)
+"""The character's settings that the command may override, each by the option of its name."""
+
+
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
+    # Inside Blender the file that is open is the scene, if no other is named.
+    nargs = "?" if parser.get_default("in_blender") else None
+    parser.add_argument("file", type=Path, nargs=nargs, metavar="FILE.blend")
+
+    written = parser.add_mutually_exclusive_group(required=True)
+    written.add_argument("-o", "--output", type=Path, metavar="OUT.blend")
+    written.add_argument("--in-place", action="store_true", help="overwrite FILE.blend itself")
+
+    parser.add_argument(
+        "--scene",
+        metavar="NAME",
+        help="the scene to use instead of the one that is active in the file",
+    )
+    parser.add_argument(
+        "--character", metavar="ARMATURE", help="needed where the scene has several characters"
+    )
+    for name, setting in _OBJECTS.items():
+        parser.add_argument(
+            f"--{name}", dest=setting, metavar="NAME", help="overrides the character's own setting"
+        )
+
+    parser.add_argument("--mode", choices=MODES, help="one mode for all frames")
+    parser.add_argument(
+        "--frames",
+        type=frame_range,
+        metavar="A:B",
+        help="first and last frame; write --frames=A:B if A is negative",
+    )
+    for name, effect in _SHARES.items():
+        parser.add_argument(f"--{name}", type=number(float, 0.0, 1.0), metavar="SHARE", help=effect)
+
+    parser.add_argument(
+        "--takes",
+        type=number(int, 1),
+        default=1,
+        metavar="N",
+        help="how many takes; the first one plays",
+    )
+    add_noise(parser, temperature=None)
+    add_weights(parser)
+
+
+def _changes(options: argparse.Namespace) -> dict[str, Any]:
+    """What the options set on the character, by the setting's name."""
+    changes = {setting: getattr(options, setting) for setting in _SETTINGS}
+    if options.frames:
+        changes["frame_start"], changes["frame_end"] = options.frames
+    return {setting: value for setting, value in changes.items() if value is not None}
+
+
+def _run(options: argparse.Namespace, progress: Progress) -> Result:
+    from ..blender.pipeline.batch import bake_takes
+    from ..core.weights import load_weights
+
+    output, result = bake_takes(
+        options.file,
+        options.output,
+        scene=options.scene,
+        character=options.character,
+        takes=options.takes,
+        weights=load_weights(options.weights) if options.weights else None,
+        progress=progress,
+        changes=_changes(options),
+    )
+    report: dict[str, Any] = {
+        "output": str(output),
+        "takes": [
+            {
+                "action": action.name,
+                "seed": draw.seed,
+                "temperature": draw.temperature,
+                "frames": len(take),
+                "log_likelihood": round(take.log_likelihood, 3),
+                "metrics": take.metrics,
+                "raw_metrics": take.raw_metrics,
+            }
+            for action, draw, take in zip(result.actions, result.draws, result.takes, strict=True)
+        ],
+        "warnings": list(result.warnings),
+        "seconds": {stage: round(spent, 4) for stage, spent in result.seconds.items()},
+    }
+    return report, _as_text(report)
+
+
+def _as_text(report: dict[str, Any]) -> str:
+    lines = [f"Warning: {printable(warning, MAX_SHOWN)}" for warning in report["warnings"]]
+    for take in report["takes"]:
+        slides = f"{take['metrics']['foot_sliding_per_frame']:.2f} sliding feet per frame"
+        lines.append(
+            f"{printable(take['action'])}: {take['frames']} frames, seed {take['seed']}, {slides}"
+        )
+
+    spent = (f"{stage} {seconds:.2f} s" for stage, seconds in report["seconds"].items())
+    return "\n".join((*lines, ", ".join(spent), f"Written to {report['output']}"))
+
+
+COMMAND = Command(
+    name="bake",
+    summary="generate the motion of a scene's character and save the scene with its keys",
+    add_arguments=_add_arguments,
+    run=_run,
+    needs=lambda _: ("bpy",),
+)

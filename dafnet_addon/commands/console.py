@@ -1,0 +1,134 @@
+"""The terminal: results on standard output, progress and errors on standard error, either of which
+may be closed, full or no longer read.
+"""
+
+import ctypes
+import io
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout, suppress
+from typing import TextIO
+
+from ..core.errors import InputError
+
+__all__ = [
+    "MAX_SHOWN",
+    "ProgressBar",
+    "complain",
+    "escape_unprintable",
+    "flush_streams",
+    "open_streams",
+    "say",
+    "stdout_kept_clean",
+]
+
+MAX_SHOWN = 2000
+"""Characters of a text from a file that are printed; ``--json`` gives all of it."""
+
+
+def open_streams() -> None:
+    """Open standard streams that were closed on the null device, before a file gets their number,
+    and with it what is printed.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            # The system gives it the lowest free number, which is this one.
+            setattr(sys, name, open(os.devnull, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115
+
+
+def flush_streams() -> None:
+    """Write what is still held back, before the process ends; what cannot be written is dropped."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            _discard(stream)
+
+
+def escape_unprintable() -> None:
+    """Print letters that the terminal does not have as escapes, instead of failing."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def say(text: str) -> None:
+    """Print the result on standard output; a reader that has read enough, such as ``head``, is not
+    an error. Raises InputError where it cannot be written.
+    """
+    try:
+        if text:
+            print(text)
+        sys.stdout.flush()
+    except OSError as error:
+        _discard(sys.stdout)
+        if not isinstance(error, BrokenPipeError):
+            raise InputError(
+                f"The result cannot be written to standard output ({error.strerror})."
+            ) from error
+
+
+def complain(text: str, end: str = "\n") -> None:
+    """Print on standard error, if anything reads it."""
+    with suppress(OSError):
+        print(text, end=end, file=sys.stderr, flush=True)
+
+
+class ProgressBar:
+    """Progress for people, on standard error: a bar on a terminal, ten dots elsewhere.
+
+    ``stop_if_asked`` is called at every step, and raises where the command is to stop.
+    """
+
+    def __init__(self, stop_if_asked: Callable[[], None]) -> None:
+        self.stop_if_asked = stop_if_asked
+        self.dots = 0
+        self.shown = False
+
+    def __call__(self, progress: float) -> None:
+        """Show the part done, in [0, 1]."""
+        self.stop_if_asked()
+        part = min(max(progress, 0.0), 1.0)
+        self.shown = True
+
+        if sys.stderr.isatty():
+            filled = "#" * int(30 * part)
+            complain(f"\r[{filled:.<30}] {100 * part:3.0f} %", end="")
+        elif int(10 * part) > self.dots:
+            complain("." * (int(10 * part) - self.dots), end="")
+            self.dots = int(10 * part)
+
+    def __enter__(self) -> "ProgressBar":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.shown:
+            complain("")
+
+
+@contextmanager
+def stdout_kept_clean() -> Iterator[None]:
+    """A block in which what Blender itself prints on standard output goes to standard error, so
+    that JSON stays JSON.
+    """
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        with redirect_stdout(sys.stderr):  # what goes through Python; the rest is written by C
+            yield
+    finally:
+        ctypes.CDLL("ucrtbase" if os.name == "nt" else None).fflush(None)
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+def _discard(stream: TextIO) -> None:
+    """Point a stream that cannot be written at the null device: what it still holds would fail
+    again at exit.
+    """
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), stream.fileno())
