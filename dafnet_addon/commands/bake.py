@@ -24,7 +24,7 @@ _OBJECTS = {
 _SHARES = {
     "plant-feet": "0 leaves the feet as generated, 1 holds standing feet in place",
     "rest-on-seats": (
-        "0 leaves the body as generated, 1 lifts it out of a seat that it has sunk into"
+        "0 leaves the body as generated, 1 brings it to where the seat it rests on carries it"
     ),
     "reach-targets": "0 leaves head and hands as generated, 1 puts them onto their targets",
     "clear-furniture": "0 leaves hands and feet as generated, 1 moves them out of furniture",

@@ -6,11 +6,12 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+from ..core.errors import InputError
 from .command import Command, Progress, Result, add_weights
 
 __all__ = ["COMMAND", "benchmark"]
 
-_MEASURES = ("seats", "speed")
+_MEASURES = ("rest", "seats", "speed")
 """What is measured of the weights."""
 
 _RESEARCH = {"ablation": "ablation", "canonical": "canonical", "tables": "experiments"}
@@ -29,6 +30,12 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", choices=[*_MEASURES, *_RESEARCH])
     add_weights(parser)
     parser.add_argument(
+        "--furniture",
+        type=Path,
+        metavar="LIBRARY",
+        help="with 'rest': on these real pieces instead of seats made of boxes",
+    )
+    parser.add_argument(
         "arguments",
         nargs=argparse.REMAINDER,
         help="for 'ablation', 'canonical' and 'tables'; '-- --help' lists them",
@@ -38,7 +45,13 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 def _run(options: argparse.Namespace, progress: Progress) -> Result:
     module = benchmark(_RESEARCH.get(options.name, options.name))
     if options.name in _MEASURES:
-        found: Result = module.measure(options.weights, progress)
+        if options.furniture and options.name != "rest":
+            raise InputError(
+                f"'{options.name}' knows no furniture library; leave --furniture out, or measure "
+                "'rest'."
+            )
+        among = {"library": options.furniture} if options.furniture else {}
+        found: Result = module.measure(options.weights, progress, **among)
         return found
 
     arguments = options.arguments[options.arguments[:1] == ["--"] :]
@@ -49,11 +62,12 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
 COMMAND = Command(
     name="bench",
     summary=(
-        "measure: 'seats' sits on ten heights from three sides; 'speed' times every system; "
+        "measure: 'rest' cleans up who hovers over seats or sinks into them; 'seats' sits on ten "
+        "heights from three sides; 'speed' times every system; "
         "'canonical' fits bodies to the skeleton; 'ablation' and 'tables' train and compare"
     ),
     add_arguments=_add_arguments,
     run=_run,
-    needs=lambda options: () if options.name in ("seats", "canonical") else ("torch",),
+    needs=lambda options: () if options.name in ("rest", "seats", "canonical") else ("torch",),
     folder="benchmarks",
 )

@@ -1,5 +1,5 @@
 """After the model: motion is smoothed, hands and feet come out of furniture, planted feet stay
-where they are, nobody sinks into a seat, head and hands reach their targets exactly.
+where they are, who rests on a seat is carried by it, head and hands reach their targets exactly.
 
 All is done on joint positions of a body with constant bones, 30 frames a second, and leaves them
 constant; the take's own poses are untouched, so that the strengths can be changed without sampling
@@ -8,7 +8,7 @@ asks for it. What bends all of the motion comes first; feet before the seat, sin
 the pelvis; targets last.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import astuple, dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from .errors import InputError
 from .kinematics import on_bones, two_bone
 from .progress import stepwise
+from .resting import Distance, on_legs, rested
 from .root import gaussian
 from .rotations import matrix_from_vector
 from .series import MODEL_FPS, runs, smoothstep
@@ -29,26 +30,21 @@ from .skeleton import (
     LIMBS,
     OFFSETS,
     PARENTS,
-    PELVIS,
     TOE_HEIGHT,
     joint,
 )
+from .softness import Support
 
 __all__ = [
     "CleanUp",
     "cleaned",
     "cleared",
     "planted",
-    "seated",
     "smoothed_out",
     "standing_still",
     "reach_targets",
 ]
 
-Distance = Callable[[np.ndarray], np.ndarray]
-"""Signed distances (T, N) of world points (T, N, 3) to the furniture, negative inside; metres."""
-
-_OVER_LEGS = [j for j in range(len(JOINTS)) if j not in {*KNEES, *ANKLES, *FEET}]
 _THIGH, _SHIN = (float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("knee", "ankle"))
 _ARMS = {f"hand_{side}": list(LIMBS[f"{side}_arm"]) for side in ("left", "right")}
 _UPPER_ARM, _FOREARM = (
@@ -61,8 +57,6 @@ _PLANTS = 4  # frames of the shortest stand
 _MENDS = 3  # frames of the longest gap in one
 _SLIPS = 0.12  # metres from its place at which a foot is let go
 _FADE = 1 / 3  # seconds in which what is added dies away
-_SITS_OVER = 0.08  # metres of a pelvis over a hard seat, at least
-_SINKS = 0.15  # metres that it is lifted by, at most
 _SMOOTHING = 2.5  # frames; deviation of the Gaussian at full strength
 _SKIN = 0.03  # metres between a wrist or ankle and the surface that it must not sink into
 _DEEPEST = 0.20  # metres that it is moved, at most
@@ -97,8 +91,8 @@ _STEP = 0.10  # metres in one round, at most
 @dataclass(frozen=True)
 class CleanUp:
     """Strengths from 0 (off) to 1 of what is done after the model: ``feet`` stand still where they
-    are planted, head and hands ``reach`` their targets, the pelvis is lifted out of the ``seat``
-    that it has sunk into, hands and feet are kept ``clear`` of furniture, and motion is made more
+    are planted, head and hands ``reach`` their targets, a body that rests on a ``seat`` is as
+    high as that carries it, hands and feet are kept ``clear`` of furniture, and motion is made more
     ``smooth``.
     """
 
@@ -214,20 +208,7 @@ def planted(
 
     ankles = joints[:, ANKLES] + moved
     down = _lowered(joints[:, HIPS], ankles, held)
-    return _on_legs(joints, -down, ankles, joints[:, KNEES] + moved / 2)
-
-
-def _on_legs(
-    joints: np.ndarray, lift: np.ndarray, ankles: np.ndarray, poles: np.ndarray
-) -> np.ndarray:
-    """Joints (T, 22, 3) with all but the legs lifted (T,), and legs bent to ``poles`` that reach
-    ``ankles`` (T, 2, 3).
-    """
-    out = joints.copy()
-    out[:, _OVER_LEGS, 2] += lift[:, None]
-    out[:, KNEES], out[:, ANKLES] = two_bone(out[:, HIPS], ankles, poles, _THIGH, _SHIN)
-    out[:, FEET] = out[:, ANKLES] + joints[:, FEET] - joints[:, ANKLES]
-    return out
+    return on_legs(joints, -down, ankles, joints[:, KNEES] + moved / 2)
 
 
 def _lowered(hips: np.ndarray, ankles: np.ndarray, held: np.ndarray) -> np.ndarray:
@@ -255,30 +236,6 @@ def _covering(need: np.ndarray) -> np.ndarray:
     kernel = np.hanning(13)[1:-1]
     wide = np.pad(ahead, 5, mode="edge")
     return np.convolve(wide, kernel / kernel.sum(), mode="valid")
-
-
-def seated(joints: np.ndarray, tops: np.ndarray, strength: float = 1.0) -> np.ndarray:
-    """Joints (T, 22, 3) whose pelvis is no lower than 8 cm over the seat that it has sunk into; the
-    feet stay, or hang.
-
-    ``tops`` (T,): heights of what is under the root (``tops_under``), NaN where nothing. A pelvis
-    may be over a hard seat by 8 to 16 cm; on a soft one it comes to lie on the cushion, which does
-    not give way.
-    """
-    need = np.maximum(
-        _SITS_OVER - joints[:, PELVIS, 2] + np.where(np.isfinite(tops), tops, -np.inf), 0.0
-    )
-    for start, end in runs(need > 0.0):
-        if need[start:end].max() > _SINKS:
-            need[start:end] = 0.0  # under a table, not on it
-
-    lift = strength * _covering(need)
-    if not lift.any():
-        return joints
-
-    return _on_legs(
-        joints, lift, joints[:, ANKLES], joints[:, KNEES] + lift[:, None, None] * (0.0, 0.0, 0.5)
-    )
 
 
 def smoothed_out(joints: np.ndarray, strength: float = 1.0) -> np.ndarray:
@@ -316,7 +273,7 @@ def cleared(
         out_of[np.isfinite(targets.get(name, np.full((len(joints), 3), np.nan))).all(-1), k] = 0.0
 
     out_of[:, 2:, 2] = 0.0
-    out = _on_legs(
+    out = on_legs(
         joints,
         np.zeros(len(joints)),
         joints[:, ANKLES] + out_of[:, 2:],
@@ -459,14 +416,14 @@ def cleaned(
     targets: dict[str, np.ndarray],
     settings: CleanUp,
     floor: np.ndarray | float = 0.0,
-    tops: np.ndarray | None = None,
+    support: Support | None = None,
     distance: Distance | None = None,
 ) -> Generator[float, None, np.ndarray]:
     """Joints (T, 22, 3) after all that ``settings`` ask for; canonical metres, world, 30 frames a
     second, constant bones.
 
-    ``floor``: its height, one or one for each frame; ``tops``: see ``seated``; ``distance``: to the
-    furniture, if there is any. Yields progress.
+    ``floor``: its height, one or one for each frame; ``support``: what is under the root;
+    ``distance``: to the furniture, if there is any. Yields progress.
     """
     if settings.smooth > 0.0:
         joints = smoothed_out(joints, settings.smooth)
@@ -477,8 +434,8 @@ def cleaned(
     if settings.feet > 0.0:
         joints = planted(joints, floor, settings.feet)
         yield 0.6
-    if settings.seat > 0.0 and tops is not None:
-        joints = seated(joints, tops, settings.seat)
+    if settings.seat > 0.0 and support is not None:
+        joints = rested(joints, support, settings.seat, distance)
         yield 0.8
     if settings.reach > 0.0:
         joints = reach_targets(joints, targets, settings.reach)

@@ -23,7 +23,7 @@ from .kinematics import (
     turned,
 )
 from .metrics import motion_metrics
-from .occupancy import distance, tops_under
+from .occupancy import distance
 from .progress import stepwise, within
 from .resampling import covering_frames, frame_times, resample_positions, resample_rotations
 from .root import RootPath, to_root, to_world
@@ -31,6 +31,7 @@ from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from
 from .sampler import Sampler, Unchanged
 from .series import MODEL_FPS
 from .skeleton import model_order
+from .softness import support_under
 from .solids import Scene
 from .take import Controls, Take
 from .weights import Weights
@@ -114,13 +115,13 @@ def cleaned_up(
     """Joints (N, 22, 3) of a shot, canonical metres, on constant bones, after all that ``settings``
     ask for.
     """
-    tops = tops_under(shot.scene, shot.path) if settings.seat else None
+    support = support_under(shot.scene, shot.path) if settings.seat else None
     floor = shot.path.position[:, 2]
     reach = partial(distance, shot.scene, floor=floor) if shot.scene.solids else None
     yield 0.2
     targets = targets_of(shot.path, shot.request)
     return (
-        yield from within(cleaned.steps(joints, targets, settings, floor, tops, reach), 0.2, 1.0)
+        yield from within(cleaned.steps(joints, targets, settings, floor, support, reach), 0.2, 1.0)
     )
 
 

@@ -28,8 +28,9 @@ _LOWEST = 0.15
 _HIGHEST = 0.925
 _APART = 0.025
 
-_FOOTPRINT = 0.07  # metres round a place, within which five spots are looked at
-_CARRYING = 3  # of the five spots must have a top
+# What carries the hips: spots to the right and forward of the root, metres.
+_SPOTS = np.array([(x, y, 0.0) for x in (-0.09, 0.0, 0.09) for y in (-0.07, 0.0, 0.07)])
+_CARRYING = 5  # of these must have a top
 
 
 @dataclass(frozen=True)
@@ -119,17 +120,17 @@ def distance(scene: Scene, points: np.ndarray, floor: np.ndarray | float) -> np.
 
 def tops_under(scene: Scene, path: RootPath) -> np.ndarray:
     """Height (T,) in the world of what could carry a body that sits where the root is: the highest
-    surface between 15 and 90 cm over the floor, under the root and around it; NaN where there is
+    surface between 15 and 90 cm over the floor, under the hips in the median; NaN where there is
     none. Canonical metres, solids as for ``occupancy``.
     """
     if not scene.solids:
         return np.full(len(path), np.nan)
 
-    spots = np.array([(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)]) * _FOOTPRINT
     heights = np.arange(_LOWEST, _HIGHEST, _APART)
-    columns = np.concatenate([np.c_[np.tile(spot, (len(heights), 1)), heights] for spot in spots])
-    found = distance(scene, path.position[:, None] + columns, path.position[:, 2]).reshape(
-        len(path), len(spots), -1
+    spots = path.position[:, None] + rotate(path.rotation[:, None], _SPOTS)
+    columns = spots[:, :, None] + heights[:, None] * (0.0, 0.0, 1.0)
+    found = distance(scene, columns.reshape(len(path), -1, 3), path.position[:, 2]).reshape(
+        len(path), len(_SPOTS), -1
     )
     touches = found[..., :-1] < _APART / 2
     highest = touches.shape[-1] - 1 - touches[..., ::-1].argmax(-1)

@@ -9,14 +9,23 @@ from functools import partial
 
 import numpy as np
 
-from .checks import FARTHEST, array, corners, inside, rotations, shaped
+from .checks import FARTHEST, array, corners, inside, number, rotations, shaped
 from .errors import InputError
 from .grid import DistanceGrid
 from .text import printable
 
-__all__ = ["Box", "Mesh", "Scene", "box_distance"]
+__all__ = ["SOFTEST", "Box", "Mesh", "Scene", "box_distance"]
+
+SOFTEST = 0.3
+"""Metres by which furniture gives way at most."""
 
 _UNTRUE = 1e-3  # of an affine matrix: how far its last row may be from 0 0 0 1
+
+
+def _checked_softness(softness: float | None, whose: str) -> float | None:
+    if softness is None:
+        return None
+    return number(softness, f"The softness of {whose}", 0.0, SOFTEST, "metres")
 
 
 @dataclass(frozen=True)
@@ -25,17 +34,20 @@ class Box:
     box's axes; world, metres.
 
     A moving box has ``center`` (T, 3) and ``rotation`` (T, 3, 3), one for each frame of the
-    controls.
+    controls. ``softness``: metres by which it carries a pelvis lower than a hard and level top,
+    None where its name and shape are to tell (``softness.guessed``).
     """
 
     center: np.ndarray
     half_size: np.ndarray
     rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
     name: str = "box"
+    softness: float | None = None
 
     def __post_init__(self) -> None:
         hold = partial(object.__setattr__, self)
         hold("name", printable(self.name))
+        hold("softness", _checked_softness(self.softness, f"the box '{self.name}'"))
         whose = f"of the box '{self.name}'"
         center = shaped(self.center, f"The center {whose}", (3,), (-1, 3))
         half_size = shaped(self.half_size, f"The half_size {whose}", (3,))
@@ -78,7 +90,7 @@ class Mesh:
 
     The mesh may be open, thin, in several parts, mirrored or scaled without uniformity. ``grid`` is
     its distance field where the caller has one already, in the space that ``distance.rigid_split``
-    describes; else it is built when first needed.
+    describes; else it is built when first needed. ``softness``: as a box's.
     """
 
     vertices: np.ndarray
@@ -86,10 +98,12 @@ class Mesh:
     matrix: np.ndarray = field(default_factory=lambda: np.eye(4))
     name: str = "mesh"
     grid: DistanceGrid | None = None
+    softness: float | None = None
 
     def __post_init__(self) -> None:
         hold = partial(object.__setattr__, self)
         hold("name", printable(self.name))
+        hold("softness", _checked_softness(self.softness, f"the mesh '{self.name}'"))
         whose = f"of the mesh '{self.name}'"
         vertices = array(self.vertices, f"The vertices {whose}")
         vertices = (

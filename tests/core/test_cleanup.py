@@ -11,12 +11,11 @@ from dafnet_addon.core.cleanup import (
     cleared,
     planted,
     reach_targets,
-    seated,
     smoothed_out,
     standing_still,
 )
 from dafnet_addon.core.generate import clean_again_steps
-from dafnet_addon.core.kinematics import on_bones, two_bone
+from dafnet_addon.core.kinematics import on_bones
 from dafnet_addon.core.metrics import foot_sliding, jerk
 from dafnet_addon.core.paths import Stop, route
 from dafnet_addon.core.progress import run_to_end
@@ -145,48 +144,6 @@ def test_nothing_is_done_where_nothing_is_asked():
     for strengths in ((-0.1, 0.0), (0.0, 1.5), (float("nan"), 0.0), (0.0, 0.0, 2.0)):
         with pytest.raises(InputError, match="from 0 to 1"):
             CleanUp(*strengths)
-
-
-def _sitting_down(low: float) -> np.ndarray:
-    """A body that goes from standing to a pelvis at ``low`` metres in a second, and stays; its feet
-    where they were.
-    """
-    joints = np.repeat(_hanging()[None], 80, axis=0)
-    down = (REST[0, 2] - low) * np.clip(np.linspace(-0.5, 2.0, 80), 0.0, 1.0)
-    legs = [joint(f"{side}_{n}") for side in ("left", "right") for n in ("knee", "ankle", "foot")]
-    joints[:, [j for j in range(22) if j not in legs], 2] -= down[:, None]
-    # Knees bend forward as far as thighs and shins ask.
-    for side in ("left", "right"):
-        hip, knee, ankle = (joints[:, joint(f"{side}_{n}")] for n in ("hip", "knee", "ankle"))
-        thigh, shin = (np.linalg.norm(OFFSETS[joint(f"{side}_{n}")]) for n in ("knee", "ankle"))
-        joints[:, joint(f"{side}_knee")], joints[:, joint(f"{side}_ankle")] = two_bone(
-            hip, ankle, knee + np.array([0.0, 1.0, 0.0]), thigh, shin
-        )
-    return joints
-
-
-def test_who_sinks_into_a_seat_is_lifted_out_softly_and_keeps_the_feet():
-    sunk, right = _sitting_down(0.47), _sitting_down(0.57)
-    tops = np.full(80, 0.45)
-    tops[:20] = np.nan
-    out = seated(sunk, tops)
-    assert np.allclose(out[60:, 0, 2], 0.53, atol=1e-6), "8 cm over the seat"
-    assert np.abs(out[:, TOES] - sunk[:, TOES]).max() < 1e-6 and np.allclose(out[:20], sunk[:20])
-    assert np.abs(np.diff(out[:, 0, 2], 2)).max() < np.abs(np.diff(sunk[:, 0, 2], 2)).max() + 2e-3
-    assert np.abs(_lengths(out) - _lengths(sunk)).max() < 1e-6
-    assert seated(right, tops) is right, "who sits right is left alone"
-    assert seated(sunk, np.full(80, np.nan)) is sunk
-    assert seated(sunk, np.full(80, 0.75)) is sunk, "what is far over the pelvis is not a seat"
-    half = seated(sunk, tops, 0.5)
-    assert np.allclose(half[60:, 0, 2], 0.50, atol=1e-6)
-
-
-def test_feet_hang_from_a_seat_that_is_too_high_for_them():
-    sunk = _sitting_down(0.93)
-    out = seated(sunk, np.full(80, 0.95))
-    assert np.allclose(out[60:, 0, 2], 1.03, atol=1e-6)
-    assert (out[60:, TOES, 2] > TOE_HEIGHT + 0.03).all()
-    assert np.abs(_lengths(out) - _lengths(sunk)).max() < 2e-3
 
 
 @pytest.mark.slow
