@@ -11,7 +11,7 @@ told is the piece's mesh and its title.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from dafnet_addon.core.softness import OVER_HARD, SOFTNESS
 from dafnet_addon.core.weights import Weights
 from dafnet_addon.director.seats import seat_of
 from dafnet_addon.director.walks import walk_to
+
+if TYPE_CHECKING:
+    from dafnet_addon.data.furnish.library import Piece
 
 OVER = (-0.10, -0.06, -0.02, 0.03, 0.07, 0.11, 0.15)
 """Metres by which a take is over where its piece carries it, before the clean-up."""
@@ -89,25 +92,32 @@ def made_pieces() -> list[Placed]:
 def real_pieces(library: Path) -> list[Placed]:
     """The pieces of a furniture library that one can be sent to, and that carry somebody there."""
     from dafnet_addon.data.furnish.library import read_library
-    from dafnet_addon.data.furnish.shapes import PELVIS_OVER, surface_under
 
-    found = []
-    for piece in read_library(library)[0]:
-        if piece.kind not in PELVIS_OVER:
-            continue
-        mesh = Mesh(piece.vertices, piece.triangles, name=piece.title)
-        try:
-            place = seat_of([mesh], np.array([0.0, -3.0]), 0.0, piece.title)
-        except InputError:
-            continue
-        grid = grid_of(mesh, 0.0)
-        surface = surface_under(grid, place.position, place.yaw, place.height)
-        if surface is not None:
-            x, y = place.position.tolist()
-            stop = Stop((x, y), place.yaw, 3.0, seated=True, name=piece.name)
-            solids = (replace(mesh, grid=grid),)
-            found.append(Placed(piece.name, piece.kind, solids, stop, surface))
-    return found
+    found = (real_piece(piece) for piece in read_library(library)[0])
+    return [piece for piece in found if piece is not None]
+
+
+def real_piece(piece: "Piece") -> Placed | None:
+    """A piece of a library, None where nobody can be sent to it, or nothing carries one there."""
+    from dafnet_addon.data.furnish.shapes import surface_under
+
+    if piece.kind not in SOFTNESS:
+        return None
+
+    mesh = Mesh(piece.vertices, piece.triangles, name=piece.title)
+    try:
+        place = seat_of([mesh], np.array([0.0, -3.0]), 0.0, piece.title)
+    except InputError:
+        return None
+
+    grid = grid_of(mesh, 0.0)
+    surface = surface_under(grid, place.position, place.yaw, place.height)
+    if surface is None:
+        return None
+
+    x, y = place.position.tolist()
+    stop = Stop((x, y), place.yaw, 3.0, seated=True, name=piece.name)
+    return Placed(piece.name, piece.kind, (replace(mesh, grid=grid),), stop, surface)
 
 
 def _raised(solid: Box | Mesh, height: float) -> Box | Mesh:
@@ -173,10 +183,12 @@ def _compared(
         for part, points in (("thighs", _thighs(joints)), ("trunk", joints[:, _TRUNK])):
             gap = distance(scene, points[frames], 0.0)
             depths[f"{part}_{name}"] = float(np.median(np.maximum(-gap, 0.0).max(axis=1)))
-    feet = np.linalg.norm((clean - raw)[:, [*ANKLES, *FEET]], axis=-1)
+    feet = (clean - raw)[:, FEET]
     return {
         "error": float(np.median(clean[frames, PELVIS, 2])) - carried,
-        "feet": float(feet.max()),
+        "feet": float(np.linalg.norm(feet, axis=-1).max()),
+        "heels": float((clean - raw)[:, ANKLES, 2].max()),
+        "feet_down": float(-feet[..., 2].min()),
         "jerk": jerk(clean, MODEL_FPS) / jerk(raw, MODEL_FPS),
         "knees_bend": float(_bends(clean).max()),
         "knees_bend_raw": float(_bends(raw).max()),
@@ -258,6 +270,8 @@ def _summary(rows: Sequence[dict[str, Any]]) -> dict[str, float]:
         "within_1.5_cm_raw": share(np.abs(of("over")) <= _WITHIN),
         "median_error_cm": round(100.0 * float(np.median(np.abs(of("error")))), 2),
         "feet_stay": share(of("feet") <= _FEET_MOVE),
+        "heels_lift": share(of("heels") > _FEET_MOVE),
+        "feet_hang": share((of("feet") > _FEET_MOVE) & (of("feet_down") <= _FEET_MOVE)),
         "knees_as_people": share(
             (of("knees_bend") <= np.maximum(_KNEES_BEND, of("knees_bend_raw")))
             & (of("knees_aside") <= _KNEES_ASIDE)

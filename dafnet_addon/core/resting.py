@@ -34,6 +34,9 @@ Distance = Callable[[np.ndarray], np.ndarray]
 
 _OVER_LEGS = [j for j in range(len(JOINTS)) if j not in {*KNEES, *ANKLES, *FEET}]
 _THIGH, _SHIN = (float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("knee", "ankle"))
+_FOOT = float(np.linalg.norm(OFFSETS[joint("left_foot")]))
+_TIPTOE = float(np.sqrt(_SHIN**2 + _FOOT**2 + 2.0 * _SHIN * _FOOT * np.cos(np.radians(35.0))))
+"""Metres from a knee to a toe base on tiptoe: the foot 35 degrees from being stretched."""
 
 _SINKS = 0.17  # metres under where it is carried, of a pelvis that rests there; lower, it is under
 _HOVERS = 0.25  # metres over it, of one that rests there; higher, it stands
@@ -228,7 +231,7 @@ def _on_the_seat(
     joints: np.ndarray, distance: Distance, softness: np.ndarray, counts: np.ndarray
 ) -> np.ndarray:
     """Joints whose thighs are raised about the hips as far as a seat's edge asks for, by ``counts``
-    (T,); feet stay where they reach, else they hang.
+    (T,); toes stay on the floor as far as heels can be lifted, else the feet hang.
     """
     above = np.tile((0.0, 0.0, 1.0), (len(joints), 1))
     skin = _THIGH_SKIN - _GIVES_WAY * softness
@@ -248,9 +251,14 @@ def _on_the_seat(
         )
 
     if out is not joints:
-        shins = normalised(joints[:, ANKLES] - out[:, KNEES])
-        out[:, ANKLES] = out[:, KNEES] + _SHIN * shins
-        out[:, FEET] = out[:, ANKLES] + joints[:, FEET] - joints[:, ANKLES]
+        down = joints[:, FEET] - out[:, KNEES]
+        length = np.linalg.norm(down, axis=-1, keepdims=True)
+        before = np.linalg.norm(joints[:, FEET] - joints[:, KNEES], axis=-1, keepdims=True)
+        within = np.maximum(_TIPTOE, before) / np.maximum(length, 1e-9)
+        toes = out[:, KNEES] + down * np.minimum(1.0, within)
+        out[:, ANKLES], out[:, FEET] = two_bone(
+            out[:, KNEES], toes, joints[:, ANKLES], _SHIN, _FOOT
+        )
     return out
 
 
