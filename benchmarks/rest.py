@@ -101,7 +101,7 @@ def real_piece(piece: "Piece") -> Placed | None:
     """A piece of a library, None where nobody can be sent to it, or nothing carries one there."""
     from dafnet_addon.data.furnish.shapes import surface_under
 
-    if piece.kind not in SOFTNESS:
+    if piece.kind not in SOFTNESS or np.ptp(piece.vertices[:, :2], axis=0).max() < _NARROWEST:
         return None
 
     mesh = Mesh(piece.vertices, piece.triangles, name=piece.title)
@@ -241,18 +241,18 @@ def measure(
         rows += rests_of(piece, weights, draws, over)
 
     progress(1.0)
-    report = {"takes": len(rows), "all": _summary(rows), "rows": rows}
-    report["kinds"] = {
+    of_all = _summary(rows)
+    kinds = {
         kind: _summary([row for row in rows if row["kind"] == kind])
         for kind in sorted({row["kind"] for row in rows})
     }
     lines = [f"{len(rows)} takes over {len({row['piece'] for row in rows})} pieces"]
-    for name, found in {"all": report["all"], **report["kinds"]}.items():
+    for name, found in {"all": of_all, **kinds}.items():
         lines.append(
             f"  {name}: "
             + ", ".join(f"{what.replace('_', ' ')} {value:g}" for what, value in found.items())
         )
-    return report, "\n".join(lines)
+    return {"takes": len(rows), "all": of_all, "kinds": kinds, "rows": rows}, "\n".join(lines)
 
 
 def _summary(rows: Sequence[dict[str, Any]]) -> dict[str, float]:

@@ -34,6 +34,7 @@ Distance = Callable[[np.ndarray], np.ndarray]
 
 _OVER_LEGS = [j for j in range(len(JOINTS)) if j not in {*KNEES, *ANKLES, *FEET}]
 _THIGH, _SHIN = (float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("knee", "ankle"))
+_LEG = 0.999 * (_THIGH + _SHIN)  # metres: as far as a leg reaches
 _FOOT = float(np.linalg.norm(OFFSETS[joint("left_foot")]))
 _TIPTOE = float(np.sqrt(_SHIN**2 + _FOOT**2 + 2.0 * _SHIN * _FOOT * np.cos(np.radians(35.0))))
 """Metres from a knee to a toe base on tiptoe: the foot 35 degrees from being stretched."""
@@ -63,14 +64,15 @@ _ROUNDS = 3  # of raising thighs: as they turn, another place of them comes over
 _LEANS = np.radians(25.0)  # at most, for a back
 _LEAST_LEVER = 0.1  # metres over the pelvis, of what tells how far to lean
 _STEADY = 4.0  # frames; deviation of the Gaussian over what brings a body out of furniture
+_SOFT = 0.06  # share of a leg in which it stops being pulled straight
 _LIES = np.radians((45.0, 75.0))  # of a trunk out of the vertical: sitting up to, lying from
 
 
 def rested(
     joints: np.ndarray, support: Support, strength: float = 1.0, distance: Distance | None = None
 ) -> np.ndarray:
-    """Joints whose pelvis, wherever it rests over something, is within half a centimetre of where that
-    carries it; feet stay where they are, or hang where they do not reach.
+    """Joints whose pelvis, wherever it rests over something, is within half a centimetre of where
+    that carries it; feet stay where they are, or hang where they do not reach.
 
     A rest is what is slow, and neither as deep in the furniture as what is under it nor as high
     over it as what stands. The way to it and from it is moved softly, less and less.
@@ -160,6 +162,16 @@ def _lifted(joints: np.ndarray, lift: np.ndarray, top: np.ndarray) -> np.ndarray
     on_it = smoothstep((np.where(np.isfinite(over), over, -1.0) - begins) / (until - begins))
     ankles = joints[:, ANKLES].copy()
     ankles[..., 2] += lift[:, None] * gaussian(on_it, _STIRS / 2)
+
+    # Legs that are nearly straight stop softly where they are pulled off the floor.
+    hips = joints[:, HIPS] + lift[:, None, None] * (0.0, 0.0, 1.0)
+    before = np.linalg.norm((joints[:, ANKLES] - joints[:, HIPS]), axis=-1, keepdims=True)
+    legs = ankles - hips
+    length = np.linalg.norm(legs, axis=-1, keepdims=True)
+    over = np.maximum(length - (1.0 - _SOFT) * _LEG, 0.0) / (_SOFT * _LEG)
+    bent = np.where(over > 0.0, _LEG * (1.0 - _SOFT * np.exp(-over)), length)
+    shorter = np.minimum(length, np.maximum(bent, before))
+    ankles = hips + legs * shorter / np.maximum(length, 1e-9)
 
     forward = np.cross((0.0, 0.0, 1.0), _across(joints))
     poles = joints[:, KNEES] + (np.abs(lift)[:, None] * forward)[:, None]

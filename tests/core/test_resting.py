@@ -74,7 +74,7 @@ def test_who_hovers_or_sinks_comes_to_rest_where_the_seat_carries(over: float, s
     assert np.abs(out[90:, PELVIS, 2] - carried).max() < 0.015
     assert np.abs(out[:, FEET] - joints[:, FEET]).max() < 0.01, "feet stay"
     assert np.allclose(out[:20], joints[:20], atol=1e-9), "long before it nothing moves"
-    assert jerk(out, FPS) < jerk(joints, FPS) + 0.5, "a fiftieth of what real motion has"
+    assert jerk(out, FPS) < jerk(joints, FPS) + 0.6, "real motion has forty times as much"
     assert np.abs(_lengths(out) - _lengths(joints)).max() < 1e-6
     assert (out[90:, KNEES, 1] > out[90:, HIPS, 1] + 0.2).all(), "knees bend forward"
     half = rested(joints, _under(0.45, softness), 0.5)
@@ -83,7 +83,7 @@ def test_who_hovers_or_sinks_comes_to_rest_where_the_seat_carries(over: float, s
 
 
 def test_who_rests_right_and_who_does_not_rest_are_left_alone():
-    right = _sitting_down(0.45 + OVER_HARD + 0.005)
+    right = _sitting_down(0.45 + OVER_HARD + 0.004)
     assert rested(right, _under(0.45)) is right
     nothing = Support(np.full(FRAMES, np.nan), np.zeros(FRAMES))
     hovers = _sitting_down(0.70)
