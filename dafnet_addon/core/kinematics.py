@@ -22,17 +22,14 @@ from .rotations import (
 )
 from .series import MODEL_FPS
 from .skeleton import (
-    ANKLES,
     COLLARS,
-    ELBOWS,
     END_EFFECTORS,
-    HIPS,
-    KNEES,
+    LIMB_AXES,
+    LIMB_BENDS,
+    LIMBS,
     OFFSETS,
     PARENTS,
     PELVIS,
-    SHOULDERS,
-    WRISTS,
     joint,
 )
 
@@ -49,14 +46,11 @@ __all__ = [
     "come_over",
 ]
 
-# Limbs in one order: left and right arm, left and right leg. The rest pose is straight along _AXIS,
-# and the middle joint leaves that line along _BEND: elbows go backward, knees forward.
+# Tables of the limbs, in the order of LIMBS.
 _PARENT = [*COLLARS, PELVIS, PELVIS]
-_FIRST = SHOULDERS + HIPS
-_MIDDLE = ELBOWS + KNEES
-_END = WRISTS + ANKLES
-_AXIS = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 0, -1], [0, 0, -1]])
-_BEND = np.array([[0.0, -1, 0], [0, -1, 0], [0, 1, 0], [0, 1, 0]])
+_FIRST, _MIDDLE, _END = (list(joints) for joints in zip(*LIMBS.values(), strict=True))
+_AXIS = np.array([LIMB_AXES[limb] for limb in LIMBS])
+_BEND = np.array([LIMB_BENDS[limb] for limb in LIMBS])
 
 # a limb bent by this (radians) shows its plane about as clearly as its neighbours in time tell it
 _CLEAR_BEND = 0.25

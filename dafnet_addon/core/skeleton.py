@@ -43,6 +43,9 @@ __all__ = [
     "ELBOWS",
     "WRISTS",
     "LIMBS",
+    "LIMB_AXES",
+    "LIMB_BENDS",
+    "FOOT_OF",
     "joint",
 ]
 
@@ -101,6 +104,22 @@ LIMBS = {
     "right_leg": (HIPS[1], KNEES[1], ANKLES[1]),
 }
 """First, middle and end joint of the limbs."""
+LIMB_AXES = {
+    "left_arm": (-1.0, 0.0, 0.0),
+    "right_arm": (1.0, 0.0, 0.0),
+    "left_leg": (0.0, 0.0, -1.0),
+    "right_leg": (0.0, 0.0, -1.0),
+}
+"""Unit vectors along which the limbs are straight in the rest pose."""
+LIMB_BENDS = {
+    "left_arm": (0.0, -1.0, 0.0),
+    "right_arm": (0.0, -1.0, 0.0),
+    "left_leg": (0.0, 1.0, 0.0),
+    "right_leg": (0.0, 1.0, 0.0),
+}
+"""Unit vectors along which the middle joint leaves that line: elbows go backward, knees forward."""
+FOOT_OF = dict(zip(ANKLES, FEET, strict=True))
+"""The foot joint that hangs on each ankle."""
 
 UPPER = (0, 3, 6, 9, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21)
 LOWER = (1, 2, 4, 5, 7, 8, 10, 11)

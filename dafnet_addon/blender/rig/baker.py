@@ -11,8 +11,10 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Quaternion
 
+from ...core.body import canonical_body
 from ...core.errors import InputError
-from ...core.retargeting import canonical_body, limb_errors, retarget
+from ...core.limb_errors import limb_errors
+from ...core.retargeting import retarget
 from ...core.root import root_from_matrices
 from ...core.rotations import continuous_signs, normalised, quaternion_from_matrix
 from ...core.skeleton import ANKLES, HEAD, HIPS, JOINTS, WRISTS

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ...core.body import Body, canonical_body
 from ...core.errors import InputError
-from ...core.retargeting import Body, Motion, canonical_body, lay_in_t_pose, limb_errors, retarget
+from ...core.limb_errors import limb_errors
+from ...core.retargeting import Motion, retarget
 from ...core.rotations import normalised, rotate, rotation_between, transpose
-from ...core.skeleton import JOINTS, PARENTS, PELVIS
+from ...core.skeleton import ANKLES, COLLARS, HEAD, HIPS, JOINTS, PARENTS, PELVIS, SHOULDERS
+from ...core.t_pose import lay_in_t_pose
 from ..character.mannequin import FACING
 from .maps import RigMap
 
@@ -130,10 +133,10 @@ def _axes(heads: np.ndarray) -> np.ndarray:
     Up is the armature's own axis nearest to the way from the ankles to the head, so that the object
     stands upright; right is one of its axes, too, where one is near.
     """
-    up = _nearest_axis(heads[15] - 0.5 * (heads[7] + heads[8]))
+    up = _nearest_axis(heads[HEAD] - 0.5 * (heads[ANKLES[0]] + heads[ANKLES[1]]))
     hips, shoulders = (
-        unit - (unit @ up) * up
-        for unit in map(normalised, (heads[2] - heads[1], heads[17] - heads[16]))
+        across - (across @ up) * up
+        for across in (normalised(heads[right] - heads[left]) for left, right in (HIPS, SHOULDERS))
     )
     right = normalised(hips + shoulders if hips @ shoulders > 0.0 else hips)
     right = _nearest_axis(right) if np.abs(right).max() > _SNAP else right
@@ -178,8 +181,8 @@ def motion_of(shape: Shape, bodies: np.ndarray, poses: np.ndarray) -> Motion:
                 frames[:, parent], shape.body.rest[j] - shape.body.rest[parent]
             )
 
-    for collar, shoulder in ((13, 16), (14, 17)):
-        # what moves the shoulder has no bone in the map
+    for collar, shoulder in zip(COLLARS, SHOULDERS, strict=True):
+        # What moves the shoulder has no bone in the map.
         if not np.isfinite(shape.rest[collar]).all():
             along = rotate(frames[:, collar], shape.body.rest[shoulder] - shape.body.rest[collar])
             frames[:, collar] = (

@@ -10,10 +10,12 @@ import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, maps
 from bl_ext.user_default.dafnet.dafnet_addon.core import (
+    body,
     kinematics,
     retargeting,
     rotations,
     skeleton,
+    t_pose,
 )
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.take import Take
@@ -30,12 +32,12 @@ def test_a_body_of_its_own_keeps_the_motion(takes: dict[str, Take]) -> None:
     """
     take = takes["write"]
     frames = kinematics.global_from_local(rotations.matrix_from_quaternion(take.rotations))
-    motion, body, root = (
+    motion, own_body, root = (
         retargeting.Motion(take.joints, frames),
-        retargeting.canonical_body(1.0),
+        body.canonical_body(1.0),
         take.root[:, :3, 3],
     )
-    same = retargeting.retarget(motion, body, body, root)
+    same = retargeting.retarget(motion, own_body, own_body, root)
     assert (
         np.abs(same.motion.joints - take.joints).max() < 2e-3
         and np.abs(same.motion.frames - frames).max() < 0.02
@@ -45,9 +47,9 @@ def test_a_body_of_its_own_keeps_the_motion(takes: dict[str, Take]) -> None:
         turn = rotations.matrix_from_vector(np.array([0.0, -0.8 * sign, 0.0]))
         down[[elbow, wrist]] = down[shoulder] + (down[[elbow, wrist]] - down[shoulder]) @ turn.T
     down[[3, 13, 14]] = np.nan
-    lesser = retargeting.lay_in_t_pose(down)
+    lesser = t_pose.lay_in_t_pose(down)
     assert np.abs(lesser.rest - skeleton.REST).max() < 0.05
-    retargeted = retargeting.retarget(motion, body, lesser, root).motion
+    retargeted = retargeting.retarget(motion, own_body, lesser, root).motion
     off = np.linalg.norm(retargeted.joints - take.joints, axis=-1).mean(axis=0)
     assert off[[1, 2, 7, 8, 10, 11]].max() < 1e-6 and off[[15, 20, 21]].max() < CENTIMETRE
     assert np.abs(retargeted.frames[:, [20, 21]] - frames[:, [20, 21]]).max() < 1e-9
