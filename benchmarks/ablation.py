@@ -40,9 +40,11 @@ from dafnet_addon.data.held_out.real import real_test
 from dafnet_addon.model.config import SMALL, ModelConfig
 from dafnet_addon.training import precision
 from dafnet_addon.training.checkpoints import checkpoint_file
+from dafnet_addon.training.config import TrainingConfig
 from dafnet_addon.training.evaluate import Measured, captured, measured, row, rows_of
 from dafnet_addon.training.export import export
-from dafnet_addon.training.train import Run, TrainingConfig, train, train_part, trained
+from dafnet_addon.training.parts import load_run, trained_networks
+from dafnet_addon.training.train import train, train_part
 from dafnet_addon.training.validation import likelihoods
 
 MODEL = replace(SMALL, width=96, code=96, ahead=18)
@@ -117,11 +119,11 @@ def variant(
             job.result()
 
     file = folder / "weights.safetensors"
-    export(file, *trained(folder), {})
+    export(file, *trained_networks(folder), {})
     found = rows_of(
         measured(load_weights(file), clips, seeds=1), ["ground_truth", "free_t0", "ee_t0"]
     )
-    steps = {part: Run.load(part, folder).step for part in ("upper", "lower")}
+    steps = {part: load_run(part, folder).step for part in ("upper", "lower")}
     return {"steps": steps, "nll": round(sum(likelihoods(folder, dataset).values()), 2), **found}
 
 
@@ -183,7 +185,7 @@ def trained_on(dataset: Path, folder: Path, minutes: float, begin_with: Weights)
     )
     train(dataset, folder, model, training, begin_with=begin_with)
     file = folder / "weights.safetensors"
-    export(file, *trained(folder), {})
+    export(file, *trained_networks(folder), {})
     return file
 
 
@@ -265,7 +267,7 @@ def furniture(
     }
     for name, file in files.items():
         if name != BEGUN:
-            rows[name]["steps"] = {p: Run.load(p, file.parent).step for p in ("upper", "lower")}
+            rows[name]["steps"] = {p: load_run(p, file.parent).step for p in ("upper", "lower")}
 
     save_text(out / "furniture.json", json.dumps(rows, indent=1))
     text = furniture_table(found)

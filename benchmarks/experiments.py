@@ -39,11 +39,14 @@ from dafnet_addon.model.config import SMALL, ModelConfig
 from dafnet_addon.model.systems import system_named
 from dafnet_addon.training import precision
 from dafnet_addon.training.checkpoints import Checkpoint, checkpoint_file
+from dafnet_addon.training.config import TrainingConfig
 from dafnet_addon.training.evaluate import Measured, captured, measured, row
 from dafnet_addon.training.export import export
 from dafnet_addon.training.noise import take_noise
+from dafnet_addon.training.parts import load_run, trained_networks
 from dafnet_addon.training.processes import spread_out
-from dafnet_addon.training.train import Run, TrainingConfig, dataset_pool, train_part, trained
+from dafnet_addon.training.steps import dataset_pool
+from dafnet_addon.training.train import train_part
 
 MODEL = SMALL
 TRAINING = TrainingConfig(batch=40, peak=1e-3, mixed=True, minutes_predictor=2.0)
@@ -156,7 +159,7 @@ def train(
         spent = replace(training, minutes_flow=minutes)
         if budget == "equal steps":
             spent = replace(
-                spent, steps_flow=Run.load("whole", _at(runs, BUDGETS[0]) / "moglow").step
+                spent, steps_flow=load_run("whole", _at(runs, BUDGETS[0]) / "moglow").step
             )
         elif budget == "triple time":
             spent = replace(spent, minutes_flow=3.0 * minutes)
@@ -169,7 +172,7 @@ def train(
 
         list(spread_out(partial(_train, dataset, samp), jobs, processes))
         for folder in {job.folder for job in jobs if job.part not in NETWORKS}:
-            flow, predictor, statistics = trained(folder)
+            flow, predictor, statistics = trained_networks(folder)
             noise = take_noise(flow, predictor, dataset_pool(dataset), statistics)
             export(folder / "weights.safetensors", flow, predictor, statistics, {}, noise)
 

@@ -1,17 +1,17 @@
 """Trains SAMP's networks, with the budget, the learning rates and the resuming of the flows
-(``training.train``).
+(``training.steps``).
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
 import torch
+from torch import Tensor
 
-from ..core.errors import InputError
 from ..training.checkpoints import Checkpoint, generators, of_training, write_checkpoint
-from ..training.train import TrainingConfig, clock_of, dataset_pool, descend
+from ..training.config import TrainingConfig
+from ..training.steps import clock_of, dataset_pool, descend, mean_loss
 from .samp import KINDS, MotionNet, SampConfig, SampTraining, network_of
 
 __all__ = ["load_samp", "train_samp"]
@@ -45,21 +45,16 @@ def train_samp(
         step, seconds = kept.progress()
         kept.set_generators(device)
 
-    clock, losses = clock_of(device), []
+    clock: Callable[[], float] = clock_of(device)
+    losses: list[Tensor] = []
     while (share := training.share(step, seconds)) < 1.0:
         begin = clock()
         loss = run.loss(pool, torch.randint(len(pool), (training.batch,)), share)
         descend(run.network, optimiser, loss, training, step, share)
-        losses.append(float(loss.detach()))
+        losses.append(loss.detach())
         step, seconds = step + 1, seconds + clock() - begin
         if step % training.save_every == 0 or training.share(step, seconds) >= 1.0:
-            mean = sum(losses) / len(losses)
-            if not math.isfinite(mean):
-                raise InputError(
-                    f"The loss of '{kind}' is not a number by step {step}; resume with a lower "
-                    "peak rate."
-                )
-
+            mean = mean_loss(losses, kind, step, device)
             drawn = {f"generator.{name}": state for name, state in generators(device).items()}
             state = {"kind": kind, "config": asdict(run.config), "step": step, "seconds": seconds}
             write_checkpoint(file, {**of_training(run.network, optimiser), **drawn}, state)

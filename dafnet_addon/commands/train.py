@@ -46,7 +46,8 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
     from ..core.weights import load_weights
     from ..training import precision, ranks
     from ..training.candidates import write_weights
-    from ..training.train import read_config, train
+    from ..training.config import read_config
+    from ..training.train import train
 
     model, config = read_config(options.config, options.set)
     if options.minutes is not None:

@@ -4,12 +4,14 @@ The run itself is only read. Checkpoints are replaced as a whole, so that a copy
 any time.
 """
 
+import json
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from ..core.errors import InputError
 from ..model.config import ModelConfig
@@ -17,9 +19,11 @@ from ..model.systems import system_named
 from .checkpoints import Checkpoint, checkpoint_file
 from .export import export
 from .noise import take_noise
-from .train import Run, account, before_it_cooled, dataset_pool, train, trained
+from .parts import load_run, saved_runs, trained_networks, uncooled_run
+from .steps import dataset_pool
+from .train import train
 
-__all__ = ["cooled", "has_weights", "snapshot", "write_weights"]
+__all__ = ["cooled", "has_weights", "provenance", "snapshot", "write_weights"]
 
 
 @contextmanager
@@ -67,17 +71,37 @@ def _parts_there(folder: Path) -> tuple[str, ...]:
 
 
 def write_weights(folder: Path, dataset: Path, file: Path, device: str = "cpu") -> None:
-    """Write the averaged weights of a run's latest checkpoints, with what ``account`` says of
-    them. How far takes differ is measured on ``device``.
+    """Write the averaged weights of a run's latest checkpoints, with what ``provenance`` says
+    of them. How far takes differ is measured on ``device``.
     """
-    flow, predictor, statistics = trained(folder)
+    flow, predictor, statistics = trained_networks(folder)
     networks = [network for network in (flow, predictor) if network is not None]
+
     for network in networks:
         network.to(device)
     noise = take_noise(flow, predictor, dataset_pool(dataset, device), statistics)
     for network in networks:
         network.cpu()
-    export(file, flow, predictor, statistics, account(folder, dataset), noise)
+
+    export(file, flow, predictor, statistics, provenance(folder, dataset), noise)
+
+
+def provenance(folder: Path, dataset: Path) -> dict[str, str]:
+    """What a weights file says of its making, as metadata: licence, data, and training."""
+    runs = saved_runs(folder)
+    training: dict[str, Any] = {
+        part: {"steps": run.step, "minutes": round(run.seconds / 60, 1)}
+        for part, run in runs.items()
+    }
+    last = list(runs.values())[-1]
+    if last.adopted:
+        training["begun_with"] = last.adopted
+
+    return {
+        "licence": "CC-BY-4.0; provenance in LICENSE-WEIGHTS.md",
+        "data": (dataset / "dataset.json").read_text(encoding="utf-8"),
+        "training": json.dumps({**training, "settings": asdict(last.config)}),
+    }
 
 
 def cooled(
@@ -95,7 +119,7 @@ def cooled(
     """
     if not checkpoint_file(out, _parts(folder)[-1]).exists():
         _begin_cooling(folder, out, minutes)
-    begun = Run.load(_parts(out)[-1], out)
+    begun = load_run(_parts(out)[-1], out)
     train(dataset, out, begun.model, begun.config, device=device)
     file = out / f"{begun.model.system}.safetensors"
     write_weights(out, dataset, file, device)
@@ -109,7 +133,7 @@ def _begin_cooling(folder: Path, out: Path, minutes: float) -> None:
 
     # The predictor is done, and the flow has learnt with what it is.
     runs = [
-        Run.load(part, folder) if part == "predictor" else before_it_cooled(part, folder)
+        load_run(part, folder) if part == "predictor" else uncooled_run(part, folder)
         for part in _parts(folder)
     ]
     budget = max(run.seconds for run in runs if run.part != "predictor") / 60.0 + minutes

@@ -12,14 +12,30 @@ import torch
 from torch import Tensor
 
 from ..core.series import MODEL_FPS
-from ..core.skeleton import LOWER, OFFSETS, PARENTS, TOE_HEIGHT, UPPER
+from ..core.skeleton import LOWER, LOWER_SIZE, OFFSETS, PARENTS, TOE_HEIGHT, UPPER, UPPER_SIZE
+from .batches import Statistics
 
-__all__ = ["upper_loss", "lower_loss", "sliding"]
+__all__ = ["free_run_loss", "lower_loss", "sliding", "upper_loss"]
 
-# nats for each metre, or metre a second
-_POSE, _GIVEN, _HEIGHT, _BONE, _SPEED, _SLIDE = 100.0, 200.0, 150.0, 100.0, 3.0, 40.0
-_PLANTED = 0.15  # metres a second
-_LOW = 0.03  # metres over where a planted toe base is
+# nats for each metre
+_POSE = 100.0
+_GIVEN = 200.0
+_HEIGHT = 150.0
+_BONE = 100.0
+# nats for each metre a second
+_SPEED = 3.0
+_SLIDE = 40.0
+
+_PLANTED = 0.15
+"""Metres a second, under which a captured foot is planted."""
+_LOW = 0.03
+"""Metres over where a planted toe base is, under which it may be planted."""
+_FADE = 0.025
+"""Metres over which a foot that rises is held to the floor half as much."""
+_FARTHEST = 20.0
+"""Deviations: the inverse of a flow that has not learnt may be anywhere; such poses teach
+nothing.
+"""
 
 
 def _bones(
@@ -49,6 +65,47 @@ def _followed(made: Tensor, true: Tensor, calm: Tensor) -> Tensor:
     place = (made - true).norm(dim=-1).mean((1, 2))
     speed = MODEL_FPS * (made.diff(dim=1) - true.diff(dim=1)).norm(dim=-1).mean((1, 2))
     return ((_POSE * place + _SPEED * speed) * calm).mean() / share
+
+
+def free_run_loss(
+    *,
+    part: str,
+    made: Tensor,
+    true: Tensor,
+    calm: Tensor,
+    given: Tensor,
+    pelvis: Tensor,
+    step: Tensor,
+    statistics: Statistics,
+) -> Tensor:
+    """Loss of the frames that a part of the flow has made by itself, ``made`` (B, T, …), beside
+    the captured ones, ``true``.
+
+    ``calm`` (B,): whether z = 0; ``given`` (B, T, 22): which joints the observation gives;
+    ``pelvis`` (B, T, 3): the captured one; all standardised as poses are. ``step`` (B, T, 3): see
+    ``sliding``.
+    """
+    mean, std = (
+        torch.as_tensor(values, dtype=made.dtype, device=made.device)
+        for values in (statistics.pose_mean, statistics.pose_std)
+    )
+    upper, lower = slice(0, UPPER_SIZE), slice(UPPER_SIZE, UPPER_SIZE + LOWER_SIZE)
+
+    def metres(values: Tensor, columns: slice) -> Tensor:
+        within = values.clamp(-_FARTHEST, _FARTHEST)
+        return (within * std[columns] + mean[columns]).unflatten(-1, (-1, 3))
+
+    loss = made.new_zeros(())
+    if part != "lower":
+        bodies, captured = (metres(each[..., upper], upper) for each in (made, true))
+        loss = loss + upper_loss(bodies, captured, calm, given[..., : len(UPPER)])
+
+    if part != "upper":
+        legs, captured = (metres(each[..., -LOWER_SIZE:], lower) for each in (made, true))
+        hips = metres(pelvis, slice(0, 3))[..., 0, :]
+        loss = loss + lower_loss(legs, captured, calm, hips, step)
+
+    return loss
 
 
 def upper_loss(made: Tensor, true: Tensor, calm: Tensor, given: Tensor) -> Tensor:
@@ -89,9 +146,9 @@ def lower_loss(made: Tensor, true: Tensor, calm: Tensor, pelvis: Tensor, step: T
     bones = _bone_error(torch.cat([pelvis[:, :, None], made], dim=2), _LOWER_BONES)
     still = sliding(true[:, :, _FEET], step) < _PLANTED
     planted = still & (true[:, 1:, _TOES, 2] < TOE_HEIGHT + _LOW)
-    low = (
-        2.0 - 2.0 ** ((made[:, 1:, _TOES, 2].detach() - TOE_HEIGHT).clamp_min(0.0) / 0.025)
-    ).clamp_min(0.0)
+    height = (made[:, 1:, _TOES, 2].detach() - TOE_HEIGHT).clamp_min(0.0)
+    low = (2.0 - 2.0 ** (height / _FADE)).clamp_min(0.0)
+
     weight = torch.where(calm[:, None, None], planted.float(), low)
     slid = (sliding(made[:, :, _FEET], step) * weight).sum() / weight.sum().clamp_min(1.0)
     return _followed(made, true, calm) + _BONE * bones + _SLIDE * slid

@@ -16,21 +16,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from ..core.errors import InputError
 from ..core.files import save_text, whole_file
 from ..core.skeleton import STATURE
 from ..core.text import read_json
 from ..core.weights import Weights, load_weights
-from ..data.dataset.prepare import bank_in
 from ..data.held_out.captured import HeldClip
-from .batches import Pool
 from .candidates import has_weights, snapshot, write_weights
 from .evaluate import Measured, measured, row
 from .export import annotate
+from .parts import FlowRun, PredictorRun, saved_runs
 from .plots import curves
-from .train import checkpoints
+from .steps import held_out_pool
 
 __all__ = ["BEST", "CURVES", "RECORD", "likelihoods", "recorded", "said", "score", "validations"]
 
@@ -83,19 +81,18 @@ def likelihoods(folder: Path, dataset: Path) -> dict[str, float]:
     """Negative log-likelihood a frame of held-out windows for each part of a run's flow, its
     weights averaged: nats, in standardised units, with the same draws each time.
     """
-    held = Pool(lambda: [dataset / "held.npz"], torch.device("cpu"), bank_in(dataset))
-    runs = checkpoints(folder)
-    if "predictor" in runs:
-        runs["predictor"].adopt_average()
+    held = held_out_pool(dataset)
+    runs = saved_runs(folder)
+    for run in runs.values():
+        run.adopt_average()
 
     found = {}
     for part, run in runs.items():
-        if part != "predictor":
-            run.adopt_average()
-            if "predictor" in runs:
-                run.gmvae.load_state_dict(runs["predictor"].network.state_dict())
+        if isinstance(run, FlowRun):
+            if isinstance(predictor := runs.get("predictor"), PredictorRun):
+                run.use_predictor(predictor.network.predictor)
             run.config = replace(run.config, free_run=0.0, dropout_windows=0.0)
-            found[part] = run.held_loss(held, _HELD_WINDOWS)
+            found[part] = run.held_out_loss(held, _HELD_WINDOWS)
 
     return found
 
@@ -153,7 +150,7 @@ def validations(
                 if not any(each["weights"] == SHIPPED for each in rows):
                     rows.append({"weights": SHIPPED, **measure(load_weights(None))})
                     _record(folder, rows)
-                runs = checkpoints(copy)
+                runs = saved_runs(copy)
                 spent = every is None or all(run.share >= 1.0 for run in runs.values())
                 parts = {
                     part: {"steps": run.step, "minutes": round(run.seconds / 60, 2)}

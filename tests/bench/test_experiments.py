@@ -22,7 +22,8 @@ from dafnet_addon.data.furnish.boxes import box  # noqa: E402
 from dafnet_addon.data.held_out.captured import HeldClip  # noqa: E402
 from dafnet_addon.data.motion.rests import Rest  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
-from dafnet_addon.training.train import Run, TrainingConfig  # noqa: E402
+from dafnet_addon.training.config import TrainingConfig  # noqa: E402
+from dafnet_addon.training.parts import load_run  # noqa: E402
 
 pytestmark = pytest.mark.torch
 
@@ -61,10 +62,10 @@ def test_all_systems_train_and_land_in_the_tables(
     training = TrainingConfig(batch=4, minutes_predictor=0.005, warmup=2)
     arguments = dataset, tmp_path, 0.02, 1, TINY, training, TINY_SAMP
     experiments.train(*arguments)
-    steps = Run.load("whole", tmp_path / "equal_time" / "moglow").step
+    steps = load_run("whole", tmp_path / "equal_time" / "moglow").step
     for part, folder in (("whole", "ap-p"), ("upper", "dafnet"), ("lower", "dafnet")):
-        assert Run.load(part, tmp_path / "equal_steps" / folder).step == steps
-        assert Run.load(part, tmp_path / "equal_time" / folder).seconds >= 60 * 0.02 / (
+        assert load_run(part, tmp_path / "equal_steps" / folder).step == steps
+        assert load_run(part, tmp_path / "equal_time" / folder).seconds >= 60 * 0.02 / (
             1 if part == "whole" else 2
         )
     before = (tmp_path / "equal_time" / "ap-p" / "whole.checkpoint").read_bytes()

@@ -23,7 +23,9 @@ from dafnet_addon.data.dataset.packed import is_packed, pack, unpack  # noqa: E4
 from dafnet_addon.data.dataset.prepare import load_pool  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training.checkpoints import Checkpoint, slim_run  # noqa: E402
-from dafnet_addon.training.train import Run, TrainingConfig, read_config, train_part  # noqa: E402
+from dafnet_addon.training.config import TrainingConfig, read_config  # noqa: E402
+from dafnet_addon.training.parts import load_run  # noqa: E402
+from dafnet_addon.training.train import train_part  # noqa: E402
 
 pytestmark = pytest.mark.torch
 
@@ -105,7 +107,7 @@ def test_a_slim_run_is_an_eighth_and_is_gone_on_with(dataset, tmp_path):
         < 2 * numbers + 40_000
         < 0.2 * (tmp_path / "run" / "whole.checkpoint").stat().st_size
     )
-    again = Run.load("whole", tmp_path / "slim")
+    again = load_run("whole", tmp_path / "slim")
     for name, parameter in again.network.named_parameters():
         assert torch.allclose(parameter, run.averaged[name], rtol=1e-3, atol=1e-6)
         assert torch.equal(parameter, again.averaged[name])
@@ -175,7 +177,7 @@ def test_one_command_trains_on_a_machine_without_a_network_and_goes_on_on_anothe
     data = json.loads(load_weights(out / "dafnet.safetensors").metadata["data"])
     assert data == {"train": ["Jörg"], "windows": 12}
     for part in ("upper", "lower"):
-        assert Run.load(part, out).step == 20 and Run.load(part, out).config.batch == 4
+        assert load_run(part, out).step == 20 and load_run(part, out).config.batch == 4
     done = _on_gpu(
         *common, "-o", again, "--set", "steps_flow=24", "--resume", out, without=tmp_path
     )

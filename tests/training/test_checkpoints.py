@@ -28,7 +28,10 @@ from dafnet_addon.core.weights import write_safetensors  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training.batches import Statistics  # noqa: E402
 from dafnet_addon.training.checkpoints import Checkpoint, write_checkpoint  # noqa: E402
-from dafnet_addon.training.train import Run, TrainingConfig, train_part, trained  # noqa: E402
+from dafnet_addon.training.config import TrainingConfig  # noqa: E402
+from dafnet_addon.training.parts import load_run, new_run, trained_networks  # noqa: E402
+from dafnet_addon.training.run import Run  # noqa: E402
+from dafnet_addon.training.train import train_part  # noqa: E402
 
 pytestmark = pytest.mark.torch
 
@@ -66,7 +69,7 @@ def test_a_run_that_was_stopped_ends_bit_for_bit_as_one_that_was_not(
     train_part("whole", dataset, tmp_path / "straight", TINY, STEPPED)
     with pytest.raises(_Stopped):
         train_part("whole", dataset, tmp_path / "stopped", TINY, STEPPED, progress=stop)
-    assert Run.load("whole", tmp_path / "stopped").step == 2
+    assert load_run("whole", tmp_path / "stopped").step == 2
     train_part("whole", dataset, tmp_path / "stopped", TINY, STEPPED)
     one, two = (
         Checkpoint.read(tmp_path / name / "whole.checkpoint") for name in ("straight", "stopped")
@@ -137,8 +140,8 @@ def test_a_strangers_run_folder_executes_nothing(
         with (run / f"{part}.{suffix}").open("wb") as file:
             dump(_Hostile(mark), file)
     for read in (
-        lambda: Run.load("whole", run),
-        lambda: trained(run),
+        lambda: load_run("whole", run),
+        lambda: trained_networks(run),
         lambda: load_samp(run / f"samp.{suffix}"),
         lambda: train_part("whole", dataset, run, TINY, STEPPED),
     ):
@@ -184,7 +187,7 @@ def test_a_killed_writer_leaves_the_checkpoint_before(tmp_path: Path, moment: st
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory: pytest.TempPathFactory) -> Checkpoint:
     """The checkpoint of a run after a step."""
-    run = Run("whole", tmp_path_factory.mktemp("run"), TINY, STEPPED, UNIT)
+    run = new_run("whole", tmp_path_factory.mktemp("run"), TINY, STEPPED, UNIT)
     sum(p.sum() for p in run.network.parameters()).backward()
     run.optimiser.step()
     run.step = 1
@@ -202,7 +205,7 @@ def _reads(kept: Checkpoint, folder: Path, tensors: dict[str, Any], state: dict[
         mixed,
         {k: v for k, v in {**kept.state, **state}.items() if v is not None},
     )
-    return Run.load("whole", folder)
+    return load_run("whole", folder)
 
 
 MODEL = TINY.as_dict()
@@ -280,7 +283,7 @@ def test_damaged_files_are_refused_or_read(kept: Checkpoint, tmp_path: Path) -> 
             data[place] = int(rng.integers(256))
         file.write_bytes(data)
         try:
-            Run.load("whole", tmp_path)
+            load_run("whole", tmp_path)
         except InputError as error:
             refused += 1
             assert "\n" not in str(error)
@@ -294,5 +297,5 @@ def test_json_as_deep_as_the_stack_is_refused(kept: Checkpoint, tmp_path: Path) 
             tmp_path / "whole.checkpoint", arrays, {"format": "dafnet-training-1", "state": text}
         )
         with pytest.raises(InputError, match="its state is") as error:
-            Run.load("whole", tmp_path)
+            load_run("whole", tmp_path)
         _one_sentence(error)

@@ -46,6 +46,7 @@ from dafnet_addon.training.batches import (  # noqa: E402
     occupancy_of,
     past_of,
 )
+from dafnet_addon.training.config import TrainingConfig, read_config  # noqa: E402
 from dafnet_addon.training.export import (  # noqa: E402
     adopt_predictor,
     adopted_statistics,
@@ -54,7 +55,9 @@ from dafnet_addon.training.export import (  # noqa: E402
     tensors_of,
 )
 from dafnet_addon.training.noise import noise_along, take_noise  # noqa: E402
-from dafnet_addon.training.train import Run, TrainingConfig, read_config, train_part, trained  # noqa: E402
+from dafnet_addon.training.parts import load_run, new_run, trained_networks  # noqa: E402
+from dafnet_addon.training.run import Run  # noqa: E402
+from dafnet_addon.training.train import train_part  # noqa: E402
 
 pytestmark = pytest.mark.torch
 
@@ -95,7 +98,7 @@ def _until(
 
     with pytest.raises(_Enough):
         train_part(part, dataset, folder, model, _config(steps), progress=progress)
-    return Run.load(part, folder)
+    return load_run(part, folder)
 
 
 def test_pasts_hold_ten_poses_and_eleven_velocities():
@@ -166,7 +169,7 @@ def test_the_sensor_in_torch_is_the_one_in_numpy():
 
 
 def _loss_at(run: Run, dataset: Path) -> float:
-    return run.held_loss(_pool(dataset), windows=12)
+    return run.held_out_loss(_pool(dataset), windows=12)
 
 
 @pytest.mark.parametrize("part", ["predictor", "upper"])
@@ -174,7 +177,7 @@ def test_it_learns(part, dataset, tmp_path):
     folder = tmp_path / "run"
     if part == "upper":
         _until("predictor", dataset, folder, steps=2)
-    fresh = Run(part, tmp_path / "fresh", TINY, _config(10), _pool(dataset).statistics())
+    fresh = new_run(part, tmp_path / "fresh", TINY, _config(10), _pool(dataset).statistics())
     before = _loss_at(fresh, dataset)
     assert _loss_at(_until(part, dataset, folder, steps=40), dataset) < before - 5.0
 
@@ -227,7 +230,7 @@ def test_what_is_exported_is_the_average(dataset, tmp_path):
     model = replace(TINY, system="moglow", steps_whole=1)
     config = replace(_config(1), steps_flow=6, average=0.9)
     run = train_part("whole", dataset, tmp_path, model, config)
-    flow, _, _ = trained(tmp_path)
+    flow, _, _ = trained_networks(tmp_path)
     apart = 0.0
     for name, parameter in flow.parts()["whole"].named_parameters():
         assert torch.equal(parameter, run.averaged[name])
@@ -257,7 +260,7 @@ def test_what_is_exported_is_what_was_trained(dataset, tmp_path):
     folder = tmp_path / "run"
     for part in ("predictor", "upper", "lower"):
         _until(part, dataset, folder, steps=2)
-    flow, predictor, statistics = trained(folder)
+    flow, predictor, statistics = trained_networks(folder)
     export(tmp_path / "w.safetensors", flow, predictor, statistics, {"licence": "none"})
     weights = load_weights(tmp_path / "w.safetensors")
     for name, array in tensors_of(flow, predictor, statistics).items():
@@ -279,7 +282,7 @@ def _exported(dataset: Path, folder: Path, model: ModelConfig) -> Path:
     """Weights of a hardly trained model, in a file."""
     for part in ("predictor", "upper", "lower"):
         _until(part, dataset, folder, steps=2, model=model)
-    flow, predictor, statistics = trained(folder)
+    flow, predictor, statistics = trained_networks(folder)
     export(folder / "w.safetensors", flow, predictor, statistics, {"licence": "none"})
     return folder / "w.safetensors"
 
@@ -287,10 +290,15 @@ def _exported(dataset: Path, folder: Path, model: ModelConfig) -> Path:
 def test_a_run_begins_with_what_weights_have_learnt(dataset, tmp_path):
     weights = load_weights(_exported(dataset, tmp_path / "one", TINY))
     for part in ("predictor", "upper", "lower"):
-        before = Run.load(part, tmp_path / "one")
-        before.gmvae.load_state_dict(Run.load("predictor", tmp_path / "one").network.state_dict())
-        after = Run(part, tmp_path / "two", TINY, _config(2), before.statistics)
-        after.gmvae.load_state_dict(before.gmvae.state_dict())
+        before = load_run(part, tmp_path / "one")
+        predictor = load_run("predictor", tmp_path / "one").network.predictor
+        after = new_run(part, tmp_path / "two", TINY, _config(2), before.statistics)
+        if part == "predictor":
+            # Weights hold the predictor alone, not the rest of its GMVAE.
+            after.network.load_state_dict(before.network.state_dict())
+        else:
+            before.use_predictor(predictor)
+            after.use_predictor(predictor)
         fresh = _loss_at(after, dataset)
         after.adopt(weights)
         # What was stored in 8 bits is off by a little.
@@ -316,22 +324,25 @@ def test_weights_that_were_told_less_of_the_way_ahead_begin_a_model_that_is_told
     assert (statistics.pose_mean == weights.tensors["pose_mean"]).all()
     for part in ("upper", "lower"):
         short, long = (
-            Run(part, tmp_path / "two", model, _config(2), statistics) for model in (before, after)
+            new_run(part, tmp_path / "two", model, _config(2), statistics)
+            for model in (before, after)
         )
         for run in (short, long):
-            adopt_predictor(run.gmvae.predictor, weights)
+            adopt_predictor(run.predictor, weights)
             run.adopt(weights)
         assert abs(_loss_at(short, dataset) - _loss_at(long, dataset)) < 1e-2
     with pytest.raises(WeightsError, match="choose others"):
-        Run("upper", tmp_path / "two", replace(before, width=8), _config(2), found).adopt(weights)
+        new_run("upper", tmp_path / "two", replace(before, width=8), _config(2), found).adopt(
+            weights
+        )
 
 
 def test_the_way_ahead_is_hidden_from_a_share_of_the_windows(dataset, tmp_path):
     statistics = _pool(dataset).statistics()
     root = _pool(dataset).batch(torch.arange(4), statistics, LIVE).root.repeat(100, 1, 1)
     assert root.shape[-1] == 22 and (root[..., -1] == 1.0).all()
-    run = Run("upper", tmp_path, LIVE, replace(_config(2), ahead_hidden=0.25), statistics)
-    told = run._foreseen(root)
+    run = new_run("upper", tmp_path, LIVE, replace(_config(2), ahead_hidden=0.25), statistics)
+    told = run.root_inputs(root)
     hidden = (told[..., 3:] == 0.0).all(-1)
     assert (hidden == hidden[:, :1]).all(), "all along a window or nowhere in it"
     assert 0.15 < float(hidden.float().mean()) < 0.35
@@ -370,8 +381,8 @@ def test_a_wider_network_begins_as_the_narrower_one(dataset, tmp_path):
     for part in ("upper", "lower"):
         losses = []
         for model in (TINY, wide):
-            run = Run(part, tmp_path / "two", model, _config(2), statistics)
-            adopt_predictor(run.gmvae.predictor, weights)
+            run = new_run(part, tmp_path / "two", model, _config(2), statistics)
+            adopt_predictor(run.predictor, weights)
             run.adopt(weights)
             losses.append(_loss_at(run, dataset))
         assert abs(losses[0] - losses[1]) < 1e-3 * abs(losses[0]) + 1e-2
@@ -385,14 +396,14 @@ def test_mixed_precision_is_nearly_the_same(dataset, tmp_path):
     statistics = adopted_statistics(weights, _pool(dataset).statistics())
     losses = []
     for mixed in (False, True):
-        run = Run(
+        run = new_run(
             "upper",
             tmp_path / "two",
             TINY,
             replace(_config(2), mixed=mixed, free_run=1.0),
             statistics,
         )
-        adopt_predictor(run.gmvae.predictor, weights)
+        adopt_predictor(run.predictor, weights)
         run.adopt(weights)
         losses.append(_loss_at(run, dataset))
     assert abs(losses[0] - losses[1]) < 0.02 * abs(losses[0]) + 0.2
@@ -403,7 +414,9 @@ def test_mixed_precision_is_asked_for_only_where_it_is_there(
     dataset, tmp_path, monkeypatch, capsys, there
 ):
     monkeypatch.setattr(precision, "mixes", lambda device: there)
-    run = Run("upper", tmp_path, TINY, replace(_config(2), mixed=True), _pool(dataset).statistics())
+    run = new_run(
+        "upper", tmp_path, TINY, replace(_config(2), mixed=True), _pool(dataset).statistics()
+    )
     switches = [
         module.mixed
         for module in run.flow.modules()
@@ -421,7 +434,7 @@ def test_mixed_precision_is_asked_for_only_where_it_is_there(
 def test_a_step_is_what_its_parts_say_one_after_another(dataset):
     """Conditions joined once and time first, against the plain sum over flow steps in double."""
     torch.manual_seed(0)
-    run = Run("upper", dataset, TINY, _config(1), _pool(dataset).statistics())
+    run = new_run("upper", dataset, TINY, _config(1), _pool(dataset).statistics())
     flow = run.flow.upper.double()
     with torch.no_grad():
         for parameter in flow.parameters():
@@ -472,9 +485,9 @@ def test_chance_hits_its_share_of_values_each_for_itself(share):
 @pytest.mark.parametrize("part", ["predictor", "upper"])
 def test_values_are_hidden_from_the_sensor_in_a_share_of_the_windows(part, dataset, tmp_path):
     config = replace(_config(1), dropout_windows=0.5, environment_dropout=0.5, mixed=True)
-    run = Run(part, tmp_path, TINY, config, _pool(dataset).statistics())
+    run = new_run(part, tmp_path, TINY, config, _pool(dataset).statistics())
     seen = torch.randint(1, 256, (400, 3, 2640), dtype=torch.uint8)
-    shown = run.hidden(seen).float()
+    shown = run.dropped_out(seen).float()
     kept = (shown > 0).float().mean((1, 2))
     assert (shown[kept == 1] - seen[kept == 1].float() / 255).abs().max() < 2e-3
     assert abs((kept == 1).float().mean() - 0.5) < 0.1 and abs(kept[kept < 1].mean() - 0.5) < 0.005
@@ -482,8 +495,8 @@ def test_values_are_hidden_from_the_sensor_in_a_share_of_the_windows(part, datas
 
 
 def test_the_optimiser_is_adam(dataset, tmp_path):
-    run = Run("upper", tmp_path, TINY, _config(1), _pool(dataset).statistics())
-    other = Run("upper", tmp_path, TINY, _config(1), run.statistics)
+    run = new_run("upper", tmp_path, TINY, _config(1), _pool(dataset).statistics())
+    other = new_run("upper", tmp_path, TINY, _config(1), run.statistics)
     plain = torch.optim.Adam(other.network.parameters(), lr=run.config.peak)
     batch = _pool(dataset).batch(torch.arange(12), run.statistics, TINY)
     for _ in range(10):
@@ -637,7 +650,7 @@ def test_free_running_loss_is_zero_for_the_captured_motion_and_knows_sliding():
 @pytest.mark.parametrize("part", ["lower", "upper"])
 def test_the_lower_body_first_runs_freely_too(part: str, dataset: Path, tmp_path: Path):
     pool, model = _pool(dataset), replace(TINY, system="lower-first")
-    run = Run(
+    run = new_run(
         part, tmp_path, model, replace(_config(1), free_run=1.0, mixed=True), pool.statistics()
     )
     loss = run.loss(pool.batch(torch.arange(4), run.statistics, model))
@@ -647,7 +660,7 @@ def test_the_lower_body_first_runs_freely_too(part: str, dataset: Path, tmp_path
 
 def test_running_on_is_the_likelihood_and_the_inverse(dataset):
     torch.manual_seed(0)
-    run = Run("upper", dataset, TINY, _config(1), _pool(dataset).statistics())
+    run = new_run("upper", dataset, TINY, _config(1), _pool(dataset).statistics())
     flow = run.flow.upper
     with torch.no_grad():
         for parameter in flow.parameters():
@@ -730,12 +743,12 @@ def test_baselines_learn_and_their_weights_run(system: str, dataset: Path, tmp_p
     if model.predicts:
         _until("predictor", dataset, folder, steps=2, model=model)
     for part in system_named(model.system).partition:
-        fresh = Run(part, tmp_path / "fresh", model, _config(10), _pool(dataset).statistics())
+        fresh = new_run(part, tmp_path / "fresh", model, _config(10), _pool(dataset).statistics())
         before = _loss_at(fresh, dataset)
         assert (
             _loss_at(_until(part, dataset, folder, steps=40, model=model), dataset) < before - 5.0
         )
-    flow, predictor, statistics = trained(folder)
+    flow, predictor, statistics = trained_networks(folder)
     assert (predictor is None) == (system == "moglow")
     noise = take_noise(flow, predictor, _pool(dataset), statistics)
     export(tmp_path / "w.safetensors", flow, predictor, statistics, {}, noise)
@@ -752,12 +765,12 @@ def test_baselines_learn_and_their_weights_run(system: str, dataset: Path, tmp_p
 def test_a_budget_in_steps_is_spent_by_steps(dataset: Path, tmp_path: Path):
     model = replace(TINY, system="moglow", steps_whole=1)
     run = train_part("whole", dataset, tmp_path, model, replace(_config(50), steps_flow=7))
-    assert run.step == 7 and Run.load("whole", tmp_path).step == 7
+    assert run.step == 7 and load_run("whole", tmp_path).step == 7
 
 
 def test_takes_are_drawn_from_the_noise_along_captured_motion(dataset: Path, tmp_path: Path):
-    run = Run("upper", tmp_path, TINY, _config(1), _pool(dataset).statistics())
-    pool, predictor = _pool(dataset), run.gmvae.predictor
+    run = new_run("upper", tmp_path, TINY, _config(1), _pool(dataset).statistics())
+    pool, predictor = _pool(dataset), run.predictor
     tensors = take_noise(run.flow, predictor, pool, run.statistics)
     batch = pool.batch(torch.arange(12), run.statistics, TINY, noise=0.0)
     for part, noise in noise_along(run.flow, predictor, batch).items():
@@ -777,7 +790,7 @@ def test_what_weights_do_not_say_of_noise_is_the_paper_s(dataset: Path, tmp_path
     file = tmp_path / "w.safetensors"
     for part in ("predictor", "upper", "lower"):
         _until(part, dataset, tmp_path / "run", steps=2)
-    flow, predictor, statistics = trained(tmp_path / "run")
+    flow, predictor, statistics = trained_networks(tmp_path / "run")
     tripled = {"lower.spread": 3.0 * np.eye(24, dtype=np.float32)}
     export(file, flow, predictor, statistics, {}, tripled)
     sampler = Sampler(load_weights(file))

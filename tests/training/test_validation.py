@@ -23,9 +23,11 @@ from dafnet_addon.data.held_out.captured import HeldClip  # noqa: E402
 from dafnet_addon.data.motion.rests import Rest  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training import candidates, validation  # noqa: E402
+from dafnet_addon.training.config import TrainingConfig  # noqa: E402
 from dafnet_addon.training.evaluate import Measured, figures  # noqa: E402
+from dafnet_addon.training.parts import load_run  # noqa: E402
 from dafnet_addon.training.real_report import real_report  # noqa: E402
-from dafnet_addon.training.train import Run, TrainingConfig, train_part  # noqa: E402
+from dafnet_addon.training.train import train_part  # noqa: E402
 from dafnet_addon.training.validation import likelihoods, recorded, score, validations  # noqa: E402
 from kit.places import ROOT  # noqa: E402
 
@@ -76,7 +78,7 @@ def _train(dataset: Path, folder: Path, steps: int) -> None:
         train_part("predictor", dataset, folder, TINY, config)
     for part in ("upper", "lower"):
         train_part(part, dataset, folder, TINY, replace(config, steps_flow=steps))
-        run = Run.load(part, folder)
+        run = load_run(part, folder)
         run.config = config
         run.save()
 
@@ -201,7 +203,7 @@ def test_likelihoods_are_of_the_averaged_weights(described: Path, tmp_path: Path
     _train(described, run, 12)
     averaged = likelihoods(run, described)
     for part in ("predictor", "upper", "lower"):
-        kept = Run.load(part, run)
+        kept = load_run(part, run)
         kept.adopt_average()
         kept.save()
     assert likelihoods(run, described) == averaged == likelihoods(run, described)
@@ -210,7 +212,7 @@ def test_likelihoods_are_of_the_averaged_weights(described: Path, tmp_path: Path
 def test_a_snapshot_is_whole_while_the_run_is_saved(described: Path, tmp_path: Path):
     run = tmp_path / "run"
     _train(described, run, 2)
-    training, done = Run.load("upper", run), threading.Event()
+    training, done = load_run("upper", run), threading.Event()
 
     def save() -> None:
         while not done.is_set():
@@ -223,8 +225,8 @@ def test_a_snapshot_is_whole_while_the_run_is_saved(described: Path, tmp_path: P
         steps = []
         for _ in range(20):
             with candidates.snapshot(run) as copy:
-                steps.append(Run.load("upper", copy).step)
-                assert steps[-1] == Run.load("upper", copy).step
+                steps.append(load_run("upper", copy).step)
+                assert steps[-1] == load_run("upper", copy).step
             assert not copy.exists()
     finally:
         done.set()
@@ -238,13 +240,13 @@ def test_a_copy_is_cooled_and_the_run_is_not_disturbed(described: Path, tmp_path
         candidates.cooled(run, described, out, 0.02)
     _train(described, run, 4)
     for part, seconds in (("upper", 600.0), ("lower", 540.0)):
-        kept = Run.load(part, run)
+        kept = load_run(part, run)
         kept.seconds = seconds
         kept.save()
     before = _files(run)
     candidates._begin_cooling(run, out, 1.0)
     for part in ("upper", "lower"):
-        begun = Run.load(part, out)
+        begun = load_run(part, out)
         assert begun.step == 4 and begun.config.minutes_flow == 11.0
         rates = [
             begun.config.rate(1000, begun.config.share(1000, seconds))
@@ -258,12 +260,12 @@ def test_a_copy_is_cooled_and_the_run_is_not_disturbed(described: Path, tmp_path
     file = candidates.cooled(run, described, out, 1.0)
     assert _files(run) == before and file == out / "dafnet.safetensors"
     for part in ("upper", "lower"):
-        assert Run.load(part, out).step > 4 and Run.load(part, out).share == 1.0
+        assert load_run(part, out).step > 4 and load_run(part, out).share == 1.0
     said = json.loads(load_weights(file).metadata["training"])
     assert said["upper"]["minutes"] >= 11.0 and said["settings"]["cool_down"] == 1.0 / 11.0
-    steps = Run.load("upper", out).step
+    steps = load_run("upper", out).step
     candidates.cooled(run, described, out, 1.0)
-    assert Run.load("upper", out).step == steps, "what is cooled stays so"
+    assert load_run("upper", out).step == steps, "what is cooled stays so"
 
 
 def test_a_run_that_cools_itself_is_cooled_from_before(described: Path, tmp_path: Path):
@@ -271,12 +273,12 @@ def test_a_run_that_cools_itself_is_cooled_from_before(described: Path, tmp_path
     _train(described, run, 60)  # its rate has fallen since step 42
     shutil.copyfile(run / "upper-held.checkpoint", run / "predictor-held.checkpoint")
     candidates._begin_cooling(run, tmp_path / "candidate", 1.0)
-    for name, value in Run.load("predictor", run).averaged.items():
-        assert torch.equal(value, Run.load("predictor", tmp_path / "candidate").averaged[name]), (
+    for name, value in load_run("predictor", run).averaged.items():
+        assert torch.equal(value, load_run("predictor", tmp_path / "candidate").averaged[name]), (
             "the flow has learnt with the predictor as it was done"
         )
-    held = Run.load("upper", run, name="upper-held").step
-    assert 42 <= held < 60 and Run.load("upper", tmp_path / "candidate").step == held
+    held = load_run("upper", run, name="upper-held").step
+    assert 42 <= held < 60 and load_run("upper", tmp_path / "candidate").step == held
     other = tmp_path / "other"
     other.mkdir()
     (other / "mine.txt").write_text("mine", encoding="utf-8")
