@@ -231,9 +231,8 @@ class PartFlow(nn.Module):
     def free_run(
         self, x: Tensor, condition: Tensor, occupancy: Tensor, z: Tensor, kept: int
     ) -> tuple[Tensor, Tensor]:
-        """Log density (B, T) of ``x``, and what the noise ``z`` (B, size), held constant, makes of
-        the frames after the first ``kept`` (B, T − kept, size), with the memory that those have
-        left.
+        """Log density (B, T) of ``x``, and what the noise ``z`` (B, T − kept, size) makes of the
+        frames after the first ``kept``, as many poses, with the memory that those have left.
 
         No pose enters the flow but through its memory, so making all frames costs what measuring
         them does.
@@ -244,8 +243,7 @@ class PartFlow(nn.Module):
 
         z_before, det_before, state = self._to_noise(x[:, :kept], before, None)
         z_after, det_after, _ = self._to_noise(x[:, kept:], after, state)
-        held = z[:, None].expand(-1, x.shape[1] - kept, -1)
-        poses, _ = self._to_pose(held, after, state)
+        poses, _ = self._to_pose(z, after, state)
 
         densities = [_log_density(z_before, det_before), _log_density(z_after, det_after)]
         return torch.cat(densities, dim=1), poses

@@ -29,8 +29,10 @@ class TrainingConfig:
     ``clip_norm``: largest gradient norm. ``free_run``: weight of the losses of motion that the flow
     makes by itself (see ``free_run``; 0 as in the paper), which begins after ``captured`` frames of
     a window, in a share ``cold`` of the batches after the first, with an empty memory, as a take
-    begins; ``calm`` of the windows make it from z = 0. ``mixed``: LSTMs and environment encoders
-    compute in bfloat16, where the device can.
+    begins; ``calm`` of the windows make it from z = 0, ``lively`` of them from noise that lasts and
+    comes and goes as it is found along captured motion while the run goes on (see ``noise``: what
+    takes at temperature 1 are drawn from), the others from one vector of N(0, I). ``mixed``: LSTMs
+    and environment encoders compute in bfloat16, where the device can.
     """
 
     minutes_predictor: float = 5.0
@@ -52,6 +54,7 @@ class TrainingConfig:
     captured: int = 20
     cold: float = 0.25
     calm: float = 0.5
+    lively: float = 0.0
     mixed: bool = False
     save_every: int = 100
     seed: int = 0
@@ -63,6 +66,8 @@ class TrainingConfig:
                 raise ValueError(f"'{name}' must be {least} or more")
         if self.cool_down > 1.0 or self.average >= 1.0:
             raise ValueError("'cool_down' must be 1 at most, and 'average' less than 1")
+        if self.calm + self.lively > 1.0:
+            raise ValueError("'calm' and 'lively' must be 1 at most together")
 
     def share(self, step: int, seconds: float) -> float:
         """Share of the flow's budget that is spent."""

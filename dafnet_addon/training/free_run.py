@@ -1,11 +1,11 @@
 """What motion that the flow makes by itself is held to, beside the likelihood.
 
-The likelihood is learnt along captured poses; sampling walks along the model's own, with one noise
-vector for all frames. These losses are of the poses that such a vector makes after some captured
-frames (the memory knows the phase of the gait from them): at z = 0 they should be the captured
-ones; with any noise targets are met, the pelvis is as high as floor or seat asks, bones keep their
-length and planted feet stay (the paper's section 7 asks for a foot-velocity loss). Metres and
-seconds.
+The likelihood is learnt along captured poses; sampling walks along the model's own, made from
+noise: none, one vector for all frames, or such as comes and goes (``noise``). These losses are of
+the poses that it makes after some captured frames (the memory knows the phase of the gait from
+them): at z = 0 they should be the captured ones; with any noise targets are met, the pelvis is as
+high as floor or seat asks, bones keep their length and planted feet stay (the paper's section 7
+asks for a foot-velocity loss). Metres and seconds.
 """
 
 import torch

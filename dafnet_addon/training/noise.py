@@ -7,8 +7,12 @@ takes draw both (``core.noise.TakeNoise``), as they are found along captured win
 is then how far, and how, real takes differ.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 import torch
+from torch import Tensor
 
 from ..core.noise import TAPS
 from ..model.config import POSE_SIZE
@@ -16,34 +20,66 @@ from ..model.flow import BodyFlow
 from ..model.predictor import ActionPredictor
 from .batches import Batch, Pool, Statistics
 
-__all__ = ["noise_along", "take_noise"]
+__all__ = ["PartNoise", "noise_along", "part_noise", "take_noise"]
 
-_SETTLED = 20  # frames in which the memory fills
-_AT_ONCE = 50  # windows
-_HAIR = 1e-6  # of variance, for what a few windows leave out of the space
+_SETTLED = 20
+"""Frames in which the flow's memory fills."""
+_AT_ONCE = 50
+"""Windows."""
+_HAIR = 1e-6
+"""Of variance, for what a few windows leave out of the space."""
+
+
+@dataclass(frozen=True)
+class PartNoise:
+    """What ``core.noise.TakeNoise`` holds, of a part of the body with n numbers: ``spread`` (n, n)
+    is what lasts, ``passing`` (n, n) and ``taps`` (n, 49) what comes and goes.
+    """
+
+    spread: Tensor
+    passing: Tensor
+    taps: Tensor
+
+    @staticmethod
+    def shapes(size: int) -> dict[str, tuple[int, int]]:
+        """The shapes of a part with so many numbers, by the names of the fields."""
+        return {"spread": (size, size), "passing": (size, size), "taps": (size, TAPS)}
+
+    def draw(self, windows: int, frames: int) -> Tensor:
+        """Noise (B, T, n) at temperature 1, as takes draw it, of torch's own generator."""
+        size, device = len(self.spread), self.spread.device
+        held = torch.randn(windows, 1, size, device=device) @ self.spread.T
+        white = torch.randn(windows, frames + TAPS - 1, size, device=device) @ self.passing.T
+
+        filters = self.taps[:, None]
+        passing = torch.nn.functional.conv1d(white.transpose(1, 2), filters, groups=size)
+        return held + passing.transpose(1, 2)
 
 
 @torch.no_grad()
 def noise_along(
-    flow: BodyFlow, predictor: ActionPredictor | None, batch: Batch
-) -> dict[str, torch.Tensor]:
-    """Noise of each part (B, T, …) along captured windows in FREE mode, each beside the captured
-    parts before it.
+    flow: BodyFlow,
+    predictor: ActionPredictor | None,
+    batch: Batch,
+    parts: Sequence[str] | None = None,
+) -> dict[str, Tensor]:
+    """Noise of each of these parts (None: all) of the flow (B, T, …) along captured windows in FREE
+    mode, each beside the captured parts before it.
     """
     observation = torch.zeros(*batch.upper.shape[:2], POSE_SIZE, device=batch.upper.device)
     given = observation[..., :22]
-    told = batch.past
+    base = batch.past
     if predictor is not None:
-        told = torch.cat([predictor(batch.past, batch.occupancy), batch.root], dim=-1)
+        base = torch.cat([predictor(batch.past, batch.occupancy), batch.root], dim=-1)
 
     pose = torch.cat([batch.upper, batch.lower], dim=-1)
-    conditions = {
-        name: flow.condition(name, told, observation, given, pose) for name in flow.partition
-    }
-    return {
-        name: part(pose[..., flow.partition[name]], conditions[name], batch.occupancy)[0]
-        for name, part in flow.parts().items()
-    }
+    found = {}
+    for name, part in flow.parts().items():
+        if parts is None or name in parts:
+            condition = flow.condition(name, base, observation, given, pose)
+            found[name] = part(pose[..., flow.partition[name]], condition, batch.occupancy)[0]
+
+    return found
 
 
 def take_noise(
@@ -52,9 +88,10 @@ def take_noise(
     pool: Pool,
     statistics: Statistics,
     windows: int = 2000,
+    parts: Sequence[str] | None = None,
 ) -> dict[str, np.ndarray]:
     """The tensors of ``TakeNoise``, by the parts' names and theirs, of as many windows: ``spread``
-    (n, n), what lasts; ``passing`` (n, n); ``taps`` (n, 49).
+    (n, n), what lasts; ``passing`` (n, n); ``taps`` (n, 49). ``parts``: None for all.
 
     Poses are taken as they were captured, without the noise of the training: what comes and goes is
     then motion, not jitter.
@@ -63,7 +100,7 @@ def take_noise(
     found: dict[str, list[np.ndarray]] = {}
     for some in rows.split(_AT_ONCE):
         batch = pool.batch(some, statistics, flow.config, noise=0.0)
-        for part, noise in noise_along(flow, predictor, batch).items():
+        for part, noise in noise_along(flow, predictor, batch, parts).items():
             found.setdefault(part, []).append(noise[:, _SETTLED:].double().cpu().numpy())
 
     tensors: dict[str, np.ndarray] = {}
@@ -76,6 +113,26 @@ def take_noise(
         tensors[f"{part}.taps"] = _filters(passing)
 
     return {name: tensor.astype(np.float32) for name, tensor in tensors.items()}
+
+
+def part_noise(
+    part: str,
+    flow: BodyFlow,
+    predictor: ActionPredictor | None,
+    pool: Pool,
+    statistics: Statistics,
+    windows: int,
+) -> PartNoise:
+    """What takes of a flow that is still learning would draw for one of its parts, on the pool's
+    device.
+    """
+    found = take_noise(flow, predictor, pool, statistics, windows, [part])
+    return PartNoise(
+        **{
+            name: torch.from_numpy(found[f"{part}.{name}"]).to(pool.device)
+            for name in PartNoise.__annotations__
+        }
+    )
 
 
 def _root(values: np.ndarray) -> np.ndarray:

@@ -17,11 +17,12 @@ from ..model.config import AHEAD_SIZE, VELOCITY_SIZE, ModelConfig
 from ..model.flow import BodyFlow, Coupling, EnvironmentEncoder
 from ..model.predictor import GMVAE, ActionPredictor, gumbel_temperature
 from ..model.systems import system_named
-from .batches import Batch, Statistics, observation_for
+from .batches import Batch, Pool, Statistics, observation_for
 from .checkpoints import HELD, Checkpoint, checkpoint_file
 from .config import TrainingConfig
 from .export import adopt_part, adopt_predictor
 from .free_run import free_run_loss
+from .noise import PartNoise, part_noise
 from .run import Run, Setup
 
 __all__ = [
@@ -39,6 +40,12 @@ _MAX_NUMBERS = 1 << 28
 """Of the networks that a checkpoint's settings describe: a GB; the paper's sizes are a seventh of
 it.
 """
+_NOISE = "noise"
+"""Before the names of the tensors in a checkpoint that lively free runs are drawn from."""
+_MEASURED_EVERY = 1000
+"""Steps after which that noise is measured anew."""
+_MEASURED_WINDOWS = 500
+"""Windows that it is measured along: less than a hundredth of the time that those steps take."""
 _STRIDE = 5
 """Frames between two that the predictor learns from: neighbours say nearly the same, and it has no
 memory.
@@ -53,6 +60,9 @@ class PredictorRun(Run):
     @property
     def share(self) -> float:
         return min(1.0, self.seconds / max(60.0 * self.config.minutes_predictor, 1e-9))
+
+    def prepare(self, pool: Pool) -> None:
+        """A predictor needs nothing."""
 
     def _copy(self, weights: Weights) -> None:
         adopt_predictor(self.network.predictor, weights)
@@ -82,6 +92,10 @@ class FlowRun(Run):
                 module.mixed = self.config.mixed
 
         predictor.mixed = self.config.mixed
+        self.noise: PartNoise | None = None
+        """What lively free runs are made from; None where there are none, or before it was
+        measured.
+        """
 
     @property
     def share(self) -> float:
@@ -89,6 +103,38 @@ class FlowRun(Run):
 
     def _copy(self, weights: Weights) -> None:
         adopt_part(self.flow.parts()[self.part], self.part, weights, self.model)
+
+    def prepare(self, pool: Pool) -> None:
+        """Measure the noise of lively free runs, at first and then now and again: what it is
+        changes as the flow learns.
+        """
+        if self.config.lively and (self.noise is None or self.step % _MEASURED_EVERY == 0):
+            self.noise = part_noise(
+                part=self.part,
+                flow=self.flow,
+                predictor=self.predictor if self.model.predicts else None,
+                pool=pool,
+                statistics=self.statistics,
+                windows=_MEASURED_WINDOWS,
+            )
+
+    def _own_tensors(self) -> dict[str, Tensor]:
+        if self.noise is None:
+            return {}
+        return {f"{_NOISE}.{name}": getattr(self.noise, name) for name in PartNoise.__annotations__}
+
+    def restore(self, kept: Checkpoint) -> None:
+        super().restore(kept)
+        # A run that was begun without lively free runs measures their noise when it has some.
+        if self.config.lively and f"{_NOISE}.spread" in kept.tensors:
+            size = self.flow.partition[self.part].stop - self.flow.partition[self.part].start
+            shapes = PartNoise.shapes(size)
+            self.noise = PartNoise(
+                **{
+                    name: kept.tensor(f"{_NOISE}.{name}", torch.empty(shape)).to(self.device)
+                    for name, shape in shapes.items()
+                }
+            )
 
     def use_predictor(self, predictor: ActionPredictor) -> None:
         """Take the weights of a trained predictor, and keep them as they are."""
@@ -113,8 +159,7 @@ class FlowRun(Run):
             return -flow.log_likelihood(x, condition, occupancy, initialise).mean()
 
         captured = 1 if float(torch.rand(())) < self.config.cold else self.config.captured
-        calm = torch.rand(len(x), device=self.device) < self.config.calm
-        z = torch.randn(len(x), x.shape[-1], device=self.device) * ~calm[:, None]
+        z, calm = self._free_run_noise(x[:, captured:])
         density, made = flow.free_run(x, condition, occupancy, z, captured)
 
         loss = free_run_loss(
@@ -128,6 +173,19 @@ class FlowRun(Run):
             statistics=self.statistics,
         )
         return -density.mean() + self.config.free_run * loss
+
+    def _free_run_noise(self, like: Tensor) -> tuple[Tensor, Tensor]:
+        """Noise (B, T, n) that free runs of windows are made from, and where it is zero (B,)."""
+        windows, frames, size = like.shape
+        drawn = torch.rand(windows, device=self.device)
+        calm = drawn < self.config.calm
+        held = torch.randn(windows, size, device=self.device) * ~calm[:, None]
+        z = held[:, None].expand(-1, frames, -1)
+        if self.noise is None:
+            return z, calm
+
+        lively = drawn >= 1.0 - self.config.lively
+        return torch.where(lively[:, None, None], self.noise.draw(windows, frames), z), calm
 
     def _base(self, batch: Batch, occupancy: Tensor) -> Tensor:
         """The condition's first part (B, T, …): action probabilities and root; of MoGlow, past

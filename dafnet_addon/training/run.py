@@ -78,6 +78,10 @@ class Run(ABC):
     def _copy(self, weights: Weights) -> None:
         """Give the network what these weights hold. Raises WeightsError where they do not fit."""
 
+    @abstractmethod
+    def prepare(self, pool: Pool) -> None:
+        """Measure along the training windows what the next step needs, where that is due."""
+
     def adopt(self, weights: Weights) -> None:
         """Begin with what these weights have learnt. Raises WeightsError where they do not fit into
         this model.
@@ -136,6 +140,7 @@ class Run(ABC):
         }
         tensors = {
             **of_training(self.network, self.optimiser),
+            **self._own_tensors(),
             **{f"averaged.{name}": value for name, value in self.averaged.items()},
             **{f"generator.{name}": state for name, state in generators(self.device).items()},
             **{f"statistics.{name}": values for name, values in statistics.items()},
@@ -148,6 +153,10 @@ class Run(ABC):
             "adopted": self.adopted,
         }
         write_checkpoint(checkpoint_file(self.folder, name or self.part), tensors, state)
+
+    def _own_tensors(self) -> dict[str, Tensor]:
+        """What this kind of run keeps in a checkpoint besides."""
+        return {}
 
     def restore(self, kept: Checkpoint) -> None:
         """Go on from what a checkpoint holds, random draws included. Raises InputError where it

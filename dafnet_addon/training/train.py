@@ -211,6 +211,7 @@ def _spend_budget(
 
 def _step(run: Run, pool: Pool) -> Tensor:
     """One step on windows drawn at random; its loss."""
+    run.prepare(pool)
     rows = torch.randint(len(pool), (run.config.batch,))
     batch = pool.batch(rows, run.statistics, run.model)
     loss = run.loss(batch, initialise=run.step == 0 and not run.adopted)

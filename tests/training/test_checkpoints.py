@@ -59,18 +59,21 @@ def _one_sentence(error: pytest.ExceptionInfo[InputError]) -> None:
     assert text.endswith(".") and "\n" not in text and "Traceback" not in text
 
 
+@pytest.mark.parametrize("lively", [0.0, 0.5])
 def test_a_run_that_was_stopped_ends_bit_for_bit_as_one_that_was_not(
-    dataset: Path, tmp_path: Path
+    dataset: Path, tmp_path: Path, lively: float
 ) -> None:
+    config = replace(STEPPED, lively=lively)
+
     def stop(part: str, share: float, loss: float) -> None:
         if share >= 1.0:
             raise _Stopped
 
-    train_part("whole", dataset, tmp_path / "straight", TINY, STEPPED)
+    train_part("whole", dataset, tmp_path / "straight", TINY, config)
     with pytest.raises(_Stopped):
-        train_part("whole", dataset, tmp_path / "stopped", TINY, STEPPED, progress=stop)
+        train_part("whole", dataset, tmp_path / "stopped", TINY, config, progress=stop)
     assert load_run("whole", tmp_path / "stopped").step == 2
-    train_part("whole", dataset, tmp_path / "stopped", TINY, STEPPED)
+    train_part("whole", dataset, tmp_path / "stopped", TINY, config)
     one, two = (
         Checkpoint.read(tmp_path / name / "whole.checkpoint") for name in ("straight", "stopped")
     )
@@ -80,6 +83,7 @@ def test_a_run_that_was_stopped_ends_bit_for_bit_as_one_that_was_not(
     )
     for name, tensor in one.tensors.items():
         assert torch.equal(tensor, two.tensors[name]), name
+    assert ("noise.spread" in one.tensors) == (lively > 0.0)
     lines = [
         json.loads(line)
         for line in (tmp_path / "stopped" / "log.jsonl").read_text(encoding="utf-8").splitlines()
@@ -87,6 +91,19 @@ def test_a_run_that_was_stopped_ends_bit_for_bit_as_one_that_was_not(
     assert [line["step"] for line in lines] == [2, 4], (
         "what was stopped before it was saved is not told twice"
     )
+
+
+def test_a_run_that_was_begun_without_lively_free_runs_goes_on_with_them(
+    dataset: Path, tmp_path: Path
+) -> None:
+    train_part("whole", dataset, tmp_path, TINY, STEPPED)
+    longer = replace(STEPPED, steps_flow=6, lively=0.5)
+    run = train_part("whole", dataset, tmp_path, TINY, longer)
+    assert run.step == 6 and run.noise is not None
+
+    kept = load_run("whole", tmp_path)
+    assert torch.equal(kept.noise.taps, run.noise.taps)
+    assert load_run("whole", tmp_path, replace(longer, lively=0.0)).noise is None
 
 
 def test_samp_goes_on_bit_for_bit_too(dataset: Path, tmp_path: Path) -> None:

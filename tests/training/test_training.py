@@ -665,12 +665,43 @@ def test_running_on_is_the_likelihood_and_the_inverse(dataset):
     with torch.no_grad():
         for parameter in flow.parameters():
             parameter += 0.05 * torch.randn_like(parameter)
-        x, z, occupancy = torch.randn(2, 12, 42), torch.randn(2, 42), torch.rand(2, 12, 2640)
+        x, z, occupancy = torch.randn(2, 12, 42), torch.randn(2, 7, 42), torch.rand(2, 12, 2640)
         condition = torch.randn(2, 12, TINY.condition_size - TINY.code)
         density, made = flow.free_run(x, condition, occupancy, z, 5)
         assert torch.allclose(density, flow.log_likelihood(x, condition, occupancy), atol=1e-3)
         again, _, _ = flow(torch.cat([x[:, :5], made], 1), condition, occupancy)
-    assert (again[:, 5:] - z[:, None]).abs().max() < 1e-3
+    assert (again[:, 5:] - z).abs().max() < 1e-3
+
+
+@pytest.mark.parametrize("part", ["upper", "lower"])
+def test_free_runs_see_the_noise_that_takes_are_drawn_from(
+    part: str, dataset: Path, tmp_path: Path
+):
+    pool = _pool(dataset)
+    config = replace(_config(1), free_run=1.0, calm=0.3, lively=0.6)
+    run = new_run(part, tmp_path, TINY, config, pool.statistics())
+    run.prepare(pool)
+    torch.manual_seed(0)
+    size = run.flow.partition[part].stop - run.flow.partition[part].start
+    z, calm = run._free_run_noise(torch.zeros(4000, 30, size))
+    lively = (z != z[:, :1]).any(-1).any(-1)
+    assert abs(calm.float().mean() - 0.3) < 0.03 and (z[calm] == 0.0).all()
+    assert abs(lively.float().mean() - 0.6) < 0.03 and not (lively & calm).any()
+
+    # What is drawn varies, lasts, and follows upon itself as takes' noise does.
+    found = take_noise(run.flow, run.predictor, pool, run.statistics)
+    lasting, passing, taps = (found[f"{part}.{name}"] for name in ("spread", "passing", "taps"))
+    drawn = z[lively].double().numpy()
+    for apart in (0, 1, 5):
+        pairs = (drawn[:, : 30 - apart] * drawn[:, apart:]).mean((0, 1))
+        held = (lasting.astype(float) ** 2).sum(1)
+        follows = (taps[:, : 49 - apart] * taps[:, apart:]).sum(1) * (passing**2).sum(1)
+        assert np.abs(pairs - (held + follows)).max() < 0.1 * (held + (passing**2).sum(1)).max()
+
+
+def test_calm_and_lively_windows_are_no_more_than_all():
+    with pytest.raises(ValueError, match="together"):
+        TrainingConfig(calm=0.6, lively=0.5)
 
 
 def _tiny_train(
