@@ -41,7 +41,7 @@ from dafnet_addon.model.config import SMALL, ModelConfig
 from dafnet_addon.training import precision
 from dafnet_addon.training.checkpoints import checkpoint_file
 from dafnet_addon.training.config import TrainingConfig
-from dafnet_addon.training.evaluate import Measured, captured, measured, row, rows_of
+from dafnet_addon.training.evaluation.clips import Measured, captured, measured, row, rows_of
 from dafnet_addon.training.export import export
 from dafnet_addon.training.parts import load_run, trained_networks
 from dafnet_addon.training.train import train, train_part

@@ -40,7 +40,7 @@ from dafnet_addon.model.systems import system_named
 from dafnet_addon.training import precision
 from dafnet_addon.training.checkpoints import Checkpoint, checkpoint_file
 from dafnet_addon.training.config import TrainingConfig
-from dafnet_addon.training.evaluate import Measured, captured, measured, row
+from dafnet_addon.training.evaluation.clips import Measured, captured, measured, row
 from dafnet_addon.training.export import export
 from dafnet_addon.training.noise import take_noise
 from dafnet_addon.training.parts import load_run, trained_networks

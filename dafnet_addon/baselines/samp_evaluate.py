@@ -1,4 +1,4 @@
-"""Measures SAMP's networks on held-out clips, as ``training.evaluate`` does flows."""
+"""Measures SAMP's networks on held-out clips, as ``training.evaluation.clips`` does flows."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -8,7 +8,7 @@ import torch
 
 from ..core.threads import one_thread
 from ..data.held_out.captured import HeldClip
-from ..training.evaluate import SEEDS, Figures, Measured, figures, shot_of
+from ..training.evaluation.clips import SEEDS, Figures, Measured, figures, shot_of
 from ..training.processes import spread_out
 from .samp import takes
 from .train import load_samp

@@ -78,9 +78,11 @@ def _on_held_out_clips(
 ) -> Result:
     """The main test: clips of bodies that training has not seen."""
     from ..core.weights import load_weights
+    from ..training.evaluation.contact_sheets import contact_sheets
+    from ..training.evaluation.plots import plot
+    from ..training.evaluation.report import report
+    from ..training.evaluation.report_text import text
     from ..training.export import annotate
-    from ..training.plots import plot
-    from ..training.report import contact_sheets, report, text
 
     weights = load_weights(options.weights)
     found = report(weights, clips, progress)
@@ -106,7 +108,7 @@ def _among_real_furniture(options: argparse.Namespace, progress: Progress) -> Re
     from ..core.weights import load_weights
     from ..data.held_out.real import real_test
     from ..data.held_out.walks import real_walks
-    from ..training.real_report import real_page, real_report, real_text
+    from ..training.evaluation.real_report import real_page, real_report, real_text
 
     if options.save or options.sheets:
         raise InputError(
@@ -132,7 +134,7 @@ def _samp(options: argparse.Namespace, clips: "list[HeldClip]", progress: Progre
     """A checkpoint of SAMP: only the rows, for each way to run its network."""
     from ..baselines.samp_evaluate import measured_samp
     from ..baselines.train import load_samp
-    from ..training.evaluate import rows, table
+    from ..training.evaluation.clips import rows, table
 
     if options.save or options.sheets or options.output:
         raise InputError(

@@ -24,10 +24,10 @@ from ..core.text import read_json
 from ..core.weights import Weights, load_weights
 from ..data.held_out.captured import HeldClip
 from .candidates import has_weights, snapshot, write_weights
-from .evaluate import Measured, measured, row
+from .evaluation.clips import Measured, measured, row
+from .evaluation.plots import curves
 from .export import annotate
 from .parts import FlowRun, PredictorRun, saved_runs
-from .plots import curves
 from .steps import held_out_pool
 
 __all__ = ["BEST", "CURVES", "RECORD", "likelihoods", "recorded", "said", "score", "validations"]

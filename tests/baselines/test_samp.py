@@ -29,7 +29,7 @@ from dafnet_addon.data.furnish.shapes import ABSENT_SHAPE, SHAPES  # noqa: E402
 from dafnet_addon.data.held_out.captured import HeldClip  # noqa: E402
 from dafnet_addon.training import precision  # noqa: E402
 from dafnet_addon.training.batches import Pool  # noqa: E402
-from dafnet_addon.training.evaluate import shot_of  # noqa: E402
+from dafnet_addon.training.evaluation.clips import shot_of  # noqa: E402
 
 pytestmark = pytest.mark.torch
 

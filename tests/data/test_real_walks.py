@@ -45,7 +45,7 @@ def test_they_come_to_rest_on_their_pieces_as_high_as_these_carry_them() -> None
 @pytest.mark.furniture
 def test_the_report_has_rows_of_those_that_are_sent() -> None:
     from dafnet_addon.core.weights import load_weights
-    from dafnet_addon.training.real_report import real_page, real_report, real_text
+    from dafnet_addon.training.evaluation.real_report import real_page, real_report, real_text
 
     walks = real_walks(LIBRARY, "choose")
     one = replace(walks, clips=walks.clips[:1], sent={walks.clips[0].kind: 2}, refused={})

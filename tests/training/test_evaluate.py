@@ -21,7 +21,7 @@ from dafnet_addon.data.capture.mocap import read_clips
 from dafnet_addon.data.furnish.boxes import box
 from dafnet_addon.data.held_out import captured as h
 from dafnet_addon.data.motion.rests import Rest
-from dafnet_addon.training import evaluate as e
+from dafnet_addon.training.evaluation import clips as e
 from kit.places import MOCAP
 
 
@@ -233,7 +233,7 @@ def test_takes_made_together_are_those_that_generate_makes():
 
 @pytest.mark.torch
 def test_beside_measures_all_modes_and_the_likelihood_of_real_poses():
-    from dafnet_addon.training.report import _followed
+    from dafnet_addon.training.evaluation.actions import follow
 
     sampler, clip = Sampler(load_weights()), _clip(40, seated=0)
     runs = e.beside(sampler, clip, seeds=2).runs
@@ -253,21 +253,21 @@ def test_beside_measures_all_modes_and_the_likelihood_of_real_poses():
         "in FREE the clean-up knows of no target"
     )
     assert _figure(runs["legs"], "apd_upper") < 0.1 * _figure(runs["free_t1"], "apd_upper")
-    own = _followed(sampler, (clip, None))
+    own = follow(sampler, (clip, None))
     assert own.actions.shape == (40, 10) and np.allclose(own.actions.sum(1), 1.0, atol=1e-4)
-    again = _followed(sampler, (clip, own.actions))
+    again = follow(sampler, (clip, own.actions))
     assert np.allclose(own.nats, again.nats, atol=1e-2)
     bent = replace(
         clip,
         joints=clip.joints
         + np.where(np.isin(np.arange(22), UPPER), 0.3, 0.0)[:, None] * (0.0, 1.0, 0.0),
     )
-    assert _followed(sampler, (bent, None)).nats.mean() > own.nats.mean() + 10.0
+    assert follow(sampler, (bent, None)).nats.mean() > own.nats.mean() + 10.0
 
 
 @pytest.mark.torch
 def test_the_rounds_of_a_long_walk_are_alike():
-    from dafnet_addon.training.report import long_rooms, seat_rooms
+    from dafnet_addon.training.evaluation.rooms import long_rooms, seat_rooms
 
     for room in long_rooms():
         path, rests = room.walked.path, room.walked.rests
@@ -303,7 +303,7 @@ def test_actions_that_tell_frames_apart():
 
 @pytest.mark.torch
 def test_criteria_know_what_is_at_most_and_what_is_at_least():
-    from dafnet_addon.training.report import Criterion
+    from dafnet_addon.training.evaluation.criteria import Criterion
 
     def met(value: float, most: bool) -> str:
         return Criterion("", value, 2.0, 1.5 if most else 2.5, most, "").met

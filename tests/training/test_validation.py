@@ -24,9 +24,9 @@ from dafnet_addon.data.motion.rests import Rest  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training import candidates, validation  # noqa: E402
 from dafnet_addon.training.config import TrainingConfig  # noqa: E402
-from dafnet_addon.training.evaluate import Measured, figures  # noqa: E402
+from dafnet_addon.training.evaluation.clips import Measured, figures  # noqa: E402
+from dafnet_addon.training.evaluation.real_report import real_report  # noqa: E402
 from dafnet_addon.training.parts import load_run  # noqa: E402
-from dafnet_addon.training.real_report import real_report  # noqa: E402
 from dafnet_addon.training.train import train_part  # noqa: E402
 from dafnet_addon.training.validation import likelihoods, recorded, score, validations  # noqa: E402
 from kit.places import ROOT  # noqa: E402

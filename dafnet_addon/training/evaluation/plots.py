@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.files import whole_file
+from ...core.files import whole_file
 
 __all__ = ["curves", "plot"]
 

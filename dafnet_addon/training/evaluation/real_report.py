@@ -5,10 +5,11 @@ captured motion itself; and where nobody was captured, but the director sends th
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..core.weights import Weights
-from ..data.held_out.captured import HeldClip
-from ..data.held_out.walks import Walks
-from .evaluate import Measured, measured, rows_of, table
+from ...core.weights import Weights
+from ...data.held_out.captured import HeldClip
+from ...data.held_out.walks import Walks
+from .clips import Measured, measured, rows_of, table
+from .markdown import markdown_table
 
 __all__ = ["real_page", "real_report", "real_text"]
 
@@ -144,12 +145,15 @@ def real_page(report: dict[str, Any], title: str) -> str:
 def _page_table(
     cells: dict[str, Callable[[dict[str, Any]], str]], groups: dict[str, dict[str, Any]]
 ) -> str:
-    lines = ["| | " + " | ".join(cells) + " |", "|---" * (len(cells) + 1) + "|"]
-    for number, (name, rows) in enumerate(groups.items()):
-        if rows:
-            label = name if number else f"**{name}**"
-            lines.append(f"| {label} | " + " | ".join(cell(rows) for cell in cells.values()) + " |")
-    return "\n".join(lines)
+    labels = [name if number else f"**{name}**" for number, name in enumerate(groups)]
+    return markdown_table(
+        ("", *cells),
+        [
+            (label, *(cell(rows) for cell in cells.values()))
+            for label, rows in zip(labels, groups.values(), strict=True)
+            if rows
+        ],
+    )
 
 
 def _within(run: str) -> Callable[[dict[str, Any]], str]:

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from ..core import liveliness
-from ..core.cleanup import CleanUp
-from ..core.conditions import PREROLL, Shot, shot_steps
-from ..core.generate import cleaned_up
-from ..core.kinematics import on_bones
-from ..core.metrics import (
+from ...core import liveliness
+from ...core.cleanup import CleanUp
+from ...core.conditions import PREROLL, Shot, shot_steps
+from ...core.generate import cleaned_up
+from ...core.kinematics import on_bones
+from ...core.metrics import (
     BAD_COLLISION_JOINTS,
     bad_collisions,
     body_points,
@@ -31,19 +31,20 @@ from ..core.metrics import (
     penetration,
     skate,
 )
-from ..core.occupancy import distance
-from ..core.progress import run_to_end
-from ..core.root import forward_of, to_world
-from ..core.sampler import Sampler
-from ..core.series import MODEL_FPS
-from ..core.skeleton import END_EFFECTORS, FEET, LOWER, PELVIS, POSE_SIZE, STATURE, UPPER
-from ..core.solids import Scene
-from ..core.take import MODES, Controls
-from ..core.threads import one_thread
-from ..core.weights import Weights
-from ..data.held_out.captured import HeldClip
-from ..model.systems import sampler_of
-from .processes import spread_out
+from ...core.occupancy import distance
+from ...core.progress import run_to_end
+from ...core.root import forward_of, to_world
+from ...core.sampler import Sampler
+from ...core.series import MODEL_FPS
+from ...core.skeleton import END_EFFECTORS, FEET, LOWER, PELVIS, POSE_SIZE, STATURE, UPPER
+from ...core.solids import Scene
+from ...core.take import MODES, Controls
+from ...core.threads import one_thread
+from ...core.weights import Weights
+from ...data.held_out.captured import HeldClip
+from ...model.systems import sampler_of
+from ..processes import spread_out
+from .markdown import markdown_table
 
 __all__ = [
     "COLUMNS",
@@ -77,14 +78,20 @@ _RUNS = (
     "full_t0_clean",
     "full_t1",
 )
-# centimetres between the made and the real pelvis, the median over an episode
 _SITS_WITHIN = (2, 4, 6, 8)
-# metres, the pelvis of one that stands: the real one's, and at least
-_STANDING, _STANDS_ABOVE = 0.90, 0.86
-_DEEP = 0.02  # metres inside furniture, from where on a body is seen to penetrate it
-_OFF_FLOOR = 0.07  # metres; under it the paper counts a toe base as low
+"""Centimetres between the made and the real pelvis, the median over an episode."""
+_STANDING = 0.90
+"""Metres of the captured pelvis of one who stands."""
+_STANDS_ABOVE = 0.86
+"""Metres of the made pelvis, where it should stand, that count as standing."""
+_DEEP = 0.02
+"""Metres inside furniture, from where on a body is seen to penetrate it."""
+_OFF_FLOOR = 0.07
+"""Metres; under it the paper counts a toe base as low."""
 _DRAWS = 1000
-_LEGS = [1 + 4 * (j - 1) + k for j in LOWER for k in range(4)]  # of ``body_points``
+"""Of the bootstrap."""
+_LEGS = [1 + 4 * (j - 1) + k for j in LOWER for k in range(4)]
+"""The legs' rows of ``body_points``."""
 
 Sums = dict[str, tuple[float, float]]
 """By the name of a figure: its total and its weight (frames, episodes), so that clips can be
@@ -425,15 +432,10 @@ def table(rows: dict[str, dict[str, Any]], columns: Sequence[str] = COLUMNS) -> 
         between = values.get("intervals", {}).get(name)
         return f"{values[name]:g}" + (f" ({between[0]:g} to {between[1]:g})" if between else "")
 
-    lines = [
-        "| | " + " | ".join(name.replace("_", " ") for name in names) + " |",
-        "|---" * (len(names) + 1) + "|",
-    ]
-    for label, values in rows.items():
-        lines.append(
-            f"| {label.replace('_', ' ')} | "
-            + " | ".join(cell(values, name) for name in names)
-            + " |"
-        )
-
-    return "\n".join(lines)
+    return markdown_table(
+        ("", *(name.replace("_", " ") for name in names)),
+        [
+            (label.replace("_", " "), *(cell(values, name) for name in names))
+            for label, values in rows.items()
+        ],
+    )
