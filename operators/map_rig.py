@@ -7,14 +7,14 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
+from ..dafnet_addon.blender.rig.detection import detect_map
 from ..dafnet_addon.blender.rig.maps import (
     NEEDED,
-    detected,
-    in_names_of,
     load_map,
     map_files,
-    required,
+    require_usable,
     save_map,
+    with_bone_names_of,
 )
 from ..dafnet_addon.blender.rig.properties import map_of, presets, rig_of, show_map
 from .base import DafnetOperator
@@ -47,7 +47,7 @@ class DAFNET_OT_detect_rig(_OfRig, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> None:
         """Fill the list."""
         rig = _rig(context)
-        found = detected(rig)
+        found = detect_map(rig)
         show_map(rig, found)
         missing = [joint for joint in NEEDED if joint not in found.joints]
         if missing:
@@ -69,7 +69,7 @@ class DAFNET_OT_load_rig_map(_OfRig, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> None:
         """Fill the list."""
         rig = _rig(context)
-        found = in_names_of(load_map(map_files()[self.preset]), rig.data.bones.keys())
+        found = with_bone_names_of(load_map(map_files()[self.preset]), rig.data.bones.keys())
         show_map(rig, found)
         self.report({"INFO"}, f"{found.name}: {len(found.joints)} joints")
 
@@ -92,6 +92,6 @@ class DAFNET_OT_save_rig_map(_OfRig, bpy.types.Operator):
         """Write the file."""
         rig = _rig(context)
         rig_map = map_of(rig)
-        required(rig, rig_map)
+        require_usable(rig, rig_map)
         file = save_map(rig_map, self.name)
         self.report({"INFO"}, f"Saved '{file.name}'")

@@ -9,7 +9,12 @@ import bpy
 import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.takes import add_take
-from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay import contents, display, faults
+from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay import (
+    contents,
+    display,
+    faults,
+    watched,
+)
 from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.cache import cache
 from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.drawing import compose
 from bl_ext.user_default.dafnet.dafnet_addon.core.generate import Draw
@@ -84,7 +89,7 @@ def shot(blender):
         display.switch(kind, False)
     display.hide_live_pose()
     display.hide_faults()
-    contents.forget()
+    watched.forget()
 
 
 def standing(frames: int, speed: float = 0.0) -> np.ndarray:
@@ -389,14 +394,14 @@ def test_another_object_may_be_active(shot: Shot) -> None:
     shot.scene.frame_set(5)
     objects = bpy.context.view_layer.objects
     objects.active = shot.cube
-    assert contents.watched_character(bpy.context) == shot.ann, "the only character"
+    assert watched.watched_character(bpy.context) == shot.ann, "the only character"
     objects.active = shot.ann
     bpy.ops.dafnet.add_character(name="Bob")
-    assert contents.watched_character(bpy.context).name == "Bob"
+    assert watched.watched_character(bpy.context).name == "Bob"
     bpy.ops.object.select_all(action="DESELECT")
     objects.active = shot.cube
     cache.note_edit(None)
-    assert contents.watched_character(bpy.context).name == "Bob", (
+    assert watched.watched_character(bpy.context).name == "Bob", (
         "the last one, while the furniture is worked on"
     )
 

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
-from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, maps
+from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, detection, maps
 from bl_ext.user_default.dafnet.dafnet_addon.core.generate import generate
 from bl_ext.user_default.dafnet.dafnet_addon.core.paths import Route, Stop, route
 from bl_ext.user_default.dafnet.dafnet_addon.core.solids import Box, Scene
@@ -120,7 +120,7 @@ class RigStage(Stage):
         """Its bones: detected, but for the odd one."""
         if kind == "odd":
             return maps.RigMap("Odd", joints=humanoids.ODD, root="Wurzel")
-        return maps.detected(rig)
+        return detection.detect_map(rig)
 
     def bake(self, kind: str, rig: Any, **options: Any) -> Any:
         """Bake what she plays onto the rig."""

@@ -6,27 +6,20 @@ is asked for, so that what was deleted or undone is simply not there; what was c
 ``cache`` until the frame, the scene or the take changes.
 """
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection
 
 import bpy
 import numpy as np
-from mathutils import Euler
 
-from ...core.cleanup import standing_still
 from ...core.errors import DafnetError
 from ...core.metrics import BAD_COLLISION_JOINTS, bad_collisions
 from ...core.occupancy import distance, occupancy
-from ...core.resampling import frame_times, resample_nearest, resample_positions
 from ...core.root import RootPath, root_from_matrices, to_world
-from ...core.rotations import matrix_from_quaternion
 from ...core.sensor import SPHERES
-from ...core.series import MODEL_FPS
 from ...core.skeleton import END_EFFECTORS, FEET
-from ...core.take import Controls, Take
-from ..character.armature import character_scale, is_character, metres_per_unit, sent
-from ..character.takes import PACKED, played_take, stored_take, takes_of
-from ..compat import action_curves
+from ...core.take import Controls
+from ..character.armature import character_scale, metres_per_unit
+from ..character.takes import played_take, takes_of
 from .cache import cache
 from .drawing import (
     ABOVE_FLOOR,
@@ -40,15 +33,14 @@ from .drawing import (
     ring,
 )
 from .nearby import furniture_near
+from .root_path import root_path
+from .watched import played_now, unpacked_take, watched_character
 
 __all__ = [
     "CIRCLE",
     "KINDS",
     "drawings",
-    "forget",
     "live_pose",
-    "root_path",
-    "watched_character",
 ]
 
 _EMPTY_SPHERE = np.array((0.35, 0.75, 1.0, 0.6))
@@ -82,98 +74,6 @@ _SPHERE_RADIUS = 0.018
 """Metres; radius of the bead of an empty sphere. A full one is twice as large."""
 _TICKS_A_SECOND = 4
 """How many facings of the path, and gaps to a target, are drawn for each second."""
-_CAPACITY = 24
-"""Takes that stay unpacked, since ghosts are shown together."""
-
-
-def forget() -> None:
-    """Drop what was computed, and which character was watched."""
-    cache.forget()
-    _last_watched[:] = None, ""
-
-
-# The character that is watched, and the take that it plays.
-
-_last_watched: list[object] = [None, ""]
-"""What the watched character was found from, and its name."""
-
-
-def watched_character(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The character that overlays are for: see ``armature.sent``; where there is none, the one they
-    were for last.
-    """
-    scene, active = context.scene, context.object
-    key = cache.edits, scene.session_uid, active.session_uid if active else 0
-    last = scene.objects.get(_last_watched[1])
-    if last is not None and _last_watched[0] == key:
-        return last
-
-    character, _ = sent(context)
-    if character is None and last is not None and is_character(last):
-        character = last
-
-    _last_watched[:] = key, character.name if character else ""
-    return character
-
-
-@dataclass(frozen=True)
-class _UnpackedTake:
-    """A take, the controls it was made from, and ``planted`` (T, 2): whether the left and the right
-    foot are planted.
-    """
-
-    take: Take
-    controls: Controls
-    planted: np.ndarray
-
-
-def _unpacked(action: bpy.types.Action) -> _UnpackedTake | None:
-    """The take that an action holds; None where it holds none."""
-    if PACKED not in action:
-        return None
-
-    def unpack() -> _UnpackedTake:
-        take, controls = stored_take(action)
-        return _UnpackedTake(take, controls, _planted(take))
-
-    return cache.recall("takes", action.session_uid, unpack, _CAPACITY)
-
-
-def _planted(take: Take) -> np.ndarray:
-    """Whether feet are planted (T, 2) at the take's own rate."""
-    own = frame_times(len(take), take.fps)
-    model = frame_times(len(take.path), MODEL_FPS)
-    joints = resample_positions(take.joints / take.scale, own, model)
-
-    planted = np.zeros((len(model), 2), bool)
-    for foot, start, stop in standing_still(joints, take.path.position[:, 2]):
-        planted[start:stop, foot] = True
-    return resample_nearest(planted, model, own)
-
-
-@dataclass(frozen=True)
-class _Played:
-    """The take that is played, its ``action``, and its ``frame`` that is the scene's current one;
-    None outside the take.
-    """
-
-    action: bpy.types.Action
-    unpacked: _UnpackedTake
-    frame: int | None
-
-    @property
-    def take(self) -> Take:
-        return self.unpacked.take
-
-
-def _played(context: bpy.types.Context, armature: bpy.types.Object) -> _Played | None:
-    """The take that the armature plays; None where it plays none."""
-    action = played_take(armature)
-    unpacked = _unpacked(action) if action else None
-    if action is None or unpacked is None:
-        return None
-    frame = context.scene.frame_current - action.dafnet.frame_start
-    return _Played(action, unpacked, frame if 0 <= frame < len(unpacked.take) else None)
 
 
 # Poses.
@@ -202,7 +102,7 @@ def _ghosts(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Dra
     def draw() -> tuple[Drawing, ...]:
         figures = []
         for row, action in shown:
-            unpacked = _unpacked(action)
+            unpacked = unpacked_take(action)
             if unpacked is None:
                 continue
 
@@ -224,78 +124,6 @@ def _ghosts(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Dra
 
 
 # The root's path.
-
-
-def root_path(
-    context: bpy.types.Context, armature: bpy.types.Object
-) -> tuple[RootPath, int] | None:
-    """The root's path and its first frame: the played take's, in metres; else the root's own keys
-    over the frame range.
-
-    None where there is neither, or where constraints or drivers move the root, which only playing
-    the scene could tell.
-    """
-    played = _played(context, armature)
-    if played is not None:
-        return root_from_matrices(played.take.root)[0], played.action.dafnet.frame_start
-
-    root, own, scene = armature.dafnet.root, armature.dafnet, context.scene
-    if root is None:
-        return None
-
-    first, last = (
-        (scene.frame_start, scene.frame_end)
-        if own.use_scene_range
-        else (own.frame_start, own.frame_end)
-    )
-    matrices = _keyed_matrices(root, range(first, last + 1))
-    if matrices is None:
-        return None
-
-    path, _ = root_from_matrices(matrices)
-    return RootPath(path.position * metres_per_unit(scene), path.yaw), first
-
-
-def _keyed_matrices(root: bpy.types.Object, frames: range) -> np.ndarray | None:
-    """World matrices (T, 4, 4) of the root by its keys alone, Blender units; a parent counts as it
-    stands now.
-    """
-    curves = {(c.data_path, c.array_index): c for c in action_curves(root) if not c.mute}
-    data = root.animation_data
-    if (
-        not curves
-        or not len(frames)
-        or (data and data.drivers)
-        or any(not constraint.mute for constraint in root.constraints)
-    ):
-        return None
-
-    def values(path: str, unkeyed: Sequence[float]) -> np.ndarray:
-        channels = [curves.get((path, index)) for index in range(len(unkeyed))]
-        return np.array(
-            [
-                [
-                    c.evaluate(frame) if c else value
-                    for c, value in zip(channels, unkeyed, strict=True)
-                ]
-                for frame in frames
-            ]
-        )
-
-    basis = np.tile(np.eye(4), (len(frames), 1, 1))
-    basis[:, :3, 3] = values("location", root.location)
-    if root.rotation_mode == "QUATERNION":
-        basis[:, :3, :3] = matrix_from_quaternion(
-            values("rotation_quaternion", root.rotation_quaternion)
-        )
-    elif root.rotation_mode == "AXIS_ANGLE":
-        basis[:, :3, :3] = np.array(root.matrix_basis.to_3x3().normalized())
-    else:
-        angles = values("rotation_euler", root.rotation_euler)
-        basis[:, :3, :3] = [np.array(Euler(a, root.rotation_mode).to_matrix()) for a in angles]
-
-    above = np.array(root.matrix_world @ root.matrix_basis.inverted_safe())
-    return above @ basis if np.isfinite(above).all() else None
 
 
 def _path(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Drawing, ...]:
@@ -331,7 +159,7 @@ def _floor_of(context: bpy.types.Context, armature: bpy.types.Object, place: np.
     """The floor's height, world metres: that of the played take, else that of the root at ``place``
     (3,).
     """
-    played = _played(context, armature)
+    played = played_now(context, armature)
     return float(place[2] if played is None else np.median(played.take.root[:, 2, 3]))
 
 
@@ -371,7 +199,7 @@ def _spheres(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Dr
 
 def _circle(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Drawing, ...]:
     """The circle of the played take's action at the current frame."""
-    played = _played(context, armature)
+    played = played_now(context, armature)
     if played is None or played.frame is None or not played.take.action.size:
         return ()
     shares = played.take.action[played.frame]
@@ -386,7 +214,7 @@ def _contacts(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[D
     """Rings around planted feet; beads on joints that touch the furniture as it is now, or are
     inside it.
     """
-    played = _played(context, armature)
+    played = played_now(context, armature)
     if played is None or played.frame is None:
         return ()
 
@@ -428,7 +256,7 @@ def _reach(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Draw
     """The paths of head and hands and of their targets, and how far apart the two are now, in
     centimetres.
     """
-    played = _played(context, armature)
+    played = played_now(context, armature)
     if played is None:
         return ()
 

@@ -17,9 +17,10 @@ from bpy.props import BoolProperty, PointerProperty
 from ..character.takes import played_take
 from . import contents
 from .cache import cache
-from .contents import CIRCLE, KINDS, watched_character
+from .contents import CIRCLE, KINDS
 from .drawing import Drawing
 from .faults import Faults, fault_bars
+from .watched import forget, watched_character
 
 __all__ = [
     "Overlays",
@@ -188,7 +189,7 @@ def _arrange() -> None:
     if not view:
         _batches.clear()
     if not listening:
-        contents.forget()
+        forget()
 
     _redraw()
 
@@ -213,7 +214,7 @@ def _other_frame(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None 
 
 @persistent
 def _undone(*_: object) -> None:
-    contents.forget()
+    forget()
     _batches.clear()
 
 

@@ -2,26 +2,20 @@
 animator's own, in a new action.
 """
 
-import re
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import bpy
 import numpy as np
-from mathutils import Euler, Matrix, Quaternion
 
 from ...core.body import canonical_body
 from ...core.errors import InputError
 from ...core.limb_errors import limb_errors
 from ...core.retargeting import retarget
 from ...core.root import root_from_matrices
-from ...core.rotations import continuous_signs, normalised, quaternion_from_matrix
 from ...core.skeleton import ANKLES, HEAD, HIPS, JOINTS, WRISTS
 from ..character.armature import character_scale, metres_per_unit
 from ..character.mannequin import FACING
-from ..compat import action_curves, assign_action, new_action
-from ..pipeline.baker import TRANSFORMS, has_drivers, key_curves
+from ..pipeline.baker import TRANSFORMS, has_drivers
 from ..pipeline.rollback import undone_on_failure
 from ..scene.playback import frame_kept
 from .controls import (
@@ -33,17 +27,15 @@ from .controls import (
     find_attachments,
     rotations_without,
 )
-from .maps import RigMap, in_names_of, required
+from .keys import key_control, key_object, rekey_rotation
+from .maps import RigMap, require_usable, with_bone_names_of
+from .preparation import overruled, prepare_rig
 from .reading import character_motion, pose_matrices, rigid_parts, shape_of
 
 __all__ = ["Baked", "bake_onto_rig", "frames_played"]
 
 _MEASURED_FRAMES = 24
 """How many frames the result is measured in."""
-_INTERFERING = 1e-3
-"""How far a matrix of a joint's bone changes, at least, when a bone that interferes is moved."""
-_BONE_PATH = re.compile(r'^pose\.bones\["(.+?)"\](?:\["(.+)"\])?')
-Curves = Callable[[str, int, str], bpy.types.FCurve]
 
 
 @dataclass(frozen=True)
@@ -111,8 +103,8 @@ def bake_onto_rig(
             f"The character '{character.name}' shows its rest position; set it to Pose Position."
         )
 
-    rig_map = in_names_of(rig_map, rig.data.bones.keys()) if rig.mode != "EDIT" else rig_map
-    required(rig, rig_map)
+    rig_map = with_bone_names_of(rig_map, rig.data.bones.keys()) if rig.mode != "EDIT" else rig_map
+    require_usable(rig, rig_map)
 
     controls = controls_of(rig, rig_map, limbs, root_motion == "BONE")
     recording = _record(context, character, rig, frames)
@@ -161,7 +153,15 @@ def _bake(
     options: _BakeOptions,
 ) -> Baked:
     previous = rig.animation_data.action if rig.animation_data else None
-    add_curve = _prepare_rig(context, rig=rig, rig_map=rig_map, controls=controls, options=options)
+    add_curve = prepare_rig(
+        context,
+        rig=rig,
+        rig_map=rig_map,
+        controls=controls,
+        limbs=options.limbs,
+        name=options.name,
+        first=options.frames[0],
+    )
     action = rig.animation_data.action
 
     attachments = find_attachments(context, rig, controls)
@@ -188,10 +188,14 @@ def _bake(
         carrier=carrier if options.root_motion == "BONE" else objects,
     )
 
-    local = np.linalg.inv(recording.above) @ objects
-    _key_object(rig, add_curve, options=options, matrices=local, rest=basis)
+    if options.root_motion == "OBJECT":
+        local = np.linalg.inv(recording.above) @ objects
+        key_object(rig, add_curve, matrices=local, frames=options.frames)
+    else:
+        key_object(rig, add_curve, matrices=basis[None], frames=options.frames[:1])
+
     curves = {
-        control.bone: _key_control(
+        control.bone: key_control(
             rig, add_curve, control, channels=channels, index=index, frames=options.frames
         )
         for index, control in enumerate(controls)
@@ -223,66 +227,8 @@ def _bake(
         errors=errors,
         angles=angles,
         ratio=retargeted.ratio,
-        overruled=_overruled(rig, controls),
+        overruled=overruled(rig, controls),
     )
-
-
-def _prepare_rig(
-    context: bpy.types.Context,
-    *,
-    rig: bpy.types.Object,
-    rig_map: RigMap,
-    controls: list[Control],
-    options: _BakeOptions,
-) -> Curves:
-    """Let the rig play a new action in which its settings are keyed and everything at rest that
-    would interfere; returns what adds curves to it.
-    """
-    moved, switched = _animated(rig)
-    action, add_curve = new_action(rig, options.name)
-    action.use_fake_user = True
-    assign_action(rig, action)
-    first = options.frames[0]
-
-    for bone, key, value in (
-        *rig_map.settings.get(options.limbs, ()),
-        *rig_map.settings.get("BOTH", ()),
-    ):
-        _key_setting(rig, add_curve, bone=bone, key=key, value=value, frame=first)
-        switched.discard((bone, key))
-
-    for bone, key in switched:
-        value = rig.pose.bones[bone].get(key)
-        _key_setting(rig, add_curve, bone=bone, key=key, value=value, frame=first)
-
-    moved |= {bone.name for bone in rig.pose.bones if bone.matrix_basis != Matrix.Identity(4)}
-    unmapped = moved - {control.bone for control in controls}
-    for bone in _interfering(context, rig, rig_map, unmapped):
-        _key_rest(rig.pose.bones[bone], add_curve, first, ("location", "rotation", "scale"))
-    for control in controls:
-        if control.bone in moved:
-            kinds = ("location", "scale")[control.moves :]
-            _key_rest(rig.pose.bones[control.bone], add_curve, first, kinds)
-
-    return add_curve
-
-
-def _overruled(rig: bpy.types.Object, controls: list[Control]) -> tuple[str, ...]:
-    """Controls that constraints or drivers of their own move, in addition to their keys."""
-
-    def moved(name: str) -> bool:
-        own = any(
-            not constraint.mute and constraint.influence > 0.0
-            for constraint in rig.pose.bones[name].constraints
-        )
-        return own or has_drivers(
-            rig,
-            tuple(
-                f'pose.bones["{bpy.utils.escape_identifier(name)}"].{part}' for part in TRANSFORMS
-            ),
-        )
-
-    return tuple(control.bone for control in controls if moved(control.bone))
 
 
 def _facing(bodies: np.ndarray) -> np.ndarray:
@@ -355,168 +301,6 @@ def _record(
     return recording
 
 
-def _animated(rig: bpy.types.Object) -> tuple[set[str], set[tuple[str, str]]]:
-    """Bones, and custom properties of bones, that the action moves which the rig plays."""
-    moved, switched = set(), set()
-    for curve in action_curves(rig):
-        found = _BONE_PATH.match(curve.data_path)
-        bone, key = (
-            (bpy.utils.unescape_identifier(part or "") for part in found.groups())
-            if found
-            else ("", "")
-        )
-        if key and bone in rig.pose.bones:
-            switched.add((bone, key))
-        elif bone in rig.pose.bones:
-            moved.add(bone)
-
-    return moved, switched
-
-
-def _interfering(
-    context: bpy.types.Context, rig: bpy.types.Object, rig_map: RigMap, suspects: set[str]
-) -> list[str]:
-    """Those among some bones that move joints when they are moved; they are left at rest, while the
-    others keep their pose.
-
-    In control rigs they need not be parents of what they move, so each of them is tried.
-    """
-    poses = {name: rig.pose.bones[name].matrix_basis.copy() for name in suspects}
-    places = [rig_map.place(joint) for joint in JOINTS]
-    for name in suspects:
-        rig.pose.bones[name].matrix_basis.identity()
-
-    rest = pose_matrices(evaluated_now(context, rig), places) if suspects else np.empty(0)
-
-    found = []
-    for name in sorted(suspects):
-        bone = rig.pose.bones[name]
-        bone.matrix_basis = Matrix.Rotation(0.3, 4, "X") @ Matrix.Rotation(0.3, 4, "Z")
-        bone.location = (0.1 * bone.length,) * 3
-        change = np.abs(pose_matrices(evaluated_now(context, rig), places) - rest)
-        if np.nanmax(change) > _INTERFERING:
-            found.append(name)
-
-        bone.matrix_basis.identity()
-
-    for name in suspects - set(found):
-        rig.pose.bones[name].matrix_basis = poses[name]
-
-    return found
-
-
-def _key_rest(
-    bone: bpy.types.PoseBone, add_curve: Curves, frame: float, kinds: tuple[str, ...]
-) -> None:
-    """Put a bone at rest, with one key for each kind of channels."""
-    bone.matrix_basis.identity()
-    start = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].'
-    path, rotation = _rotation_channels(bone.rotation_mode, np.array([[1.0, 0.0, 0.0, 0.0]]))
-    at_rest = {
-        "location": ("location", np.zeros((1, 3))),
-        "rotation": (path, rotation),
-        "scale": ("scale", np.ones((1, 3))),
-    }
-    for kind in kinds:
-        path, values = at_rest[kind]
-        key_curves(add_curve, start + path, bone.name, frames=np.array([frame]), values=values)
-
-
-def _key_setting(
-    rig: bpy.types.Object, add_curve: Curves, *, bone: str, key: str, value: Any, frame: float
-) -> None:
-    """Set and key a custom property of a bone, where the bone has it as a number."""
-    owner = rig.pose.bones[bone]
-    if isinstance(owner.get(key), int | float):
-        owner[key] = type(owner[key])(value)
-        names = (bpy.utils.escape_identifier(part) for part in (bone, key))
-        path = 'pose.bones["{}"]["{}"]'.format(*names)
-        key_curves(add_curve, path, bone, frames=np.array([frame]), values=np.array([[value]]))
-
-
-def _rotation_channels(mode: str, quaternions: np.ndarray) -> tuple[str, np.ndarray]:
-    """Data path and values (T, 3 or 4) of rotations (T, 4) in one of Blender's rotation modes,
-    steady in time.
-    """
-    if mode == "QUATERNION":
-        return "rotation_quaternion", quaternions
-
-    if mode == "AXIS_ANGLE":
-        axis, length = quaternions[:, 1:], np.linalg.norm(quaternions[:, 1:], axis=1)
-        angle = 2.0 * np.arctan2(length, quaternions[:, 0])
-        return "rotation_axis_angle", np.concatenate(
-            [angle[:, None], normalised(axis, np.array([0.0, 1.0, 0.0]))], axis=1
-        )
-
-    angles, before = [], Euler((0.0, 0.0, 0.0), mode)
-    for quaternion in quaternions:
-        before = Quaternion(quaternion.tolist()).to_euler(mode, before)
-        angles.append(tuple(before))
-
-    return "rotation_euler", np.array(angles)
-
-
-def _quaternions(turns: np.ndarray) -> np.ndarray:
-    return continuous_signs(quaternion_from_matrix(turns))
-
-
-def _key_object(
-    rig: bpy.types.Object,
-    add_curve: Curves,
-    *,
-    options: _BakeOptions,
-    matrices: np.ndarray,
-    rest: np.ndarray,
-) -> None:
-    """Keys of the object: ``matrices`` (T, 4, 4) that take it over the floor, or ``rest`` (4, 4)
-    where it stays in one place.
-    """
-    frames = options.frames
-    if options.root_motion != "OBJECT":
-        matrices, frames = rest[None], frames[:1]
-
-    rotations, _ = rigid_parts(matrices, f"armature '{rig.name}'")
-    path, values = _rotation_channels(rig.rotation_mode, _quaternions(rotations))
-    key_curves(add_curve, "location", "Object", frames=frames, values=matrices[:, :3, 3])
-    key_curves(add_curve, path, "Object", frames=frames, values=values)
-
-
-def _key_control(
-    rig: bpy.types.Object,
-    add_curve: Curves,
-    control: Control,
-    *,
-    channels: Channels,
-    index: int,
-    frames: np.ndarray,
-) -> dict[str, list[bpy.types.FCurve]]:
-    """Keys of one control, the one with this ``index``; returns its curves by channel."""
-    bone = rig.pose.bones[control.bone]
-    bone.matrix_basis.identity()
-    path, values = _rotation_channels(bone.rotation_mode, _quaternions(channels.turns[:, index]))
-    start = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].'
-    curves: dict[str, list[bpy.types.FCurve]] = {}
-
-    def adding_to(channel: str) -> Curves:
-        def add(path: str, index: int, group: str) -> bpy.types.FCurve:
-            curve = add_curve(path, index, group)
-            curves.setdefault(channel, []).append(curve)
-            return curve
-
-        return add
-
-    if control.moves:
-        moves = channels.moves[:, index]
-        key_curves(
-            adding_to("location"), start + "location", bone.name, frames=frames, values=moves
-        )
-
-    if control.pole is None:
-        key_curves(adding_to("rotation"), start + path, bone.name, frames=frames, values=values)
-
-    return curves
-
-
 def _correct_loose(
     context: bpy.types.Context,
     rig: bpy.types.Object,
@@ -543,12 +327,10 @@ def _correct_loose(
 
         for k, i in enumerate(loose):
             channels.turns[:, i] = np.swapaxes(bare[:, k], 1, 2) @ channels.wanted[:, i]
-            mode = rig.pose.bones[controls[i].bone].rotation_mode
-            _, values = _rotation_channels(mode, _quaternions(channels.turns[:, i]))
-            for curve, column in zip(curves[controls[i].bone]["rotation"], values.T, strict=True):
-                points = np.stack([frames, column], axis=1).astype(np.float32)
-                curve.keyframe_points.foreach_set("co", points.ravel())
-                curve.update()
+            bone = rig.pose.bones[controls[i].bone]
+            rekey_rotation(
+                bone, curves[bone.name]["rotation"], turns=channels.turns[:, i], frames=frames
+            )
 
 
 def _measure(

@@ -11,6 +11,7 @@ from ...core.errors import InputError
 from ...core.skeleton import JOINTS
 from ..character.armature import is_character
 from . import maps
+from .detection import detect_map
 
 __all__ = ["character_for", "map_of", "presets", "register", "rig_of", "show_map", "unregister"]
 
@@ -161,8 +162,8 @@ def map_of(rig: bpy.types.Object) -> maps.RigMap:
     """The map in the rig's settings, or the detected one if none has been set yet."""
     own = rig.dafnet_rig
     if not own.more:
-        return maps.detected(rig)
-    return maps.edited(
+        return detect_map(rig)
+    return maps.with_bones(
         maps.from_text(own.more),
         own.root_bone or None,
         {row.name: row.bone for row in own.rows if row.bone},

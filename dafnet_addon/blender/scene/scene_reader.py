@@ -35,7 +35,7 @@ from ..character.settings import Settings
 from ..character.takes import stored_take
 from ..compat import action_curves
 from ..pipeline.baker import has_bone_overrides, require_bakeable
-from ..rig.maps import RigMap, required
+from ..rig.maps import RigMap, require_usable
 from ..rig.properties import map_of
 from ..rig.reading import joints_of, pose_matrices
 from .dependencies import Dependencies, Simulation
@@ -378,7 +378,7 @@ def _upper_body_source(
         return source, None
 
     rig_map = map_of(source)
-    required(source, rig_map)
+    require_usable(source, rig_map)
     return source, rig_map
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender import compat
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import create_character
-from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, maps
+from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, detection
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.operators.bake_to_rig import DAFNET_OT_bake_to_rig
 from bl_ext.user_default.dafnet.panels.rig import DAFNET_PT_rig
@@ -51,7 +51,7 @@ def test_controls_that_are_turned_by_several_are_found_frame_by_frame(stage: Rig
     meant = stage.bones(rig, names)
     rig.animation_data_clear()
     rig.pose.bones["torso"]["neck_follow"] = rig.pose.bones["torso"]["head_follow"] = 0.5
-    detected = maps.detected(rig)
+    detected = detection.detect_map(rig)
     follows = {kind: rows for kind, rows in detected.settings.items() if kind != "BOTH"}
     rig_map = type(detected)(**{**vars(detected), "settings": follows})
     baker.bake_onto_rig(bpy.context, stage.ann, rig, rig_map)
@@ -123,13 +123,13 @@ def test_what_cannot_be_baked_is_refused_and_left_alone(stage: RigStage) -> None
         )
         with pytest.raises(InputError, match=match) as caught:
             baker.bake_onto_rig(
-                bpy.context, stage.ann, rig, rig_map or maps.detected(rig), **options
+                bpy.context, stage.ann, rig, rig_map or detection.detect_map(rig), **options
             )
         assert str(caught.value).count(". ") == 0
         assert set(bpy.data.actions) == actions and rig.animation_data is None
         assert [bone.matrix_basis for bone in rig.pose.bones] == pose
 
-    detected = maps.detected(rig)
+    detected = detection.detect_map(rig)
     joints = {joint: bone for joint, bone in detected.joints.items() if joint != "left_knee"}
     refused("no bone for the left knee", rig_map=type(detected)("Mine", joints=joints))
     refused(

@@ -5,7 +5,7 @@ from pathlib import Path
 import bpy
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import is_character
-from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import maps, properties
+from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import detection, maps, properties
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.panels.rig import DAFNET_PT_rig, DAFNET_UL_rig
 
@@ -29,7 +29,7 @@ DETECTED = {
 @pytest.mark.parametrize("kind", DETECTED)
 def test_conventions_are_detected(stage: RigStage, kind: str) -> None:
     rig = stage.build(kind)
-    found = maps.detected(rig)
+    found = detection.detect_map(rig)
     assert (found.name, len(found.joints)) == DETECTED[kind]
     assert not is_character(rig)
     assert is_character(stage.ann)
@@ -37,14 +37,14 @@ def test_conventions_are_detected(stage: RigStage, kind: str) -> None:
 
 @pytest.mark.parametrize("prefix", ["", "mixamorig1:", "mixamorig_", "Mia:"])
 def test_prefixes_do_not_matter(stage: RigStage, prefix: str) -> None:
-    found = maps.detected(humanoids.mixamo(bpy, prefix=prefix))
+    found = detection.detect_map(humanoids.mixamo(bpy, prefix=prefix))
     assert (found.name, len(found.joints)) == ("Mixamo", 22)
     assert found.joints["left_hip"] == f"{prefix}LeftUpLeg"
 
 
 def test_five_spine_bones_of_unreal(stage: RigStage) -> None:
     rig = humanoids.unreal(bpy, spines=5)
-    found = maps.detected(rig)
+    found = detection.detect_map(rig)
     assert found.name == "Unreal mannequin (UE5)" and found.joints["spine3"] == "spine_05"
     stage.play("write")
     stage.bake("unreal", rig)
@@ -71,7 +71,7 @@ GUESSED = {
 
 def test_names_of_no_convention_are_guessed(stage: RigStage) -> None:
     rig = humanoids.mixamo(bpy)
-    meant = maps.detected(rig).joints
+    meant = detection.detect_map(rig).joints
     new = {}
     for joint, bone in meant.items():
         for word, side in (("Left", "L"), ("Right", "R")):
@@ -82,7 +82,7 @@ def test_names_of_no_convention_are_guessed(stage: RigStage) -> None:
     new["left_ankle"], new["right_ankle"] = (
         rig.data.bones[new[f"{side}_ankle"]].name for side in ("left", "right")
     )
-    found = maps.detected(rig)
+    found = detection.detect_map(rig)
     assert found.name == "Guessed"
     assert found.joints == new
 
@@ -107,7 +107,7 @@ def test_presets_are_saved_and_found_again(stage: RigStage, user_maps: Path) -> 
     assert bpy.ops.dafnet.save_rig_map(name="Otto's Rig") == {"FINISHED"}
     assert [file.suffix for file in user_maps.iterdir()] == [".json"]
     other = humanoids.odd(bpy)
-    found = maps.detected(other)
+    found = detection.detect_map(other)
     assert (found.name, found.joints, found.root) == ("Otto's Rig", humanoids.ODD, "Wurzel")
     key = next(key for key, name, _ in properties.presets(None, None) if name == "Otto's Rig")
     assert key.startswith("my_") and "mixamo" in {
@@ -117,7 +117,7 @@ def test_presets_are_saved_and_found_again(stage: RigStage, user_maps: Path) -> 
     assert bpy.ops.dafnet.load_rig_map(preset=key) == {"FINISHED"}
     assert properties.map_of(other).joints == humanoids.ODD
     (user_maps / "broken.json").write_text("{}", encoding="utf-8")
-    assert maps.detected(other).name == "Otto's Rig"
+    assert detection.detect_map(other).name == "Otto's Rig"
     with pytest.raises(InputError, match=r"'broken\.json'"):
         maps.load_map(user_maps / "broken.json")
 
@@ -160,8 +160,8 @@ def test_a_corrected_row_of_rigify_keeps_the_rest(stage: RigStage) -> None:
     controls only.
     """
     rig = stage.build("rigify")
-    properties.show_map(rig, maps.detected(rig))
-    assert properties.map_of(rig) == maps.detected(rig)
+    properties.show_map(rig, detection.detect_map(rig))
+    assert properties.map_of(rig) == detection.detect_map(rig)
     rig.dafnet_rig.rows["left_wrist"].bone = "hand_tweak.L"
     changed = properties.map_of(rig)
     assert (

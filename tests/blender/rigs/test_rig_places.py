@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
-from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, maps
+from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, detection
 from bl_ext.user_default.dafnet.dafnet_addon.core import (
     body,
     kinematics,
@@ -275,7 +275,7 @@ def test_hips_beside_the_trunk_do_not_tear_it(stage: RigStage) -> None:
     hip.head, hip.tail = bones["pelvis"].head, bones["pelvis"].tail
     bones["pelvis"].parent = bones["abdomenLower"].parent = hip
     bpy.ops.object.mode_set(mode="OBJECT")
-    found = maps.detected(rig)
+    found = detection.detect_map(rig)
     assert (found.name, found.joints["pelvis"], found.joints["spine1"]) == (
         "Guessed",
         "hip",

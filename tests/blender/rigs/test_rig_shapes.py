@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import create_character
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.settings import settings_of
-from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import maps, properties, reading
+from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import detection, properties, reading
 from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.scene_reader import read_scene
 from bl_ext.user_default.dafnet.dafnet_addon.core import (
     kinematics,
@@ -117,7 +117,7 @@ class World:
     """Where a rig's joints are in the room, and what FULL reads from it."""
 
     def __init__(self, stage: RigStage, rig: Any) -> None:
-        self.stage, self.rig, self.map = stage, rig, maps.detected(rig)
+        self.stage, self.rig, self.map = stage, rig, detection.detect_map(rig)
 
     def played(self, frames: range) -> np.ndarray:
         known = [j for j, name in enumerate(JOINTS) if self.map.place(name)]
@@ -151,7 +151,7 @@ def test_the_rest_pose_does_not_matter(stage: RigStage, kind: str, rest: str) ->
     """
     stage.play("write")
     rig = stage.build(kind)
-    humanoids.rested(bpy, rig, *humanoids.rest_pose(rest, maps.detected(rig).joints))
+    humanoids.rested(bpy, rig, *humanoids.rest_pose(rest, detection.detect_map(rig).joints))
     baked = stage.bake(kind, rig)
     for part, distances in stage.errors(kind, rig).items():
         assert distances.mean() < CENTIMETRE, part
@@ -287,7 +287,7 @@ def test_hands_feet_and_face_turn_the_same_from_any_rest_pose(stage: RigStage, r
         60
     ]
     rig = stage.build("mixamo")
-    humanoids.rested(bpy, rig, *humanoids.rest_pose(rest, maps.detected(rig).joints))
+    humanoids.rested(bpy, rig, *humanoids.rest_pose(rest, detection.detect_map(rig).joints))
     stage.bake("mixamo", rig)
 
     def way(start: str, end: str) -> np.ndarray:
@@ -325,7 +325,7 @@ def test_full_mode_tells_what_it_cannot_follow(stage: RigStage) -> None:
 
     rig.pose.bones["mixamorig:Spine1"].rotation_quaternion = (0.966, 0.259, 0.0, 0.0)
     assert "is copied" not in warnings()
-    known = maps.detected(rig)
+    known = detection.detect_map(rig)
     joints = {
         joint: bone
         for joint, bone in known.joints.items()
