@@ -43,7 +43,7 @@ class DAFNET_OT_add_character(DafnetOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """A new armature needs object mode."""
-        cls.poll_message_set("Leave the current mode for object mode first")
+        cls.poll_message_set("Switch to object mode first")
         return context.mode == "OBJECT"
 
     def run(self, context: bpy.types.Context) -> None:

@@ -36,12 +36,12 @@ class DAFNET_OT_add_example(DafnetOperator, bpy.types.Operator):
         """A new armature needs object mode."""
         if not idle(cls):
             return False
-        cls.poll_message_set("Leave the current mode for object mode first")
+        cls.poll_message_set("Switch to object mode first")
         return context.mode == "OBJECT"
 
     def run(self, context: bpy.types.Context) -> None:
         """Add it."""
-        made = add_example(context, self.kind)
+        armature = add_example(context, self.kind)
         self.report(
-            {"INFO"}, f"'{made.name}' is ready: press Generate in the sidebar's tab DAFNet."
+            {"INFO"}, f"'{armature.name}' is ready: press Generate in the sidebar's tab DAFNet."
         )

@@ -2,16 +2,16 @@
 
 import bpy
 
-from ..dafnet_addon.blender.character.armature import sent
+from ..dafnet_addon.blender.character.armature import character_and_goal
 from ..dafnet_addon.blender.character.targets import add_targets, missing_targets
 from .base import DafnetOperator
-from .follow_path import may_direct
+from .follow_path import can_direct
 
 __all__ = ["DAFNET_OT_add_targets"]
 
 
 class DAFNET_OT_add_targets(DafnetOperator, bpy.types.Operator):
-    """Add empties for head and hands where the character has none, where they are now; mode EE
+    """Add the missing targets of head and hands, where these are now; in mode EE the character
     follows them
     """
 
@@ -22,12 +22,12 @@ class DAFNET_OT_add_targets(DafnetOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a character that lacks one."""
-        if not may_direct(cls, context):
+        if not can_direct(cls, context):
             return False
-        cls.poll_message_set("Head and hands have their targets already")
-        return bool(missing_targets(context, sent(context)[0]))
+        cls.poll_message_set("The head and hands already have targets")
+        return bool(missing_targets(context, character_and_goal(context)[0]))
 
     def run(self, context: bpy.types.Context) -> None:
         """Add them."""
-        made = add_targets(context, sent(context)[0])
-        self.report({"INFO"}, f"Added {', '.join(each.name for each in made)}.")
+        added = add_targets(context, character_and_goal(context)[0])
+        self.report({"INFO"}, f"Added {', '.join(each.name for each in added)}.")

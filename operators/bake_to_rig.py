@@ -10,8 +10,10 @@ from .base import DafnetOperator, idle
 
 __all__ = ["DAFNET_OT_bake_to_rig"]
 
-_FAR, _TURNED = 0.02, 8.0
-"""Mean error above which the user is warned: metres, degrees."""
+_FAR = 0.02
+"""Metres of mean error above which the user is warned."""
+_TURNED = 8.0
+"""Degrees of mean error above which the user is warned."""
 
 
 class DAFNET_OT_bake_to_rig(DafnetOperator, bpy.types.Operator):
@@ -25,7 +27,7 @@ class DAFNET_OT_bake_to_rig(DafnetOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """An own rig is active, and none is being generated."""
+        """A rig of the animator's own is active, and no job is running."""
         if not idle(cls):
             return False
         cls.poll_message_set("Select the armature of your rig, in object or pose mode")
@@ -43,14 +45,14 @@ class DAFNET_OT_bake_to_rig(DafnetOperator, bpy.types.Operator):
             root_motion=own.root_motion,
             limbs=own.limbs,
         )
-        if off := _off(baked):
+        if off := _deviations(baked):
             bones = ", ".join(f"'{bone}'" for bone in baked.overruled[:3])
             why = (
                 f"mute the constraints and drivers of {bones} and bake again"
                 if bones
-                else "its proportions are others"
+                else "its proportions differ"
             )
-            self.report({"WARNING"}, f"The rig is off the character's motion, {off}: {why}")
+            self.report({"WARNING"}, f"The rig deviates from the character's motion, {off}: {why}")
 
         places = ", ".join(
             f"{part} {100 * mean:.1f} ({100 * most:.1f})"
@@ -60,14 +62,12 @@ class DAFNET_OT_bake_to_rig(DafnetOperator, bpy.types.Operator):
             f"{limb} {mean:.0f} ({most:.0f})" for limb, (mean, most) in baked.angles.items()
         )
         size = "" if baked.ratio == 1.0 else f", motion scaled by {baked.ratio:.2f}"
-        told = f"off by cm, mean (largest): {places}; by degrees: {limbs}{size}"
-        self.report({"INFO"}, f"'{baked.action.name}': {told}")
+        errors = f"mean (largest) error in cm: {places}; in degrees: {limbs}{size}"
+        self.report({"INFO"}, f"'{baked.action.name}': {errors}")
 
 
-def _off(baked: Baked) -> str:
-    """What of a bake is off by so much that it is seen, with its mean error; empty where nothing
-    is.
-    """
+def _deviations(baked: Baked) -> str:
+    """What a viewer would see to be off, with its mean error; empty where nothing is."""
     places = [
         f"{part} by {100 * mean:.0f} cm" for part, (mean, _) in baked.errors.items() if mean > _FAR
     ]

@@ -14,8 +14,8 @@ __all__ = ["DafnetOperator", "idle", "reported"]
 
 @contextmanager
 def reported(operator: bpy.types.Operator) -> Iterator[None]:
-    """Show an error of the add-on to the user and go on behind the block; any other exception
-    passes.
+    """A block whose errors, if they are the add-on's own, are shown to the user and end only the
+    block; any other exception passes.
     """
     try:
         yield
@@ -24,7 +24,7 @@ def reported(operator: bpy.types.Operator) -> Iterator[None]:
 
 
 class DafnetOperator:
-    """An operator that does one thing and is done: ``run`` does it.
+    """An operator whose ``run`` does all its work at once.
 
     Mixed into ``bpy.types.Operator``, before it.
     """

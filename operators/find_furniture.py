@@ -1,15 +1,16 @@
-"""Find the furniture beside the character's path."""
+"""Find the furniture along the character's path."""
 
 import bpy
 
-from ..dafnet_addon.blender.character.armature import sent
+from ..dafnet_addon.blender.character.armature import character_and_goal
 from ..dafnet_addon.blender.directing.surroundings import find_furniture
 from .base import DafnetOperator
-from .follow_path import may_direct
+from .follow_path import can_direct
 
 __all__ = ["DAFNET_OT_find_furniture"]
 
 _NAMED = 6
+"""How many pieces the report names."""
 
 
 class DAFNET_OT_find_furniture(DafnetOperator, bpy.types.Operator):
@@ -24,11 +25,11 @@ class DAFNET_OT_find_furniture(DafnetOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a character with a root."""
-        return may_direct(cls, context)
+        return can_direct(cls, context)
 
     def run(self, context: bpy.types.Context) -> None:
         """Find it."""
-        found = find_furniture(context, sent(context)[0])
+        found = find_furniture(context, character_and_goal(context)[0])
         for warning in found.warnings:
             self.report({"WARNING"}, warning)
         more = f" and {len(found.names) - _NAMED} more" if len(found.names) > _NAMED else ""

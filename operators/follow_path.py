@@ -5,11 +5,11 @@ from collections.abc import Callable, Generator
 import bpy
 from bpy.props import BoolProperty, FloatProperty
 
-from ..dafnet_addon.blender.character.armature import sent
+from ..dafnet_addon.blender.character.armature import character_and_goal
 from ..dafnet_addon.blender.directing.path_sources import (
     along_curve,
-    as_moved,
-    chosen,
+    along_object,
+    character_and_source,
     floor_points,
     is_curve,
     may_move,
@@ -24,13 +24,13 @@ __all__ = [
     "DAFNET_OT_root_from_object",
     "DAFNET_OT_walk_along_curve",
     "DAFNET_OT_walk_through_points",
-    "may_direct",
+    "can_direct",
 ]
 
-_SPEED = "Of walking, in metres a second for a body of 1.75 m"
+_SPEED = "Walking speed, in metres per second for a body of 1.75 m"
 
 
-def may_direct(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+def can_direct(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Whether there is a character to direct in object mode and none is being generated; says what
     is missing.
     """
@@ -38,8 +38,8 @@ def may_direct(cls: type[bpy.types.Operator], context: bpy.types.Context) -> boo
         return False
 
     if context.mode != "OBJECT":
-        cls.poll_message_set("Leave the current mode for object mode first")
-    elif (character := sent(context)[0]) is None:
+        cls.poll_message_set("Switch to object mode first")
+    elif (character := character_and_goal(context)[0]) is None:
         cls.poll_message_set("Add a character, or select one")
     elif character.dafnet.root is None:
         cls.poll_message_set("Choose the character's root")
@@ -49,21 +49,21 @@ def may_direct(cls: type[bpy.types.Operator], context: bpy.types.Context) -> boo
     return False
 
 
-def _has(
+def _can_follow(
     cls: type[bpy.types.Operator],
     context: bpy.types.Context,
     fits: Callable[[bpy.types.Object], bool],
     missing: str,
 ) -> bool:
-    if not may_direct(cls, context):
+    if not can_direct(cls, context):
         return False
     cls.poll_message_set(missing)
-    return chosen(context, fits)[1] is not None
+    return character_and_source(context, fits)[1] is not None
 
 
 class DAFNET_OT_walk_along_curve(WalkOperator, bpy.types.Operator):
-    """Key the character's root along the selected curve from the current frame on; keys after that
-    are replaced
+    """Key the character's root along the selected curve from the current frame on; later keys are
+    replaced
     """
 
     bl_idname = "dafnet.walk_along_curve"
@@ -77,10 +77,11 @@ class DAFNET_OT_walk_along_curve(WalkOperator, bpy.types.Operator):
         min=0.0,
         max=600.0,
         subtype="TIME_ABSOLUTE",
-        description="Seconds of rest at the end",
+        description="How long it stays at the end, in seconds",
     )
     keep_facing: BoolProperty(
-        name="Keep Facing", description="Look where it looks now all the way, not along the curve"
+        name="Keep Facing",
+        description="Keep looking where it looks now, instead of along the curve",
     )
     backwards: BoolProperty(
         name="Backwards", description="Walk from the curve's end to its beginning"
@@ -89,16 +90,16 @@ class DAFNET_OT_walk_along_curve(WalkOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a character to send, and a curve."""
-        return _has(
+        return _can_follow(
             cls,
             context,
             is_curve,
-            "Select the one curve to walk along, with the character or alone",
+            "Select one curve to walk along, and nothing else but the character",
         )
 
     def steps(self, context: bpy.types.Context) -> Generator[float, None, Walk]:
         """Look for the way to the curve, and key the walk."""
-        character, curve = chosen(context, is_curve)
+        character, curve = character_and_source(context, is_curve)
         return along_curve.steps(
             context,
             character,
@@ -111,8 +112,8 @@ class DAFNET_OT_walk_along_curve(WalkOperator, bpy.types.Operator):
 
 
 class DAFNET_OT_walk_through_points(WalkOperator, bpy.types.Operator):
-    """Key the root on through the selected empties in the order of their names; where none is
-    selected, to the 3D cursor
+    """Continue the root's keys through the selected empties, in the order of their names, or to the
+    3D cursor if none is selected
     """
 
     bl_idname = "dafnet.walk_through_points"
@@ -126,7 +127,7 @@ class DAFNET_OT_walk_through_points(WalkOperator, bpy.types.Operator):
         min=0.0,
         max=600.0,
         subtype="TIME_ABSOLUTE",
-        description="Seconds of rest at the last one",
+        description="How long it stays at the last one, in seconds",
     )
     to_cursor: BoolProperty(
         name="On to Cursor", description="Walk on from the last empty to the 3D cursor"
@@ -135,13 +136,13 @@ class DAFNET_OT_walk_through_points(WalkOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a character to send."""
-        return may_direct(cls, context)
+        return can_direct(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Generator[float, None, Walk]:
         """Look for the way, and key the walk."""
         return through_points.steps(
             context,
-            sent(context)[0],
+            character_and_goal(context)[0],
             floor_points(context),
             speed=self.speed,
             seconds=self.seconds,
@@ -150,8 +151,8 @@ class DAFNET_OT_walk_through_points(WalkOperator, bpy.types.Operator):
 
 
 class DAFNET_OT_root_from_object(WalkOperator, bpy.types.Operator):
-    """Key the root where the selected moving object goes, in the same frames; keys from there on
-    are replaced
+    """Key the root along the path of the selected moving object, in the same frames; later keys are
+    replaced
     """
 
     bl_idname = "dafnet.root_from_object"
@@ -161,14 +162,14 @@ class DAFNET_OT_root_from_object(WalkOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a character to send, and something that moves."""
-        return _has(
+        return _can_follow(
             cls,
             context,
             may_move,
-            "Select the one animated object to follow, with the character or alone",
+            "Select one animated object to follow, and nothing else but the character",
         )
 
     def steps(self, context: bpy.types.Context) -> Generator[float, None, Walk]:
         """Look where it goes, and key that."""
-        character, source = chosen(context, may_move)
-        return as_moved.steps(context, character, source)
+        character, source = character_and_source(context, may_move)
+        return along_object.steps(context, character, source)

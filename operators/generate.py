@@ -40,12 +40,12 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
             (
                 "LEGS",
                 "Vary the Legs",
-                "Generate another lower body under the upper body of the chosen take",
+                "Generate other legs under the upper body of the chosen take",
             ),
             (
                 "ONWARD",
                 "From Here On",
-                "Keep the chosen take up to the current frame, and generate what follows anew",
+                "Keep the chosen take up to the current frame, and generate the rest anew",
             ),
         ],
     )
@@ -62,7 +62,7 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
         elif character.dafnet.root is None:
             cls.poll_message_set("Choose the character's root")
         elif context.mode not in {"OBJECT", "POSE"}:
-            cls.poll_message_set("Leave the current mode for object or pose mode first")
+            cls.poll_message_set("Switch to object or pose mode first")
         else:
             return True
 
@@ -112,14 +112,14 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> None:
         """Generate without showing progress."""
-        self.tell(job.run(context, self._settings(context)))
+        self.report_result(job.run(context, self._settings(context)))
 
     def steps(self, context: bpy.types.Context) -> Generator[float, None, job.Result]:
         """Generate and show each frame as it is made."""
         return job.run.steps(context, self._settings(context), watch=self._watch)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Start the job and show what grows."""
+        """Start the job and show the frames as they are made."""
         begun = super().invoke(context, event)
         if begun == {"RUNNING_MODAL"}:
             running = self._running
@@ -131,8 +131,8 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
         super().cancel(context)
         display.hide_live_pose()
 
-    def tell(self, result: job.Result) -> None:
-        """Say what was generated, and what is to be seen to."""
+    def report_result(self, result: job.Result) -> None:
+        """Say what was generated, and pass the warnings on."""
         for warning in result.warnings:
             self.report({"WARNING"}, warning)
         seconds = sum(result.seconds.values())

@@ -1,4 +1,4 @@
-"""Operators whose work takes long: it is done between the user's events, and Esc ends it."""
+"""Operators whose work takes long: it is done between the user's events, and Esc cancels it."""
 
 from collections.abc import Callable, Generator
 from time import perf_counter
@@ -13,8 +13,8 @@ from .base import DafnetOperator, reported
 __all__ = ["LongOperator"]
 
 _TICK = 0.02
-"""Seconds of work between two looks at the user's input."""
-_LOOKING = {
+"""Seconds of work before the user's input is looked at again."""
+_VIEW_EVENTS = {
     "MOUSEMOVE",
     "INBETWEEN_MOUSEMOVE",
     "MIDDLEMOUSE",
@@ -28,14 +28,14 @@ _LOOKING = {
 
 
 class LongOperator(DafnetOperator):
-    """An operator that does a job of steps (``core.progress``), whose result it tells.
+    """An operator that runs a job step by step (``core.progress``) and reports its result.
 
     Mixed into ``bpy.types.Operator``, before it.
     """
 
-    at_once: ClassVar[float] = 0.0
-    """Seconds of work before the first look at the user's input: what is done by then is done as
-    by any other operator, without a flicker.
+    seconds_before_modal: ClassVar[float] = 0.0
+    """Seconds of work before the operator becomes modal: what takes no longer is done as by any
+    other operator, without a flicker.
     """
 
     report: Callable[[set[str], str], None]
@@ -47,23 +47,23 @@ class LongOperator(DafnetOperator):
     _timer: bpy.types.Timer
 
     def steps(self, context: bpy.types.Context) -> Generator[float, None, Any]:
-        """The job; where it is closed the scene is as it was. Its result is never None."""
+        """The job, which leaves the scene as it was if it is closed. Its result is never None."""
         raise NotImplementedError
 
-    def tell(self, result: Any) -> None:
-        """Report what has come of it."""
+    def report_result(self, result: Any) -> None:
+        """Tell the user what was done."""
         raise NotImplementedError
 
     def run(self, context: bpy.types.Context) -> None:
         """Do the whole job without showing progress."""
-        self.tell(run_to_end(self.steps(context)))
+        self.report_result(run_to_end(self.steps(context)))
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Start the job; ``modal`` goes on with it."""
         with reported(self):
             self._steps, self._started, self._share = self.steps(context), perf_counter(), 0.0
-            if (result := self._worked(self.at_once)) is not None:
-                self.tell(result)
+            if (result := self._advance(self.seconds_before_modal)) is not None:
+                self.report_result(result)
                 return {"FINISHED"}
             self._listen(context)
             return {"RUNNING_MODAL"}
@@ -80,7 +80,7 @@ class LongOperator(DafnetOperator):
             return {"CANCELLED"}
 
         if event.type != "TIMER":
-            allowed = event.type in _LOOKING or (
+            allowed = event.type in _VIEW_EVENTS or (
                 event.type == "LEFTMOUSE" and _over_sidebar(context, event)
             )
             return {"PASS_THROUGH"} if allowed else {"RUNNING_MODAL"}
@@ -89,7 +89,7 @@ class LongOperator(DafnetOperator):
         running = False
         try:
             with reported(self):
-                result = self._worked(_TICK)
+                result = self._advance(_TICK)
                 running = result is None
         finally:
             if not running:
@@ -101,7 +101,7 @@ class LongOperator(DafnetOperator):
         if result is None:
             return {"CANCELLED"}
 
-        self.tell(result)
+        self.report_result(result)
         return {"FINISHED"}
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -122,7 +122,7 @@ class LongOperator(DafnetOperator):
         manager.modal_handler_add(self)
         self._running = begin_job()
 
-    def _worked(self, seconds: float) -> Any:
+    def _advance(self, seconds: float) -> Any:
         """Work for some ``seconds``; the result once it is there, else None."""
         now = perf_counter()
         until, step = now + seconds, 0.0

@@ -1,4 +1,4 @@
-"""Which bones of the animator's own rig are which joints: detected, saved as a preset, loaded from
+"""Which bone of the animator's own rig is which joint: detected, saved as a preset, loaded from
 one.
 """
 
@@ -33,12 +33,12 @@ class _OfRig(DafnetOperator):
 
 
 def _rig(context: bpy.types.Context) -> Any:
-    """The rig, which poll has seen to."""
+    """The rig; ``poll`` has made sure that there is one."""
     return rig_of(context)
 
 
 class DAFNET_OT_detect_rig(_OfRig, bpy.types.Operator):
-    """Find out which bones are which joints by their names"""
+    """Find the bone of each joint by its name"""
 
     bl_idname = "dafnet.detect_rig"
     bl_label = "Detect Bones"
@@ -58,7 +58,7 @@ class DAFNET_OT_detect_rig(_OfRig, bpy.types.Operator):
 
 
 class DAFNET_OT_load_rig_map(_OfRig, bpy.types.Operator):
-    """Take the bones from a preset"""
+    """Load the bones from a preset"""
 
     bl_idname = "dafnet.load_rig_map"
     bl_label = "Load Rig Preset"

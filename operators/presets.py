@@ -1,4 +1,4 @@
-"""Presets of how takes are drawn and cleaned up, as Blender keeps presets."""
+"""Presets of temperature, number of takes and clean-up, as Blender keeps presets."""
 
 from typing import ClassVar
 

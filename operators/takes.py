@@ -22,7 +22,7 @@ __all__ = [
 
 
 def _character(context: bpy.types.Context) -> Any:
-    """The character, which poll has seen to."""
+    """The character; ``poll`` has made sure that there is one."""
     return character_of(context)
 
 
@@ -31,7 +31,7 @@ class _OfTakes(DafnetOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There is a take, and time for it."""
+        """There is a take, and no job is running."""
         character = character_of(context)
         if not idle(cls):
             return False
@@ -74,8 +74,8 @@ class DAFNET_OT_play_take(_OfTakes, bpy.types.Operator):
 
 
 class DAFNET_OT_reject_take(_OfTakes, bpy.types.Operator):
-    """Take the chosen take out of the list; its action goes when the file is saved and opened
-    again, unless it is used
+    """Remove the chosen take from the list; its action is deleted when the file is saved and
+    reopened, unless something uses it
     """
 
     bl_idname = "dafnet.reject_take"
@@ -84,7 +84,7 @@ class DAFNET_OT_reject_take(_OfTakes, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There is a row, be its action there or not."""
+        """There is a row, whether its action still exists or not."""
         character = character_of(context)
         cls.poll_message_set("There is no take in the list")
         return idle(cls) and character is not None and len(character.dafnet.takes) > 0
@@ -114,9 +114,7 @@ class DAFNET_OT_keep_accepted(_OfTakes, bpy.types.Operator):
 
 
 class DAFNET_OT_clean_again(_OfTakes, bpy.types.Operator):
-    """Make a new take of the chosen one with the clean-up as it is set now, without generating
-    again
-    """
+    """Clean up the chosen take with the present settings, as a new take; nothing is generated"""
 
     bl_idname = "dafnet.clean_again"
     bl_label = "Clean Up Again"
@@ -128,5 +126,5 @@ class DAFNET_OT_clean_again(_OfTakes, bpy.types.Operator):
         take = active_take(character)
         if take is None:
             raise InputError("Choose a take in the list of takes first.")
-        result = job.clean_again_of(context, character, take)
+        result = job.clean_up_again(context, character, take)
         self.report({"INFO"}, f"'{result.action.name}'")

@@ -5,7 +5,7 @@ from collections.abc import Generator
 import bpy
 from bpy.props import EnumProperty, FloatProperty
 
-from ..dafnet_addon.blender.character.armature import sent
+from ..dafnet_addon.blender.character.armature import character_and_goal
 from ..dafnet_addon.blender.directing.walking import Walk, walk
 from ..dafnet_addon.core.errors import InputError
 from .base import idle
@@ -15,8 +15,8 @@ __all__ = ["DAFNET_OT_walk_to"]
 
 
 class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
-    """Key the character's root on from its last key: it walks round the furniture and sits down, or
-    stands at the 3D cursor
+    """Continue the root's keys from the last one: the character walks around the furniture and sits
+    down, or stops at the 3D cursor
     """
 
     bl_idname = "dafnet.walk_to"
@@ -41,14 +41,14 @@ class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
         min=0.0,
         max=600.0,
         subtype="TIME_ABSOLUTE",
-        description="Seconds of rest",
+        description="How long it stays there, in seconds",
     )
     speed: FloatProperty(
         name="Speed",
         default=1.1,
         min=0.4,
         max=3.0,
-        description="Of walking, in metres a second for a body of 1.75 m",
+        description="Walking speed, in metres per second for a body of 1.75 m",
     )
 
     @classmethod
@@ -56,13 +56,13 @@ class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
         """There is a character to send, and none is being generated."""
         if not idle(cls):
             return False
-        cls.poll_message_set("Add a character, or select one beside its goal")
-        return context.mode == "OBJECT" and sent(context)[0] is not None
+        cls.poll_message_set("Add a character, or select one together with its goal")
+        return context.mode == "OBJECT" and character_and_goal(context)[0] is not None
 
     def steps(self, context: bpy.types.Context) -> Generator[float, None, Walk]:
         """Look for the way, and key the walk."""
-        character, seat = sent(context)
+        character, seat = character_and_goal(context)
         if self.goal == "SEAT" and seat is None:
-            raise InputError("Select the one object to sit on, with the character or alone.")
+            raise InputError("Select one object to sit on, and nothing else but the character.")
         goal = seat if self.goal == "SEAT" else None
         return walk.steps(context, character, goal, self.seconds, self.speed)

@@ -11,10 +11,10 @@ __all__ = ["WalkOperator"]
 class WalkOperator(LongOperator):
     """An operator that looks for a way and keys it on the character's root."""
 
-    at_once: ClassVar[float] = 0.1
+    seconds_before_modal: ClassVar[float] = 0.1
 
-    def tell(self, result: Walk) -> None:
-        """Say where the root was keyed, and what is to be seen to."""
+    def report_result(self, result: Walk) -> None:
+        """Say where the root was keyed, and pass the warnings on."""
         for warning in result.warnings:
             self.report({"WARNING"}, warning)
         ended = ", the range now ends there" if result.extended else ""

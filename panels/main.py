@@ -4,7 +4,7 @@ and Generate.
 
 import bpy
 
-from ..dafnet_addon.blender.character.armature import character_of, sent
+from ..dafnet_addon.blender.character.armature import character_and_goal, character_of
 from ..dafnet_addon.blender.character.targets import lacks_root, missing_targets
 from ..dafnet_addon.blender.compat import action_curves
 from ..dafnet_addon.blender.pipeline.running import running_job
@@ -60,7 +60,7 @@ class DAFNET_PT_character(bpy.types.Panel):
 
         character = character_of(context)
         if character is None:
-            directed, goal = sent(context)
+            directed, goal = character_and_goal(context)
             if directed is not None and goal is not None:
                 layout.label(text=f"{directed.name}: {goal.name}", icon="ARMATURE_DATA")
                 layout.operator(

@@ -9,7 +9,7 @@ __all__ = ["DAFNET_MT_presets", "DAFNET_PT_presets"]
 
 
 class DAFNET_MT_presets(bpy.types.Menu):
-    """Presets of how takes are drawn and cleaned up"""
+    """Presets of temperature, number of takes and clean-up"""
 
     bl_idname = "DAFNET_MT_presets"
     bl_label = "DAFNet Presets"
@@ -19,7 +19,7 @@ class DAFNET_MT_presets(bpy.types.Menu):
 
 
 class DAFNET_PT_presets(PresetPanel, bpy.types.Panel):
-    """Presets of how takes are drawn and cleaned up"""
+    """Presets of temperature, number of takes and clean-up"""
 
     bl_idname = "DAFNET_PT_presets"
     bl_label = "DAFNet Presets"

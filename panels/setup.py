@@ -2,8 +2,13 @@
 
 import bpy
 
-from ..dafnet_addon.blender.character.armature import sent
-from ..dafnet_addon.blender.directing.path_sources import chosen, floor_points, is_curve, may_move
+from ..dafnet_addon.blender.character.armature import character_and_goal
+from ..dafnet_addon.blender.directing.path_sources import (
+    character_and_source,
+    floor_points,
+    is_curve,
+    may_move,
+)
 from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.blender.showcase.examples import EXAMPLES
 from ..operators.add_character import DAFNET_OT_add_character
@@ -32,12 +37,12 @@ class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
         """There is a character to direct: the active one, one that is selected together with its
         goal, or the only one.
         """
-        return running_job() is None and sent(context)[0] is not None
+        return running_job() is None and character_and_goal(context)[0] is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the buttons, with the names of what they would take."""
-        _, seat = sent(context)
-        curve, source = (chosen(context, fits)[1] for fits in (is_curve, may_move))
+        _, seat = character_and_goal(context)
+        curve, source = (character_and_source(context, fits)[1] for fits in (is_curve, may_move))
         points = floor_points(context)
         column = self.layout.column(align=True)
         row = column.row(align=True)

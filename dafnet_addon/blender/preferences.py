@@ -54,7 +54,7 @@ class Preferences(bpy.types.AddonPreferences):
     )
 
     def draw(self, _context: bpy.types.Context) -> None:
-        """Show them."""
+        """Draw the settings."""
         self.layout.use_property_split = True
         self.layout.prop(self, "weights")
         self.layout.prop(self, "engine")
@@ -70,8 +70,8 @@ def weights_path(context: bpy.types.Context) -> str | None:
 
 
 def device_of(context: bpy.types.Context) -> str | None:
-    """The torch device chosen in the preferences, or None for NumPy. ``InputError`` where there is
-    no torch, or not for it.
+    """The torch device chosen in the preferences, or None for NumPy. ``InputError`` where torch or
+    the device is missing.
     """
     addon = context.preferences.addons.get(ADDON)
     engine = addon.preferences.engine if addon else "NUMPY"

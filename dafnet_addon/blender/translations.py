@@ -99,5 +99,5 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take them away."""
+    """Remove the tables."""
     bpy.app.translations.unregister(__package__)

@@ -17,7 +17,7 @@ from ..core.solids import Box, Mesh
 from ..core.text import metres
 from .surfaces import HeightField, boxes_of, height_field, parts_of_surfaces
 
-__all__ = ["NoWay", "around", "doubted", "walk_to", "way_round", "ways"]
+__all__ = ["NoWay", "around", "unit_doubt", "walk_to", "way_round", "ways"]
 
 _CELL = 0.08
 _KNEE_LOW = 0.07  # metres over the floor; what lies lower is stepped over
@@ -180,7 +180,7 @@ def ways(
         try:
             found.append((yield from within(leg, done, done + one)))
         except NoWay as error:
-            if doubt := doubted(solids, places, floor, size):
+            if doubt := unit_doubt(solids, places, floor, size):
                 raise InputError(doubt) from error
             raise
 
@@ -273,7 +273,7 @@ def walk_to(
     """
     if np.linalg.norm(np.subtract(start.position, goal.position)) < _NEAREST:
         raise InputError(
-            doubted(solids, [np.array(start.position)], floor, size)
+            unit_doubt(solids, [np.array(start.position)], floor, size)
             or "The character is there already; choose another place to go to."
         )
     leaves, comes = _ahead(start, AFTER_SEAT), _ahead(goal, BEFORE_SEAT)
@@ -282,7 +282,7 @@ def walk_to(
 
 
 @stepwise
-def doubted(
+def unit_doubt(
     solids: Sequence[Box | Mesh],
     places: Sequence[np.ndarray] | np.ndarray,
     floor: float = 0.0,

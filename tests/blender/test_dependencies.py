@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import create_character
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.settings import settings_of
-from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.path_sources import places_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.path_sources import places_over_time
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import job
 from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.furniture import furniture_now
 from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.scene_reader import read_scene
@@ -435,6 +435,6 @@ def test_a_simulation_that_the_character_pushes_is_to_be_baked(stage: Stage) -> 
 
 def test_find_furniture_and_root_from_object_see_what_is_played(stage: Stage) -> None:
     ball = falling(stage, "Ball")
-    found = places_of(bpy.context, ball, [10, 25, 40])[:, 2]
+    found = places_over_time(bpy.context, ball, [10, 25, 40])[:, 2]
     shown = played(stage, ball, 2, 1, 40)
     assert np.allclose(found, shown[[9, 24, 39]], atol=1e-5) and np.ptp(found) > 4.0

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import sent
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import character_and_goal
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.settings import settings_of
 from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
 from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import (
@@ -91,7 +91,7 @@ def test_what_cannot_be_walked_to_changes_nothing(room: Room) -> None:
         assert room.scene.frame_end == 40
 
     room.select(room.ann)
-    refused("Select the one object")
+    refused("Select one object to sit on")
     tower = room.box("Tower", (2.0, 2.0, 0.0), (2.5, 2.5, 1.2))
     room.ann.dafnet.furniture = room.furniture
     room.select(tower, room.ann)
@@ -433,14 +433,14 @@ def test_an_action_whose_slot_is_missing_gets_one(room: Room) -> None:
 
 def test_the_panel_offers_the_selected_seat(room: Room) -> None:
     room.select(room.chair)
-    assert sent(bpy.context) == (room.ann, room.chair)
+    assert character_and_goal(bpy.context) == (room.ann, room.chair)
     room.select(room.ann, room.chair)
-    assert sent(bpy.context) == (room.ann, room.chair)
+    assert character_and_goal(bpy.context) == (room.ann, room.chair)
     room.select(room.ann)
-    assert sent(bpy.context) == (room.ann, None)
+    assert character_and_goal(bpy.context) == (room.ann, None)
     bpy.ops.dafnet.add_character(name="Bob")
     room.select(room.chair)
-    assert sent(bpy.context)[0] is None and not bpy.ops.dafnet.walk_to.poll()
+    assert character_and_goal(bpy.context)[0] is None and not bpy.ops.dafnet.walk_to.poll()
 
 
 def _table(room: Room, near: float) -> None:
@@ -456,7 +456,7 @@ def test_a_chair_under_a_table_is_refused_before_anything_is_keyed(room: Room) -
         _table(room, near)
         room.select(room.chair)
         with pytest.raises(
-            RuntimeError, match="'Table' stands where one comes to sit on 'Chair'; pull 'Chair' out"
+            RuntimeError, match="'Table' is in the way of sitting down on 'Chair'; pull 'Chair' out"
         ):
             bpy.ops.dafnet.walk_to(goal="SEAT")
         assert (
@@ -544,7 +544,7 @@ def _walks(room: Room) -> dict[str, Callable[[], Generator[float, None, Any]]]:
         "cursor": lambda: walking.walk.steps(context, ann, None, 1.0),
         "curve": lambda: path_sources.along_curve.steps(context, ann, curve),
         "points": lambda: path_sources.through_points.steps(context, ann, [point], to_cursor=True),
-        "object": lambda: path_sources.as_moved.steps(context, ann, ball),
+        "object": lambda: path_sources.along_object.steps(context, ann, ball),
     }
 
 
@@ -595,7 +595,7 @@ def test_esc_ends_a_walk_and_leaves_the_scene_as_it_was(room: Room) -> None:
     room.scene.frame_set(1)
 
     class Walks(WalkOperator):
-        at_once, slowness = 0.0, 0.02
+        seconds_before_modal, slowness = 0.0, 0.02
 
         def __init__(self) -> None:
             self.said: list[str] = []
@@ -642,7 +642,7 @@ def test_esc_ends_a_walk_and_leaves_the_scene_as_it_was(room: Room) -> None:
 
     room.root.animation_data_clear()
     room.root.location = (0.0, 0.0, 0.0)
-    Walks.at_once, Walks.slowness = 600.0, 0.0
+    Walks.seconds_before_modal, Walks.slowness = 600.0, 0.0
     assert walks.invoke(bpy.context, None) == {"FINISHED"}, "what is quick is done at once"
 
 

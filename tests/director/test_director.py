@@ -15,7 +15,7 @@ from dafnet_addon.core.rotations import rotate, yaw_matrix
 from dafnet_addon.core.skeleton import SEAT_TO_PELVIS
 from dafnet_addon.director.seats import on_a_seat, seat_of
 from dafnet_addon.director.surfaces import height_field, surface_points
-from dafnet_addon.director.walks import doubted, walk_to, way_round
+from dafnet_addon.director.walks import unit_doubt, walk_to, way_round
 from kit.places import FURNITURE
 
 
@@ -218,20 +218,24 @@ def test_a_scene_of_another_unit_is_doubted_by_what_stands_near():
     chair, table = _chair(), [_box((1.0, 1.0, 0.0), (2.0, 1.8, 0.75))]
     rug, wall = [_box((-3, -3, 0.0), (3, 3, 0.01))], [_box((-3, 3.0, 0.0), (3, 3.1, 2.5))]
     room, way = [*chair, *table, *rug, *wall], [np.zeros(2), np.array([3.0, 0.0])]
-    assert doubted(room, way) is None and doubted([], way) is None and doubted(rug, way) is None
-    assert "is 610 m across: is its unit right?" in str(doubted(_scaled(room, 100.0), way))
-    assert "is 1,220 m across" in str(doubted(_scaled(room, 100.0), way, size=2.0))
-    assert "is 0.061 m across: is its unit right?" in str(doubted(_scaled(room, 0.01), way))
+    assert (
+        unit_doubt(room, way) is None
+        and unit_doubt([], way) is None
+        and unit_doubt(rug, way) is None
+    )
+    assert "is 610 m across: is its unit right?" in str(unit_doubt(_scaled(room, 100.0), way))
+    assert "is 1,220 m across" in str(unit_doubt(_scaled(room, 100.0), way, size=2.0))
+    assert "is 0.061 m across: is its unit right?" in str(unit_doubt(_scaled(room, 0.01), way))
 
     towers = [_box((x, 4.0, 0.0), (x + 30.0, 40.0, 90.0)) for x in (-60.0, -20.0, 20.0)]
-    assert "is its unit right" in str(doubted(towers, way))
+    assert "is its unit right" in str(unit_doubt(towers, way))
     bench = [_box((1.0, 1.0, 0.0), (3.0, 1.4, 0.45))]
-    assert doubted([*towers, *bench], way) is None, "a city with a street bench"
+    assert unit_doubt([*towers, *bench], way) is None, "a city with a street bench"
     far = [_box((900.0, 0.0, 0.0), (902.0, 0.4, 0.45))]
-    assert doubted(far, way) is None, "nothing stands near"
-    assert "is its unit right" in str(doubted([*towers, *far], way))
+    assert unit_doubt(far, way) is None, "nothing stands near"
+    assert "is its unit right" in str(unit_doubt([*towers, *far], way))
     hall = [_box((-30.0, -30.0, -0.1), (30.0, 30.0, 8.0))]
-    assert doubted(hall, way) is None
+    assert unit_doubt(hall, way) is None
 
 
 def test_where_there_is_no_way_in_a_scene_of_another_unit_that_is_said():

@@ -32,6 +32,18 @@ NAMES = {
     "_COMES_OVER": "_BLEND_SECONDS",
     "_stored": "stored_take",
     "_elsewhere": "_hint_at_other_scenes",
+    "told_of": "passage_warnings",
+    "keyed_along": "key_route",
+    "extended_to": "extend_range",
+    "as_moved": "along_object",
+    "doubted": "unit_doubt",
+    "in_names_of": "with_bone_names_of",
+    "in_order": "frames_to_play",
+    "may_direct": "can_direct",
+    "clean_again_of": "clean_up_again",
+    "_adopted": "_adopt",
+    "_unbake": "_remove_bake",
+    "_worked": "_advance",
 }
 """Names that said nothing alone, or two things, and what stands in their place."""
 

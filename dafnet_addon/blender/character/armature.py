@@ -20,8 +20,8 @@ __all__ = [
     "is_character",
     "metres_per_unit",
     "missing_bones",
-    "parts_of",
-    "sent",
+    "objects_of",
+    "character_and_goal",
 ]
 
 _CHAIN = {
@@ -73,8 +73,10 @@ def is_character(candidate: bpy.types.Object) -> bool:
     return True
 
 
-def parts_of(character: bpy.types.Object) -> set[bpy.types.Object]:
-    """A character's armature, what is parented to it, its root and its targets."""
+def objects_of(character: bpy.types.Object) -> set[bpy.types.Object]:
+    """All objects that make up a character: its armature, what is parented to it, its root and its
+    targets.
+    """
     own = character.dafnet
     return {
         character,
@@ -111,8 +113,10 @@ def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
     return None
 
 
-def sent(context: bpy.types.Context) -> tuple[bpy.types.Object | None, bpy.types.Object | None]:
-    """The character to direct and the mesh to send it to, from what is active and selected.
+def character_and_goal(
+    context: bpy.types.Context,
+) -> tuple[bpy.types.Object | None, bpy.types.Object | None]:
+    """The character to direct and the mesh to send it to, as the selection says.
 
     The character is the active one, else a selected one, else the only one of the scene. The mesh
     is the active or the only selected object that does not belong to a character.

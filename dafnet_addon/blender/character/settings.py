@@ -32,11 +32,11 @@ class Settings:
     """A plain copy of what one generation needs; objects, actions and the collection by
     ``name_full``, None where unset.
 
-    ``mode``: None takes the armature's property frame by frame, a word overrules it.
+    ``mode``: None reads the armature's property frame by frame, a mode overrides it.
     ``frame_start`` and ``frame_end`` are both generated. ``take_count``: takes to make;
-    ``lower_seed``, ``lower_temperature``: the legs' own, None as the body's. ``kept``: the action
-    of a take whose motion stays before the scene's frame ``kept_until``. ``plant_feet`` and those
-    below it: strengths of the clean-up.
+    ``lower_seed``, ``lower_temperature``: the legs' own; None for those of the upper body.
+    ``kept``: the action of a take whose motion stays before the scene's frame ``kept_until``.
+    ``plant_feet`` and those below it: strengths of the clean-up.
     """
 
     armature: str

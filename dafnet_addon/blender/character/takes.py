@@ -28,10 +28,10 @@ __all__ = [
 ]
 
 PACKED = "dafnet_take"
-"""The property of an action that holds its take."""
+"""The custom property of an action that holds its take."""
 
 _STATURE = 1.7
-"""Metres that ``end_effector_error`` was divided by."""
+"""Metres by which ``end_effector_error`` is divided, so that it does not depend on size."""
 _METRICS = {
     "sliding": "foot_sliding_per_frame",
     "collisions": "bad_collisions_per_frame",
@@ -128,8 +128,8 @@ def play_take(armature: bpy.types.Object, action: bpy.types.Action) -> None:
 
 
 def drop_take(armature: bpy.types.Object, index: int) -> None:
-    """Take a row out of the list; another take plays instead, and Blender forgets the action with
-    the file, if unused.
+    """Remove a row from the list; if its take was playing, another one plays instead. Blender
+    deletes the action with the file, unless something uses it.
     """
     own = armature.dafnet
     action = own.takes[index].action

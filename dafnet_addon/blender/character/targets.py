@@ -15,7 +15,8 @@ _TARGETS = {
     "hand_left": ("left_wrist", "Left Hand", 0.15),
     "hand_right": ("right_wrist", "Right Hand", 0.15),
 }
-"""The bone of each, its name, and the size that it is shown at, metres of a body of 1.75 m."""
+"""Of each target the bone, the name, and the size at which it is drawn, metres on a body of 1.75 m.
+"""
 
 
 def lacks_root(context: bpy.types.Context, armature: bpy.types.Object) -> bool:
@@ -41,7 +42,7 @@ def add_root(context: bpy.types.Context, armature: bpy.types.Object) -> bpy.type
     root = bpy.data.objects.new(f"{armature.name} Root", None)
     root.empty_display_type, root.empty_display_size = "ARROWS", 0.4 * size
     root.location = place.translation
-    # armatures look along -y, roots along y
+    # Armatures look along -y, roots along y.
     root.rotation_euler = (0.0, 0.0, place.to_euler().z % (2.0 * np.pi) - np.pi)
     armature.users_collection[0].objects.link(root)
     armature.dafnet.root = root

@@ -14,31 +14,37 @@ from ...core.paths import AFTER_SEAT, Route, Stop, facing, route
 from ...core.progress import stepwise, within
 from ...core.root import forward_of
 from ...core.trails import FASTEST, followed, trail
-from ...director.walks import doubted, ways
-from ..character.armature import is_character, parts_of, sent
+from ...director.walks import unit_doubt, ways
+from ..character.armature import character_and_goal, is_character, objects_of
 from ..character.settings import Settings, settings_of
 from ..compat import action_curves
 from ..scene.dependencies import Dependencies
 from ..scene.lookup import find_object
 from ..scene.playback import play_steps
-from .root_keys import MOVES, keyable_root, keyed_along, unchanged_on_failure
-from .walking import Start, Walk, extended_to, rest_at, start_of, told_of, walk
+from .root_keys import MOVES, key_route, keyable_root, unchanged_on_failure
+from .walking import Start, Walk, extend_range, passage_warnings, rest_at, start_of, walk
 
 __all__ = [
     "along_curve",
-    "as_moved",
-    "chosen",
+    "along_object",
+    "character_and_source",
     "floor_points",
     "is_curve",
     "may_move",
-    "places_of",
+    "places_over_time",
     "through_points",
 ]
 
-_READ = 0.1  # progress when the scene is read
-_FOUND = 0.7  # progress when the way is found
-_SPACING = 0.05  # metres between points on the furniture
-_THERE = 0.1  # metres between a root and the line's beginning that need no walk
+_READ = 0.1
+"""Progress once the scene is read."""
+_FOUND = 0.7
+"""Progress once the way is found."""
+_SPACING = 0.05
+"""Metres between points on the furniture."""
+_THERE = 0.1
+"""Metres from the root to the beginning of a curve up to which it need not walk there first."""
+_SAME_PLACE = 0.3
+"""Metres from the root up to which the first of several points counts as reached."""
 
 
 def is_curve(candidate: bpy.types.Object) -> bool:
@@ -59,16 +65,16 @@ def may_move(candidate: bpy.types.Object) -> bool:
     )
 
 
-def chosen(
+def character_and_source(
     context: bpy.types.Context, fits: Callable[[bpy.types.Object], bool]
 ) -> tuple[bpy.types.Object | None, bpy.types.Object | None]:
-    """The character to direct (``armature.sent``), and the active or else the only selected other
-    object that ``fits``.
+    """The character to direct (``armature.character_and_goal``), and the other selected object that
+    ``fits``: the active one, or the only one.
     """
-    character = sent(context)[0]
+    character = character_and_goal(context)[0]
     if character is None:
         return None, None
-    parts = parts_of(character)
+    parts = objects_of(character)
     others = [o for o in context.selected_objects if o not in parts and fits(o)]
     active = context.object
     return character, active if active in others else others[0] if len(others) == 1 else None
@@ -79,7 +85,7 @@ def floor_points(context: bpy.types.Context) -> list[bpy.types.Object]:
     after 9.
     """
     characters = [o for o in context.scene.objects if is_character(o)]
-    parts = {part for character in characters for part in parts_of(character)}
+    parts = {part for character in characters for part in objects_of(character)}
     found = [o for o in context.selected_objects if o.type == "EMPTY" and o not in parts]
     return sorted(
         found,
@@ -90,7 +96,7 @@ def floor_points(context: bpy.types.Context) -> list[bpy.types.Object]:
     )
 
 
-def _written(
+def _key_walk(
     context: bpy.types.Context,
     settings: Settings,
     start: Start,
@@ -98,19 +104,19 @@ def _written(
     end: Sequence[SatOn] | None = None,
     warnings: Sequence[str] = (),
 ) -> Generator[float, None, Walk]:
-    """Key a route over what the root has from its first frame on, and tell what is to be seen to;
-    before that it moves as it did. ``end``: see ``met_along``.
+    """Key a route in place of the root's keys from its first frame on, and collect warnings; before
+    that frame the root moves as it did. ``end``: see ``met_along``.
     """
     met = yield from within(met_along.steps(start.scene, walked.path, start.fps, end=end), 0.0, 0.9)
     places = walked.path.position[:, :2]
     doubt = yield from within(
-        doubted.steps(start.scene.solids, places, start.floor, start.size), 0.9, 1.0
+        unit_doubt.steps(start.scene.solids, places, start.floor, start.size), 0.9, 1.0
     )
     root, first = keyable_root(settings), start.first
     armature = find_object(settings, settings.armature, "character")
     with unchanged_on_failure(root):
-        kept = _cut(root, first)
-        keyed_along(context, root, walked, first=first, scale=1.0 / start.unit, fps=start.fps)
+        kept = _remove_keys_from(root, first)
+        key_route(context, root, walked, first=first, scale=1.0 / start.unit, fps=start.fps)
         for curve in action_curves(root):
             for frame, value in kept.get((curve.data_path, curve.array_index), []):
                 if abs(curve.evaluate(frame) - value) > 1e-5:
@@ -118,12 +124,14 @@ def _written(
             curve.update()
 
     last = first + len(walked.path) - 1
-    extended = extended_to(context.scene, armature, last)
-    told = (*told_of(met, first), *warnings, *([doubt] if doubt else []))
+    extended = extend_range(context.scene, armature, last)
+    told = (*passage_warnings(met, first), *warnings, *([doubt] if doubt else []))
     return Walk(first, last, extended, told)
 
 
-def _cut(root: bpy.types.Object, first: int) -> dict[tuple[str, int], list[tuple[int, float]]]:
+def _remove_keys_from(
+    root: bpy.types.Object, first: int
+) -> dict[tuple[str, int], list[tuple[int, float]]]:
     """Remove a root's keys from frame ``first`` on; returns by curve the values of the frames after
     the last key that stays.
     """
@@ -135,7 +143,7 @@ def _cut(root: bpy.types.Object, first: int) -> dict[tuple[str, int], list[tuple
         earlier = [point for point in curve.keyframe_points if point.co[0] < first]
         if earlier:
             last = earlier[-1]
-            # else the next key would bend what leads to this one
+            # The next key would otherwise bend the curve that leads to this one.
             last.handle_left_type = last.handle_right_type = "FREE"
             between = range(int(np.floor(last.co[0])) + 1, first)
             kept[curve.data_path, curve.array_index] = [
@@ -159,7 +167,8 @@ def _line_of(context: bpy.types.Context, curve: bpy.types.Object) -> np.ndarray:
 
     evaluated = curve.evaluated_get(context.evaluated_depsgraph_get())
     lines = _lines(evaluated)
-    if not lines:  # it has a bevel or another surface: the bare line, without its modifiers
+    if not lines:
+        # It has a bevel or another surface: take the bare line, without its modifiers.
         bare = bpy.data.objects.new(curve.name, curve.data.copy())
         data = bare.data
         try:
@@ -226,10 +235,10 @@ def along_curve(
     """Let the character walk along a curve from the current frame on, and stand at its end for some
     ``seconds``.
 
-    Where the root has keys before that, it goes from where it is to the curve first; else the walk
-    begins on the curve. Later keys are replaced. ``keep_facing``: it looks where it looks now all
-    the way. ``backwards``: from the curve's end. ``InputError``: no curve, too short, or the root
-    cannot be keyed; nothing is changed then, nor where the job is closed.
+    Where the root has earlier keys, it walks from where it is to the curve first; else the walk
+    begins on the curve. Later keys are replaced. ``keep_facing``: it keeps looking where it looks
+    now. ``backwards``: from the curve's end. ``InputError``: not a curve, too short, or the root
+    cannot be keyed. Then, or if the job is closed, nothing is changed.
     """
     settings, name = settings_of(armature, context.scene), curve.name
     line = _line_of(context, curve)[:: -1 if backwards else 1]
@@ -246,7 +255,7 @@ def along_curve(
     if away < _THERE or (keys and min(keys) < at.first):
         start = yield from within(rest_at(at), _READ, _READ)
     if start is not None and away >= _THERE:
-        way = yield from within(_way(at, start, [points[0]]), _READ, _FOUND)
+        way = yield from within(_corners_through(at, start, [points[0]]), _READ, _FOUND)
         points = np.concatenate([way[:-1], points])
 
     walked = trail(
@@ -259,12 +268,14 @@ def along_curve(
         seconds=seconds,
         name=f"curve '{name}'",
     )
-    return (yield from within(_written(context, settings, at, walked, ()), _FOUND, 1.0))
+    return (yield from within(_key_walk(context, settings, at, walked, ()), _FOUND, 1.0))
 
 
-def _way(at: Start, start: Stop, goals: Sequence[np.ndarray]) -> Generator[float, None, np.ndarray]:
-    """Corners (N, 2) of the way round the furniture from ``start`` through the places ``goals``
-    (2,), with these.
+def _corners_through(
+    at: Start, start: Stop, goals: Sequence[np.ndarray]
+) -> Generator[float, None, np.ndarray]:
+    """Corners (N, 2) of the way around the furniture from ``start`` through all ``goals`` (2,),
+    including these.
     """
     forward = forward_of(start.yaw)
     here = np.array(start.position) + (AFTER_SEAT if start.seated else 0.0) * forward
@@ -277,11 +288,11 @@ def _way(at: Start, start: Stop, goals: Sequence[np.ndarray]) -> Generator[float
 
 
 @stepwise
-def places_of(
+def places_over_time(
     context: bpy.types.Context, source: bpy.types.Object, frames: Sequence[int]
 ) -> Generator[float, None, np.ndarray]:
-    """Where an object is in some rising frames (N, 3), world, Blender units; the current frame
-    stays. ``InputError``: it is deleted while it is looked at.
+    """Where an object is (N, 3) in ascending ``frames``, world, Blender units; the current frame
+    stays. ``InputError``: it is deleted meanwhile.
     """
     places: dict[int, tuple[float, ...]] = {}
 
@@ -298,14 +309,14 @@ def places_of(
 
 
 @stepwise
-def as_moved(
+def along_object(
     context: bpy.types.Context, armature: bpy.types.Object, source: bpy.types.Object
 ) -> Generator[float, None, Walk]:
-    """Let the root go where ``source`` goes over the floor, at the same frames: those of its keys,
-    else of the scene's range.
+    """Let the root go where ``source`` goes over the floor, in the same frames: those of its keys,
+    else the scene's range.
 
-    The root's keys from there on are replaced. ``InputError``: it hardly moves, or the root cannot
-    be keyed; nothing is changed then, nor where the job is closed.
+    The root's later keys are replaced. ``InputError``: the source hardly moves, or the root cannot
+    be keyed. Then, or if the job is closed, nothing is changed.
     """
     scene, name = context.scene, source.name
     settings = settings_of(armature, scene)
@@ -320,7 +331,7 @@ def as_moved(
         if keys
         else (scene.frame_start, scene.frame_end)
     )
-    moves = places_of.steps(context, source, range(first, last + 1))
+    moves = places_over_time.steps(context, source, range(first, last + 1))
     at = yield from within(start_of(context, settings, first), 0.0, _READ)
     places = (yield from within(moves, _READ, _FOUND))[:, :2] * at.unit
     moved = followed(places, at.fps, at.yaw, at.floor)
@@ -330,7 +341,7 @@ def as_moved(
         "slow it down."
     )
     warnings = [hurried] if fastest > FASTEST else []
-    written = _written(context, settings, at, moved, None, warnings)
+    written = _key_walk(context, settings, at, moved, None, warnings)
     return (yield from within(written, _FOUND, 1.0))
 
 
@@ -346,10 +357,10 @@ def through_points(
 ) -> Generator[float, None, Walk]:
     """Let the character walk through the places of ``points`` and stand at the last.
 
-    ``to_cursor``: the 3D cursor is the last; it is the only one where there are no points. Goes on
-    from the root's last key, else from the current frame, round the furniture and without rests in
-    between. ``InputError``: no way, or the root cannot be keyed; nothing is changed then, nor where
-    the job is closed.
+    ``to_cursor``: the 3D cursor is the last one; without points it is the only one. The walk
+    continues from the root's last key, else from the current frame, around the furniture and
+    without pauses. ``InputError``: there is no way, or the root cannot be keyed. Then, or if the
+    job is closed, nothing is changed.
     """
     if not points:
         return (yield from walk.steps(context, armature, None, seconds, speed))
@@ -361,13 +372,13 @@ def through_points(
     flat = [np.array(spot, float)[:2] for spot in spots]
     at = yield from within(start_of(context, settings), 0.0, _READ)
     places = [spot * at.unit for spot in flat]
-    if len(places) > 1 and np.linalg.norm(places[0] - at.place[:2]) < 0.3:
-        del places[0]  # it stands there already
+    if len(places) > 1 and np.linalg.norm(places[0] - at.place[:2]) < _SAME_PLACE:
+        del places[0]
 
     start = yield from within(rest_at(at), _READ, _READ)
-    way = yield from within(_way(at, start, places), _READ, _FOUND)
+    way = yield from within(_corners_through(at, start, places), _READ, _FOUND)
     last = way[-1] - (way[-2] if len(way) > 1 else np.array(start.position))
     via = [(float(x), float(y)) for x, y in way]
     goal = Stop(via.pop(), facing(last), seconds)
     walked = route(start, *via, goal, speed=speed, fps=at.fps, floor=at.floor)
-    return (yield from within(_written(context, settings, at, walked, ()), _FOUND, 1.0))
+    return (yield from within(_key_walk(context, settings, at, walked, ()), _FOUND, 1.0))

@@ -1,5 +1,5 @@
-"""Keys on a character's root: it then follows its route, or nothing is changed and a sentence says
-why.
+"""Keys on a character's root: either it follows its route, or nothing is changed and an InputError
+says why.
 """
 
 from collections.abc import Iterable, Iterator
@@ -16,7 +16,7 @@ from ..compat import action_curves, shares_curves
 from ..scene.lookup import find_object
 from ..scene.playback import frame_kept
 
-__all__ = ["MOVES", "keyable_root", "keyed_along", "last_key", "unchanged_on_failure", "write_keys"]
+__all__ = ["MOVES", "keyable_root", "key_route", "last_key", "unchanged_on_failure", "write_keys"]
 
 MOVES = ("location", "rotation_euler")
 """What is keyed of a root."""
@@ -25,16 +25,16 @@ _KEYS_A_SECOND = 10
 _CHECKED_FRAMES = 12
 """In how many frames it is checked that the root follows its keys."""
 _DISTANCE_TOLERANCE = 1e-3
-"""Metres from the route that are put down to rounding."""
+"""Metres from the route that count as rounding."""
 _ANGLE_TOLERANCE = 0.01
-"""Radians from the route's heading that are put down to rounding."""
+"""Radians from the route's heading that count as rounding."""
 
 
 def keyable_root(settings: Settings) -> bpy.types.Object:
-    """The root, whose keys are to be written: its own place must be its place in the world, and its
-    action play alone.
+    """The root, if its keys alone decide where it is in the world: nothing else moves it, and its
+    action plays alone.
 
-    ``InputError``: there is none, or something keeps it from being keyed.
+    ``InputError``: there is none, or something is in the way.
     """
     if settings.root is None:
         raise InputError(
@@ -43,13 +43,13 @@ def keyable_root(settings: Settings) -> bpy.types.Object:
         )
 
     root = find_object(settings, settings.root, "root")
-    for reason in _in_the_way(root):
+    for reason in _reasons_not_to_key(root):
         raise InputError(f"The root '{root.name}' {reason}")
 
     return root
 
 
-def _in_the_way(root: bpy.types.Object) -> Iterator[str]:
+def _reasons_not_to_key(root: bpy.types.Object) -> Iterator[str]:
     """Why the root cannot be keyed, and what to do: ends of sentences that begin with the root."""
     if root.parent or any(not c.mute for c in root.constraints):
         yield "follows something; clear its parent and constraints to key it."
@@ -89,16 +89,14 @@ def _in_the_way(root: bpy.types.Object) -> Iterator[str]:
     for other in sorted(
         (each for each in users if shares_curves(root, each)), key=lambda each: each.name
     ):
-        yield (
-            f"has its keys in common with '{other.name}'; make its action a single user to key it."
-        )
+        yield (f"shares its keys with '{other.name}'; make its action a single user to key it.")
 
     for curve in action_curves(root):
         if curve.data_path in MOVES:
-            yield from _in_the_way_of_keys(curve)
+            yield from _reasons_in_curve(curve)
 
 
-def _in_the_way_of_keys(curve: bpy.types.FCurve) -> Iterator[str]:
+def _reasons_in_curve(curve: bpy.types.FCurve) -> Iterator[str]:
     group = curve.group
     if curve.lock or (group and group.lock):
         yield "has locked curves of location or rotation; unlock them to key it."
@@ -111,7 +109,7 @@ def _in_the_way_of_keys(curve: bpy.types.FCurve) -> Iterator[str]:
 
 
 def last_key(root: bpy.types.Object) -> int | None:
-    """The frame of a root's last key, or the whole one after it; None where it has none."""
+    """The frame of a root's last key, rounded up; None where it has no keys."""
     keyed = [
         float(p.co[0])
         for c in action_curves(root)
@@ -148,7 +146,7 @@ def unchanged_on_failure(root: bpy.types.Object) -> Iterator[None]:
         bpy.data.actions.remove(kept)
 
 
-def keyed_along(
+def key_route(
     context: bpy.types.Context,
     root: bpy.types.Object,
     route: Route,
@@ -203,11 +201,11 @@ def write_keys(
                 f"The root '{root.name}' cannot be keyed; unlock its action and curves."
             )
 
-    _eased(action_curves(root), first)
+    _smooth_keys(action_curves(root), first)
     return np.array(sorted(frames))
 
 
-def _eased(curves: Iterable[bpy.types.FCurve], first: int) -> None:
+def _smooth_keys(curves: Iterable[bpy.types.FCurve], first: int) -> None:
     for curve in curves:
         if curve.data_path in MOVES:
             for point in curve.keyframe_points:

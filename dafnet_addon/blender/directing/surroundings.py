@@ -11,12 +11,12 @@ from ...core.progress import run_to_end
 from ...core.sensor import REACH
 from ...core.solids import Mesh
 from ...director.surfaces import surface_points
-from ..character.armature import character_scale, metres_per_unit, parts_of
+from ..character.armature import character_scale, metres_per_unit, objects_of
 from ..character.settings import Settings, settings_of
 from ..scene.furniture import furniture_now
 from ..scene.lookup import find_object
 from ..scene.scene_reader import read_scene
-from .path_sources import places_of
+from .path_sources import places_over_time
 
 __all__ = ["FoundFurniture", "find_furniture"]
 
@@ -29,7 +29,7 @@ _HIGH = 2.0
 _SPACING = 0.1
 """Metres between the points on a surface."""
 _PLACES_A_SECOND = 10
-"""How densely the path is looked along."""
+"""How many places of the path are looked at for each second."""
 _UNSEEN = {"CURVE", "SURFACE", "META", "FONT"}
 """Types of objects that may have faces but are not meshes."""
 
@@ -49,10 +49,10 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
     """Link the visible meshes near the root's path into a collection "… Furniture", which becomes
     the character's.
 
-    The character, other armatures with what is parented to or deformed by them, and floors do not
-    count. What the collection holds from an earlier time and is no longer near is unlinked again,
-    if it also lies in another collection. ``InputError``: there is no root, nothing is
-    near it, or the scene cannot be read; nothing is changed then.
+    Characters and other armatures, what is parented to them or deformed by them, and floors do not
+    count. What an earlier search has linked and is no longer near is unlinked again, if it also
+    lies in another collection. ``InputError``: there is no root, nothing is near it, or the scene
+    cannot be read; nothing is changed then.
     """
     scene, own = context.scene, armature.dafnet
     settings = settings_of(armature, scene, mode="FREE")
@@ -61,13 +61,15 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
     size = character_scale(armature, unit)
     candidates = [o for o in scene.objects if o not in _bodies(scene)]
 
-    made = bpy.data.collections.new(f"{armature.name} Furniture")
+    collection = bpy.data.collections.new(f"{armature.name} Furniture")
     try:
         for each in candidates:
             if each.visible_get():
-                made.objects.link(each)
+                collection.objects.link(each)
 
-        meshes = furniture_now(context, settings_of(armature, scene, furniture=made.name_full))
+        meshes = furniture_now(
+            context, settings_of(armature, scene, furniture=collection.name_full)
+        )
         away = {name: _distance(found, path, size) for name, found in meshes.items()}
         near = {name for name, distance in away.items() if distance < _NEAR * size}
         if not near:
@@ -76,16 +78,16 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
                 "near the furniture first."
             )
 
-        for each in list(made.objects):
+        for each in list(collection.objects):
             if each.name not in near:
-                made.objects.unlink(each)
+                collection.objects.unlink(each)
 
         read = read_scene(
-            context, settings_of(armature, scene, mode="FREE", furniture=made.name_full)
+            context, settings_of(armature, scene, mode="FREE", furniture=collection.name_full)
         )
         warnings = [*read.warnings, *run_to_end(shot_steps(read.scene, read.controls)).warnings]
     except InputError:
-        bpy.data.collections.remove(made)
+        bpy.data.collections.remove(collection)
         raise
 
     if unseen := sorted(f"'{name}'" for name in near if away[name] > REACH * size):
@@ -94,33 +96,33 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
         )
 
     return FoundFurniture(
-        _adopted(scene, own, made),
+        _adopt(scene, own, collection),
         tuple(sorted(near)),
-        (*_ignored(candidates, path, unit, size), *warnings),
+        (*_ignored_warnings(candidates, path, unit, size), *warnings),
     )
 
 
-def _adopted(
-    scene: bpy.types.Scene, own: bpy.types.PropertyGroup, made: bpy.types.Collection
+def _adopt(
+    scene: bpy.types.Scene, own: bpy.types.PropertyGroup, collection: bpy.types.Collection
 ) -> bpy.types.Collection:
-    """Make ``made`` the character's furniture: the collection of an earlier time gets its objects,
-    or else it is used itself.
+    """Make ``collection`` the character's furniture: one that was found earlier takes its objects
+    over, else it is used itself.
     """
     wanted = f"{own.id_data.name} Furniture"
     earlier = own.furniture
-    if earlier is None or earlier == made or earlier.name != wanted or earlier.library:
-        scene.collection.children.link(made)
-        own.furniture = made
-        return made
+    if earlier is None or earlier == collection or earlier.name != wanted or earlier.library:
+        scene.collection.children.link(collection)
+        own.furniture = collection
+        return collection
 
-    for each in list(made.objects):
+    for each in list(collection.objects):
         if each.name not in earlier.objects:
             earlier.objects.link(each)
     for each in list(earlier.objects):
-        if each.name not in made.objects and len(each.users_collection) > 1:
+        if each.name not in collection.objects and len(each.users_collection) > 1:
             earlier.objects.unlink(each)
 
-    bpy.data.collections.remove(made)
+    bpy.data.collections.remove(collection)
     return earlier
 
 
@@ -135,7 +137,7 @@ def _path(context: bpy.types.Context, settings: Settings, armature: bpy.types.Ob
 
     step = max(1, round(scene.render.fps / scene.render.fps_base / _PLACES_A_SECOND))
     frames = [*range(settings.frame_start, settings.frame_end, step), settings.frame_end]
-    return places_of(
+    return places_over_time(
         context, find_object(settings, settings.root, "root"), frames
     ) * metres_per_unit(scene)
 
@@ -147,7 +149,7 @@ def _bodies(scene: bpy.types.Scene) -> set[bpy.types.Object]:
     found: set[bpy.types.Object] = set()
     for each in scene.objects:
         if each.type == "ARMATURE":
-            found |= parts_of(each)
+            found |= objects_of(each)
         elif any(m.type == "ARMATURE" and m.object is not None for m in each.modifiers):
             found.add(each)
     return found
@@ -167,7 +169,7 @@ def _distance(meshes: list[Mesh], path: np.ndarray, size: float) -> float:
     return float(np.min(away, where=standing, initial=np.inf))
 
 
-def _ignored(
+def _ignored_warnings(
     candidates: list[bpy.types.Object], path: np.ndarray, unit: float, size: float
 ) -> list[str]:
     """Sentences about what stands near the path but is hidden, or is not a mesh."""

@@ -1,4 +1,4 @@
-"""A character's walk round the furniture to a seat, or to a place to stand, as keys on its root."""
+"""A character's walk around the furniture to a seat or to a place to stand, as keys on its root."""
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
@@ -13,24 +13,27 @@ from ...core.paths import BEFORE_SEAT, Route, Stop, facing
 from ...core.progress import stepwise, within
 from ...core.solids import Scene
 from ...director.seats import on_a_seat, seat_of
-from ...director.walks import doubted, walk_to
+from ...director.walks import unit_doubt, walk_to
 from ..character.armature import character_scale, metres_per_unit
 from ..character.settings import Settings, settings_of
 from ..scene.furniture import furniture_at
 from ..scene.lookup import find_collection, find_object, find_scene
-from .root_keys import keyable_root, keyed_along, last_key, unchanged_on_failure
+from .root_keys import key_route, keyable_root, last_key, unchanged_on_failure
 
-__all__ = ["Start", "Walk", "extended_to", "rest_at", "start_of", "told_of", "walk"]
+__all__ = ["Start", "Walk", "extend_range", "rest_at", "start_of", "passage_warnings", "walk"]
 
-_BEFORE = 0.2  # seconds of rest before the first step
-_READ = 0.1  # progress when the scene is read
-_BEFORE_SEAT = BEFORE_SEAT + 0.2  # metres from a seat within which one is coming to sit on it
+_BEFORE = 0.2
+"""Seconds of rest before the first step."""
+_READ = 0.1
+"""Progress once the scene is read."""
+_SITTING_DOWN = BEFORE_SEAT + 0.2
+"""Metres from a seat within which a walker is about to sit down on it."""
 
 
 @dataclass(frozen=True)
 class Walk:
-    """Frames ``first`` to ``last`` of the new keys; whether the scene's end had to be moved for
-    them; sentences to be said.
+    """What was keyed: frames ``first`` to ``last``, both included; whether the range had to be
+    ``extended`` for them; ``warnings`` for the user.
     """
 
     first: int
@@ -112,10 +115,10 @@ def walk(
     """Let the character walk to ``seat`` and sit there for some ``seconds``, or, for None, to the
     3D cursor and stand.
 
-    Goes on from the root's last key, else from the current frame, where nothing before is changed.
-    The seat has to be in the character's furniture collection; where it has none, the seat's own
+    The walk continues from the root's last key, else from the current frame; earlier keys stay. The
+    seat has to be in the character's furniture collection; where it has none, the seat's own
     becomes that. ``InputError``: there is nothing to sit on, no way, no room before the seat, or
-    the root cannot be keyed; nothing is changed then, nor where the job is closed.
+    the root cannot be keyed. Then, or if the job is closed, nothing is changed.
     """
     scene, furniture = context.scene, armature.dafnet.furniture
     if seat is not None and furniture is None:
@@ -133,16 +136,16 @@ def walk(
     character = find_object(settings, settings.armature, "character")
     own = find_collection(settings.furniture) if settings.furniture is not None else None
     with unchanged_on_failure(root):
-        keyed_along(context, root, route, first=start.first, scale=1.0 / start.unit, fps=start.fps)
+        key_route(context, root, route, first=start.first, scale=1.0 / start.unit, fps=start.fps)
 
     character.dafnet.furniture = own
     last = start.first + len(route.path) - 1
-    extended = extended_to(scene, character, last)
-    return Walk(start.first, last, extended, (*told_of(met, start.first), *warnings))
+    extended = extend_range(scene, character, last)
+    return Walk(start.first, last, extended, (*passage_warnings(met, start.first), *warnings))
 
 
-def extended_to(scene: bpy.types.Scene, armature: bpy.types.Object, last: int) -> bool:
-    """Let the range that the character generates reach to frame ``last``; whether its end had to be
+def extend_range(scene: bpy.types.Scene, armature: bpy.types.Object, last: int) -> bool:
+    """Make the range that the character generates reach frame ``last``; whether its end had to be
     moved for that.
     """
     own = armature.dafnet
@@ -155,8 +158,8 @@ def extended_to(scene: bpy.types.Scene, armature: bpy.types.Object, last: int) -
     return True
 
 
-def told_of(met: Sequence[Passage], first: int) -> tuple[str, ...]:
-    """A sentence about the furniture that a walk from frame ``first`` on leads through, if any."""
+def passage_warnings(met: Sequence[Passage], first: int) -> tuple[str, ...]:
+    """A warning about the furniture that a walk, keyed from frame ``first`` on, leads through."""
     places = listed(met, lambda each: f"from frame {first + each.start} to {first + each.stop - 1}")
     return (
         (
@@ -196,7 +199,7 @@ def _route(
         met = met_along.steps(start.scene, route.path, start.fps, end=())
         passages = yield from within(met, 0.6, 0.95)
         doubt = yield from within(
-            doubted.steps(solids, route.path.position[:, :2], floor, size), 0.95, 1.0
+            unit_doubt.steps(solids, route.path.position[:, :2], floor, size), 0.95, 1.0
         )
         return route, passages, (doubt,) if doubt else ()
 
@@ -215,11 +218,11 @@ def _route(
     met = met_along.steps(start.scene, route.path, start.fps, [sat_on])
     passages = yield from within(met, 0.6, 1.0)
     gap = np.linalg.norm(route.path.position[:, :2] - spot.position, axis=1)
-    comes = int(np.flatnonzero(gap > _BEFORE_SEAT)[-1])
+    comes = int(np.flatnonzero(gap > _SITTING_DOWN)[-1])
     for each in passages:
         if each.stop - 1 > comes and each.name not in names:
             raise InputError(
-                f"'{each.name}' stands where one comes to sit on '{seat}'; pull "
+                f"'{each.name}' is in the way of sitting down on '{seat}'; pull "
                 f"'{seat}' out, or choose another seat."
             )
 

@@ -18,7 +18,7 @@ class OverlayCache:
     """Results of several kinds, each found by what it was computed from.
 
     ``edits`` counts changes of the scene, and ``furniture`` those that may have moved or reshaped a
-    piece of furniture. Both belong into the key of a result that depends on such things.
+    piece of furniture. Both belong in the key of a result that depends on such things.
     """
 
     def __init__(self) -> None:

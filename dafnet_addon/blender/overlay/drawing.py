@@ -1,6 +1,6 @@
 """Drawings of the overlays as plain arrays: stick figures, paths, rings, the circle of actions.
 
-Nothing here knows the scene, and nothing draws (``overlays`` does).
+Nothing here knows the scene, and nothing draws (``display`` does).
 """
 
 from collections.abc import Iterable, Sequence

@@ -9,7 +9,7 @@ from ...core.cleanup import standing_still
 from ...core.resampling import frame_times, resample_nearest, resample_positions
 from ...core.series import MODEL_FPS
 from ...core.take import Controls, Take
-from ..character.armature import is_character, sent
+from ..character.armature import character_and_goal, is_character
 from ..character.takes import PACKED, played_take, stored_take
 from .cache import cache
 
@@ -26,7 +26,7 @@ _CAPACITY = 24
 """Takes that stay unpacked, since ghosts are shown together."""
 
 _last_watched: list[object] = [None, ""]
-"""What the watched character was found from, and its name."""
+"""The selection that the watched character was found by, and its name."""
 
 
 def forget() -> None:
@@ -36,8 +36,8 @@ def forget() -> None:
 
 
 def watched_character(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The character that overlays are for: see ``armature.sent``; where there is none, the one they
-    were for last.
+    """The character that overlays are for (``armature.character_and_goal``); where there is none,
+    the one that they were for last.
     """
     scene, active = context.scene, context.object
     key = cache.edits, scene.session_uid, active.session_uid if active else 0
@@ -45,7 +45,7 @@ def watched_character(context: bpy.types.Context) -> bpy.types.Object | None:
     if last is not None and _last_watched[0] == key:
         return last
 
-    character, _ = sent(context)
+    character, _ = character_and_goal(context)
     if character is None and last is not None and is_character(last):
         character = last
 

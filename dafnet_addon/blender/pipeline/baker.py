@@ -1,4 +1,4 @@
-"""A take onto the character: keyframes in a new action."""
+"""Bakes a take onto the character: keyframes in a new action."""
 
 from collections.abc import Callable
 
@@ -35,8 +35,8 @@ TRANSFORMS = ("location", "rotation", "scale")
 
 
 def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
-    """The character's size, see ``character_scale``, if it can be baked onto; else ``InputError``
-    with what to do.
+    """The character's size (``character_scale``), if it can be baked onto. ``InputError`` where it
+    cannot.
     """
     if armature.type != "ARMATURE":
         raise InputError(

@@ -1,5 +1,5 @@
-"""Takes of a scene's character without a window: a file is opened, its character generated, another
-file written.
+"""Bakes takes without a window: opens a file, generates its character's motion, and saves another
+file.
 """
 
 import os
@@ -35,12 +35,12 @@ def bake_takes(
     weights: "Weights | None" = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[Path, job.Result]:
-    """Bake ``takes`` takes of one character and save; the first one plays, the others are Actions
-    in the file, too.
+    """Bake this many ``takes`` of one character and save; the first one plays, the others are
+    Actions in the file.
 
     ``file`` None stands for the file that is open, ``output`` None for the file itself. ``scene``
     is needed where another one is active in the file, ``character`` names the armature where the
-    scene has several. ``changes`` overrule the character's own settings (fields of ``Settings``).
+    scene has several. ``changes`` override the character's own settings (fields of ``Settings``).
     Each further take has the next seed, and temperature 1 where none is set. Returns the file
     written and the ``Result``.
 

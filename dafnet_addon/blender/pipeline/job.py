@@ -31,14 +31,14 @@ from .rollback import state_restorer, undone_on_failure
 if TYPE_CHECKING:
     from ...core.weights import Weights
 
-__all__ = ["Result", "Settings", "clean_again_of", "draws_of", "settings_of", "steps", "run"]
+__all__ = ["Result", "Settings", "clean_up_again", "draws_of", "settings_of", "steps", "run"]
 
 _READ = 0.1
 """Progress once the scene is read."""
 _GENERATED = 0.95
 """Progress once the takes are generated."""
 _FURTHER_TAKES = 1.0
-"""Temperature of every take but the first where it is set to 0, at which all would be the same."""
+"""Temperature of the further takes where it is set to 0, at which all would be the same."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +92,7 @@ def run(
     ``settings`` comes from ``settings_of(armature, scene, **overrides)``. Without ``weights`` those
     of the preferences, else the shipped ones, are loaded. ``watch``: see ``takes_steps``. The
     current frame is as it was at every yield (but see ``read_scene`` for simulations). Any error
-    (``InputError``, ``WeightsError`` or whatever else), and ``close()``, leaves the scene as it
-    was.
+    (``InputError``, ``WeightsError`` or any other), and ``close()``, leaves the scene as it was.
     """
     if weights is None:
         weights = load_weights(weights_path(context))
@@ -176,12 +175,12 @@ def _kept_take(settings: Settings) -> tuple[Take | None, int]:
 def _bake_steps(
     settings: Settings, takes: list[Take], controls: Controls, draws: list[Draw]
 ) -> Generator[float, None, list[bpy.types.Action]]:
-    """An action for each take, listed; the first one plays. All are made, or none: whatever stops
-    it, nothing has changed.
+    """An action for each take, listed on the armature; the first one plays. All are made or none:
+    whatever stops it, nothing has changed.
     """
     names: list[str] = []
     with ExitStack() as undo:
-        undo.callback(_unbake, settings, names, state_restorer(_character(settings)))
+        undo.callback(_remove_bake, settings, names, state_restorer(_character(settings)))
         for take, draw in zip(takes, draws, strict=True):
             armature = _character(settings)
             with undone_on_failure(armature):
@@ -206,21 +205,21 @@ def _character(settings: Settings) -> bpy.types.Object:
     return find_object(settings, settings.armature, "character")
 
 
-def _unbake(
+def _remove_bake(
     settings: Settings, names: list[str], restore: Callable[[bpy.types.Object], None]
 ) -> None:
-    """Give the character its state back if it is there, and remove the actions of these names."""
+    """Restore the character, if it still exists, and remove the actions of these names."""
     for armature in (o for o in bpy.data.objects if o.name_full == settings.armature):
         restore(armature)
     for action in [action for action in bpy.data.actions if action.name_full in names]:
         bpy.data.actions.remove(action)
 
 
-def clean_again_of(
+def clean_up_again(
     context: bpy.types.Context, armature: bpy.types.Object, action: bpy.types.Action
 ) -> Result:
-    """The take of ``action`` with the character's present clean-up as a new action, without
-    sampling again.
+    """Clean up the take of ``action`` with the character's present settings, as a new action and
+    without sampling again.
 
     Targets, root and mode count as they were when it was generated, furniture as it is now.
     ``InputError`` as for ``steps``, and where the action holds no take; nothing is changed then.

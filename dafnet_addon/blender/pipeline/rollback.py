@@ -1,6 +1,4 @@
-"""What writing a motion changes on an armature, and how all of it is undone where the writing
-fails.
-"""
+"""Undoes all that writing a motion changes on an armature, where the writing fails."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -41,8 +39,8 @@ def _set(owner: bpy.types.Object | bpy.types.PoseBone, channels: _Channels) -> N
 
 
 def state_restorer(armature: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
-    """A function that gives the armature the state back that it has now; it is given the armature,
-    which may have to be found again after an undo.
+    """A function that restores the state that the armature has now; it takes the armature, which
+    may have to be found again after an undo.
 
     The state is what it plays, its own transform and its bones', their custom numbers, and its list
     of takes, to which a bake adds rows at the end.
@@ -79,8 +77,8 @@ def undone_on_failure(armature: bpy.types.Object) -> Iterator[None]:
     try:
         yield
     except BaseException:
-        # first of all, since an action that is removed while it plays leaves its slot's number
-        # behind
+        # First of all, since an action that is removed while it plays leaves the number of its slot
+        # behind.
         restore(armature)
         for added in set(bpy.data.actions) - before:
             bpy.data.actions.remove(added)

@@ -1,4 +1,4 @@
-"""The job that runs in a window, one at a time: for what shows it, and for what has to wait for it.
+"""The job that runs in a window, one at a time: panels show it, and other operators wait for it.
 
 It belongs to the session and to no file: undoing, or opening another file, leaves it alone.
 """
@@ -40,5 +40,5 @@ def begin_job() -> RunningJob:
 
 
 def end_job() -> None:
-    """No job is running any more."""
+    """From now on no job is running."""
     _running.clear()

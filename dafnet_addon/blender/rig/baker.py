@@ -1,5 +1,5 @@
-"""Bakes the motion that a DAFNet character plays, hand edits included, onto an armature of the
-animator's own, in a new action.
+"""Bakes the motion that a DAFNet character plays, hand edits included, onto the animator's rig, in
+a new action.
 """
 
 from dataclasses import dataclass
@@ -89,9 +89,9 @@ def bake_onto_rig(
     that the rig then plays.
 
     ``root_motion``: OBJECT, BONE or HIPS, what carries the rig over the floor; ``limbs``: FK or IK.
-    Earlier actions are kept by a fake user. Controls that are not mapped keep their pose, but those
-    above mapped ones and those that the earlier action moves are put at rest. ``InputError``: rig,
-    map or character cannot be used; the rig is then as it was.
+    Earlier actions are kept by a fake user. Controls that are not mapped keep their pose, except
+    that those which would interfere, and those that the earlier action moves, are put at rest.
+    ``InputError``: rig, map or character cannot be used; the rig is then as it was.
     """
     frames = frames_played(character, context.scene) if frames is None else frames
     unit = metres_per_unit(context.scene)
@@ -278,7 +278,7 @@ def _require_bakeable(context: bpy.types.Context, rig: bpy.types.Object, root_mo
 def _record(
     context: bpy.types.Context, character: bpy.types.Object, rig: bpy.types.Object, frames: range
 ) -> _Recording:
-    """Play the frames and note what is needed; the current frame is as it was afterwards."""
+    """Play the frames and note what is needed; afterwards the current frame is as it was."""
     bodies, poses, above = [], [], []
     with frame_kept(context.scene):
         for frame in frames:
@@ -311,8 +311,7 @@ def _correct_loose(
     curves: dict[str, dict[str, list[bpy.types.FCurve]]],
     frames: np.ndarray,
 ) -> None:
-    """Where a control is not turned rigidly by another one, look in each frame how it lies, and
-    turn it as wanted.
+    """Turn controls that no other turns rigidly: look in each frame how they lie, and correct them.
 
     Once for every such control, since each of them may hang on the one before.
     """

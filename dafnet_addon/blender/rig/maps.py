@@ -1,5 +1,5 @@
 """Which bone of an armature is which of our joints: maps by name, one JSON file each, those that
-ship and the user's own.
+ship (``shipped_maps``) and the user's own. A new rig that many people have gets a new file there.
 
 A map's ``joints`` name the bones that are keyed. Where those are controls whose own poses are not
 the body's, ``places`` name the bones that lie as the body does; ``limbs`` name the controls of
@@ -95,8 +95,7 @@ def load_map(file: Path) -> RigMap:
         return from_text(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(
-            f"'{file.name}' is not a rig preset that can be read; delete it and save the preset "
-            "again."
+            f"'{file.name}' cannot be read as a rig preset; delete it and save the preset again."
         ) from error
 
 

@@ -1,5 +1,5 @@
-"""What the animator sets on an armature of their own (``Object.dafnet_rig``): its bones by joint,
-and how to bake onto it.
+"""What the animator sets on a rig (``Object.dafnet_rig``): its bones by joint, and how to bake onto
+it.
 """
 
 from typing import Any
@@ -39,7 +39,7 @@ class RigSettings(bpy.types.PropertyGroup):
         name="Convention", options=set(), description="Name of the preset that the bones come from"
     )
     more: StringProperty(
-        options={"HIDDEN"}, description="What else the preset knows of the rig's controls"
+        options={"HIDDEN"}, description="What else the preset knows about the rig's controls"
     )
     root_bone: StringProperty(
         name="Root Bone", options=set(), description="Bone that carries the whole rig"

@@ -1,5 +1,5 @@
-"""What an object of the scene follows, directly or indirectly: with its place and its shape, and
-which simulations move it.
+"""What an object of the scene follows, directly or indirectly, with its place or with its shape,
+and which simulations move it.
 
 Blender's own graph of dependencies cannot be asked for this, so what that graph is built from is
 read: parents, constraints (of bones, too), drivers, modifiers with their node groups, shape keys,
@@ -77,10 +77,8 @@ _IN_SHAPE = "its shape"
 
 @dataclass(frozen=True)
 class Simulation:
-    """A simulation that is not baked: the object's ``name``, and the frame that it starts
-    ``since``.
-
-    ``colliders``: the objects that it may push against.
+    """A simulation that is not baked: the ``name`` of its object, and the frame ``since`` which it
+    runs. ``colliders``: the objects that may push it.
     """
 
     name: str

@@ -24,6 +24,7 @@ from .playback import play_steps
 __all__ = ["Furniture", "array", "furniture_at", "furniture_now", "furniture_of"]
 
 _DRAWN_THROUGH = {"WIRE", "BOUNDS"}
+"""Display types that do not look solid."""
 _SHAPE_TOLERANCE = 1e-3
 """How far a vertex may move, over the mesh's size, before its shape counts as changed."""
 
@@ -91,8 +92,8 @@ def furniture_now(context: bpy.types.Context, settings: Settings) -> dict[str, l
 def furniture_at(
     context: bpy.types.Context, settings: Settings, frame: int, look: Callable[[], None]
 ) -> Generator[float, None, tuple[Mesh, ...]]:
-    """The furniture's meshes in another frame, as they lie there when the scene is played; world,
-    metres. ``look`` is called in that frame too.
+    """The furniture's meshes in another frame, as they are when the scene is played; world, metres.
+    ``look`` is called in that frame, too.
 
     A job, see ``playback.play_steps``. ``InputError`` as for ``furniture_now``.
     """
@@ -111,8 +112,8 @@ def furniture_at(
 
 
 class Furniture:
-    """A collection's evaluated meshes in the frame where it ``begin``s, and their matrices in that
-    frame and in all frames added.
+    """A collection's meshes as evaluated in the frame in which it begins (``begin``), and their
+    matrices in that frame and in all that are added.
 
     ``own``: the character, its parts and what directs it. ``members``: the objects whose meshes are
     furniture.
@@ -224,7 +225,7 @@ class Furniture:
         return tuple(_solid(piece, unit) for piece in self._pieces)
 
     def warnings(self) -> Iterator[str]:
-        """Sentences about what was read differently from what the scene shows."""
+        """Warnings about what was read differently from what the scene shows."""
         nowhere = (
             p.name
             for p in self._pieces

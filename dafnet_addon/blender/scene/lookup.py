@@ -1,4 +1,4 @@
-"""What the settings name, found again in the file: a job keeps names, since objects may be deleted,
+"""Finds what the settings name: a job keeps names instead of objects, since these may be deleted,
 or replaced by an undo, while it runs.
 """
 

@@ -10,10 +10,10 @@ import bpy
 from ...core.errors import InputError
 from .dependencies import Simulation
 
-__all__ = ["frame_kept", "in_order", "play_steps"]
+__all__ = ["frame_kept", "frames_to_play", "play_steps"]
 
 _BATCH = 16
-"""How many frames are set between two yields, at which the user's input is looked at."""
+"""How many frames are set before the job yields, so that the user's input is looked at."""
 Look = Callable[[int, bpy.types.Depsgraph, set[bpy.types.Object]], None]
 
 
@@ -27,8 +27,8 @@ def frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
         scene.frame_set(frame, subframe=subframe)
 
 
-def in_order(frames: Sequence[int], simulations: Sequence[Simulation]) -> Sequence[int]:
-    """The frames to set, in this order, to see some rising ``frames``: those alone, or with
+def frames_to_play(frames: Sequence[int], simulations: Sequence[Simulation]) -> Sequence[int]:
+    """The frames to set, one after the other, to see the ascending ``frames``: those alone, or with
     simulations every frame from their start on.
 
     A simulation computes each frame from the one before, so frames cannot be skipped, nor visited
@@ -45,16 +45,16 @@ def play_steps(
     simulations: Sequence[Simulation],
     look: Look,
 ) -> Generator[float, None, None]:
-    """Set each of some rising frames and ``look`` at it; yields progress in [0, 1), each time with
-    the current frame as it was.
+    """Set each of the ascending ``frames`` and ``look`` at it; yields progress in [0, 1), each time
+    with the current frame as it was.
 
     With ``simulations`` the frames run on instead, and the current one comes back at the end or
     when the generator is closed. ``look`` gets the frame, the evaluated scene, and the objects that
-    Blender has shaped anew for it. ``InputError``: a frame was set by somebody else while a
+    Blender has shaped anew for it. ``InputError``: something else has set a frame while a
     simulation ran.
     """
     scene = context.scene
-    played = in_order(frames, simulations)
+    played = frames_to_play(frames, simulations)
     last = scene.frame_current
     with frame_kept(scene) if simulations else nullcontext():
         for start in range(0, len(played), _BATCH):

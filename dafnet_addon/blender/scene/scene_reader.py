@@ -71,8 +71,8 @@ class ReadScene:
 def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[float, None, ReadScene]:
     """Read the scene; yields progress in [0, 1], at which the current frame is as it was.
 
-    Only where a simulation that is not baked moves what is read, the frames run on in order from
-    the simulation's start, and the current one comes back at the end, also of a generator that is
+    Where a simulation that is not baked moves what is read, though, the frames are played in order
+    from the simulation's start, and the current one comes back at the end, or when the generator is
     closed.
 
     Furniture: every mesh of the collection and of the collections in it, as the viewport evaluates
@@ -131,13 +131,13 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     frames = range(settings.frame_start, settings.frame_end + 1)
     simulations = dependencies.simulations([root, *targets.values(), *members], shaped=False)
     simulations += dependencies.simulations(sources)
-    # it has a shape by then
+    # Furniture is read once, at the first frame, by when these have given it a shape.
     simulations += [each for each in dependencies.simulations(members) if each.since < frames[0]]
     tracks = _Tracks(armature, root=root, targets=targets, source=source, places=places)
 
     def look(frame: int, depsgraph: bpy.types.Depsgraph, shaped: set[bpy.types.Object]) -> None:
         if frame == frames[0]:
-            _require_alive(depsgraph, [armature, root, *targets.values(), *sources])
+            _require_enabled(depsgraph, [armature, root, *targets.values(), *sources])
         if furniture and frame == frames[0]:
             furniture.begin(depsgraph)
         elif furniture:
@@ -259,8 +259,8 @@ def _require_independent(
     armature: bpy.types.Object,
     leading: dict[str, bpy.types.Object],
 ) -> None:
-    """What leads the character must not follow it, nor be pushed by it, or each take would change
-    the next.
+    """``InputError`` where what leads the character follows it, or may be pushed by it: each take
+    would change the next.
     """
     if dependencies.setting_follows(armature, "dafnet.", armature):
         raise InputError(
@@ -287,8 +287,10 @@ def _may_push(
     return any(dependencies.follows(each, armature) for each in simulation.colliders)
 
 
-def _require_alive(depsgraph: bpy.types.Depsgraph, needed: list[bpy.types.Object]) -> None:
-    """Blender does not move objects that are disabled in viewports; those hidden with H it does."""
+def _require_enabled(depsgraph: bpy.types.Depsgraph, needed: list[bpy.types.Object]) -> None:
+    """``InputError`` where one is disabled in viewports: Blender moves those hidden with H, not
+    these.
+    """
     alive = {each.original for each in depsgraph.ids}
     for each in needed:
         if each not in alive:
@@ -304,7 +306,7 @@ def _warnings(
     dependencies: Dependencies,
     simulations: list[Simulation],
 ) -> Iterator[str]:
-    """Warnings about what can be used, but probably not as it was meant."""
+    """About what can be used, but hardly as it was meant."""
     if has_bone_overrides(armature):
         yield (
             f"Bones of '{armature.name}' have constraints or drivers, which change the take; mute "
@@ -409,12 +411,12 @@ def _upper_body_of_take(
     at = np.clip(at, 0, len(take) - 1)
     path, _ = root_from_matrices(take.root[at])
     local = size / take.scale * to_root(path, take.joints[at][:, list(UPPER)])
-    return _on_root(root, fps, local)
+    return _on_own_root(root, fps, local)
 
 
-def _on_root(root: np.ndarray, fps: float, local: np.ndarray) -> np.ndarray:
-    """Points (T, N, 3) of a root's frames in the world, that root being this character's, ``root``
-    (T, 4, 4).
+def _on_own_root(root: np.ndarray, fps: float, local: np.ndarray) -> np.ndarray:
+    """Points (T, N, 3), ``local`` to another root, in the world as if that were this character's
+    ``root`` (T, 4, 4).
     """
     return to_world(
         smoothed(
@@ -438,7 +440,7 @@ def _upper_body_of_source(
     fps: float,
 ) -> tuple[np.ndarray, str]:
     """Upper body (T, 14, 3), world metres, on this character's ``root`` (T, 4, 4) and of its
-    ``size``; and which limbs are off by how much, in words, empty where none is.
+    ``size``; and in words which limbs are off by how much, empty where none is.
 
     ``bones`` (T, 22, 4, 4): the source's bones in its own space; ``bodies`` (T, 4, 4): its object's
     matrices; both in Blender units.
@@ -475,4 +477,4 @@ def _upper_body_of_source(
         if degrees > _LIMB_TOLERANCE
     )
     local = ratio * to_root(path, joints[:, list(UPPER)])
-    return _on_root(root, fps, local), f"{far} off" if far else ""
+    return _on_own_root(root, fps, local), f"{far} off" if far else ""

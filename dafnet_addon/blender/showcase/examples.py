@@ -17,7 +17,7 @@ from ...core.series import smoothstep
 from ...demo import Place
 from ..character.armature import create_character, metres_per_unit
 from ..directing.root_keys import write_keys
-from ..directing.walking import extended_to
+from ..directing.walking import extend_range
 from .demo_room import FURNITURE, Part, add_piece, key_channels, new_collection
 
 __all__ = ["EXAMPLES", "Example", "add_example"]
@@ -260,7 +260,7 @@ def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
     placed = Route(RootPath(path.position + np.array(middle) * unit, path.yaw), plan.route.rests)
     write_keys(own.root, placed, first=first, scale=1.0 / unit, fps=fps)
     _direct(armature, plan, first=first, middle=np.array(middle), unit=unit)
-    extended_to(scene, armature, first + len(path) - 1)
+    extend_range(scene, armature, first + len(path) - 1)
     scene.frame_set(first)
     return armature
 

@@ -36,7 +36,7 @@ def use_workbench(scene: bpy.types.Scene, width: int = 640, height: int = 360) -
     shading.light, shading.studio_light = "STUDIO", "paint.sl"
     shading.color_type = "MATERIAL"
     shading.show_shadows, shading.shadow_intensity = True, 0.40
-    # the other kind is noisy without many samples
+    # The other kind is noisy without many samples.
     shading.show_cavity, shading.cavity_type = True, "SCREEN"
     if scene.world is None:
         scene.world = bpy.data.worlds.new("World")
