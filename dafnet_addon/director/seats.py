@@ -2,6 +2,7 @@
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,38 +17,68 @@ from .surfaces import HeightField, height_field, parts_of_surfaces
 __all__ = ["SeatPlace", "on_a_seat", "seat_of"]
 
 _CELL = 0.03
-_MAX_CELLS = 1_000_000  # cells; larger furniture is looked at more coarsely
-_LOWEST = 0.22  # metres over the floor, of seats
-_HIGHEST = 0.85  # metres over the floor, of seats
-_OVERHEAD = 1.5  # metres over the floor; what is higher is not part of a seat
-_FLAT = 0.05  # metres over the seat, of what still is seat
-_BACK = 0.15  # metres over the seat, of a back or an arm
-_LEAST = 0.035  # square metres
-# metres: side of the square that a seat has room for; arms and the rims of backs have not
+"""Metres; of the cells in which furniture is looked at from above."""
+_MAX_CELLS = 1_000_000
+"""Larger furniture is looked at more coarsely."""
+
+# What is a seat. Heights are metres over the floor, unless they are said to be over the seat.
+_LOWEST = 0.22
+"""Height of the lowest seat."""
+_HIGHEST = 0.85
+"""Height of the highest seat."""
+_OVERHEAD = 1.5
+"""What is higher is not part of a seat."""
+_LEVEL_STEP = 0.02
+"""Between the heights that are tried."""
+_FLAT = 0.05
+"""Over the seat: what is no higher still is seat."""
+_BACK = 0.15
+"""Over the seat: what is higher is a back or an arm."""
+_LEAST = 0.035
+"""Square metres of the smallest seat."""
 _ROOM = 0.21
-# of the roomiest level's area, that a lower level needs to be the seat: cushions and backs lie
-# higher
+"""Metres; side of the square that a seat has room for. Arms and the rims of backs have not."""
 _NEARLY = 0.5
-# metres between the middles of seat and of what stands up around it, where that is a back
+"""Of the roomiest level's area: what a lower level needs to be the seat, since cushions and backs
+lie higher.
+"""
+_SMALLEST = 0.15
+"""Metres across, of the smallest furniture."""
+_LARGEST = 15.0
+"""Metres across, of the largest furniture."""
+
+# Which way one looks.
 _ONE_SIDED = 0.10
-_BEFORE_BACK = 0.20  # metres between the pelvis and the back
-_FROM_EDGE = 0.22  # metres between the pelvis and the front edge, where there is no back
-_ON_IT = 0.12  # metres of seat that the pelvis has before it, however shallow the seat is
+"""Metres between the middles of the seat and of what stands up around it, where that is a back."""
 _SNAP = np.radians(30.0)
-_UNDER = 0.08  # metres around a root, in which its seat is looked for
-_SMALLEST = 0.15  # metres across, of furniture
-_LARGEST = 15.0  # metres across, of furniture
-_HALF_WIDTH = 0.28  # metres that a body needs to each side
-# metres from a back to the front edge: on what is deeper, as a bed, one sits on an edge
+"""The direction is that of a side of the seat, if one differs by less."""
+_SQUARE = 1.3
+"""Length over width up to which a seat counts as square, so that any side may be its front."""
 _DEEPEST = 1.1
-_LEGS = 0.3  # metres beyond an edge, and to each side, that legs need to hang there
+"""Metres from a back to the front edge; on what is deeper, such as a bed, one sits on an edge."""
+_LEGS = 0.3
+"""Metres beyond an edge, and to each side, that legs need to hang there."""
+
+# Where the pelvis rests.
+_BEFORE_BACK = 0.20
+"""Metres between the pelvis and the back."""
+_FROM_EDGE = 0.22
+"""Metres between the pelvis and the front edge, where there is no back."""
+_ON_IT = 0.12
+"""Metres of seat that the pelvis has before it, however shallow the seat is."""
+_HALF_WIDTH = 0.28
+"""Metres that a body needs to each side."""
+_UNDER = 0.08
+"""Metres around a root in which its seat is looked for."""
 
 
 @dataclass(frozen=True)
 class SeatPlace:
-    """``position`` (2,) of the resting pelvis and ``yaw`` that it faces (``core.root``); ``height``
-    of the seat's top over the world's zero, metres; whether there is a ``back``; ``aside``: metres
-    to each side within which one may sit as well; ``edge``: metres from there to the front edge.
+    """Where somebody sits: the pelvis rests at ``position`` (2,) and faces ``yaw`` (``core.root``).
+
+    ``height``: of the seat's top over the world's zero, metres. ``back``: whether it has one.
+    ``aside``: metres to each side within which one may sit as well. ``edge``: metres from the
+    pelvis to the front edge.
     """
 
     position: np.ndarray
@@ -56,6 +87,18 @@ class SeatPlace:
     back: bool
     aside: float
     edge: float
+
+
+class _Spot(NamedTuple):
+    """A place on a seat, for one who looks in some direction: ``right``, metres to the right of the
+    origin; ``room``, metres to each side of the seat's middle within which one may sit; ``begins``
+    and ``ends``, metres ahead of the origin, of the seat there.
+    """
+
+    right: float
+    room: float
+    begins: float
+    ends: float
 
 
 def _hull(points: np.ndarray) -> np.ndarray:
@@ -94,17 +137,18 @@ def _axes(cells: np.ndarray) -> np.ndarray:
     best, found = np.inf, np.eye(2)
     edges = np.roll(hull, -1, axis=0) - hull
     for angle in np.unique(np.round(np.arctan2(edges[:, 1], edges[:, 0]) % (np.pi / 2), 3)):
-        u = np.array([np.cos(angle), np.sin(angle)])
-        v = np.array([-u[1], u[0]])
-        a, b = np.ptp(hull @ u), np.ptp(hull @ v)
-        if a * b < best - 1e-9:
-            best, found = a * b, np.stack([u, v] if a >= b else [v, u])
+        along = np.array([np.cos(angle), np.sin(angle)])
+        across = np.array([-along[1], along[0]])
+        length, width = np.ptp(hull @ along), np.ptp(hull @ across)
+        if length * width < best - 1e-9:
+            best = length * width
+            found = np.stack([along, across] if length >= width else [across, along])
 
     return found
 
 
 def _shrunk(mask: np.ndarray, reach: int) -> np.ndarray:
-    """Cells (X, Y) of which all within ``reach`` cells, along both sides, are set."""
+    """The cells (X, Y) around which all cells are set, up to ``reach`` cells along both sides."""
     size = 2 * reach + 1
     padded = np.pad(mask, reach)
     rows = np.lib.stride_tricks.sliding_window_view(padded, size, axis=0).all(-1)
@@ -122,15 +166,16 @@ def _roomy(mask: np.ndarray, reach: int) -> np.ndarray:
 def _seat_level(
     field: HeightField, floor: float
 ) -> Generator[float, None, tuple[float, np.ndarray] | None]:
-    """Height and cells (N, 2) of the level that one sits on: the lowest one that has about as much
-    room as any.
+    """Height over ``floor`` and cells (N, 2) of the level that one sits on: the lowest one that has
+    about as much room as any. None where there is none.
 
-    Backs, arms and cushions are higher than the seat between them, and rims have no room for a
-    body.
+    This is where the height of a seat is decided. Backs, arms and cushions are higher than the seat
+    between them, and rims have no room for a body.
     """
     over = field.top - floor
     reach = max(1, round(0.5 * _ROOM / field.cell))
-    levels = np.arange(_LOWEST, _HIGHEST, 0.02)
+    levels = np.arange(_LOWEST, _HIGHEST, _LEVEL_STEP)
+
     masks = []
     for k, level in enumerate(levels):
         masks.append(_roomy(np.abs(over - level) < _FLAT, reach))
@@ -144,7 +189,7 @@ def _seat_level(
         return None
 
     lowest = int(np.argmax(room >= _NEARLY * room.max()))
-    best = lowest + int(np.argmax(room[lowest : lowest + 1 + round(_FLAT / 0.02)]))
+    best = lowest + int(np.argmax(room[lowest : lowest + 1 + round(_FLAT / _LEVEL_STEP)]))
     level = float(np.median(over[masks[best]]))
     cells = np.argwhere(masks[best] & (np.abs(over - level) < _FLAT))
     return level, cells
@@ -156,44 +201,76 @@ def _nearest(ways: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
 
 def _snapped(forward: np.ndarray, ways: np.ndarray) -> np.ndarray:
-    """``forward`` (2,), or the one of the ``ways`` (N, 2) that is as good as it."""
+    """The one of the ``ways`` (N, 2) that is about ``forward`` (2,), or else ``forward`` itself."""
     found = _nearest(ways, forward)
     return found if found @ forward > np.cos(_SNAP) else forward
 
 
-def _spot(
-    places: np.ndarray, forward: np.ndarray, near: np.ndarray | None
-) -> tuple[float, float, float, float]:
-    """Where one sits on ``places`` (N, 2) that looks ``forward``: how far to the right, with how
-    much room to each side, and where along ``forward`` the seat begins and ends there.
-
-    One sits in the middle or beside ``near``; where a part of a sofa is as deep as a bed, on
-    another part.
+def _spot(places: np.ndarray, forward: np.ndarray, near: np.ndarray | None) -> _Spot:
+    """Where one sits on ``places`` (N, 2) that looks ``forward`` (2,): in the middle or beside
+    ``near`` (2,); where a part of a sofa is as deep as a bed, on another part.
     """
     sideways = np.array([forward[1], -forward[0]])
     depth, width = places @ forward, places @ sideways
     order = np.argsort(width)
     depth, width = depth[order], width[order]
+
     middle = 0.5 * float(width.min() + width.max())
     room = max(0.0, 0.5 * float(np.ptp(width)) - _HALF_WIDTH)
     low, high = middle - room, middle + room
     wanted = middle if near is None else float(np.clip(near @ sideways, low, high))
     others = np.linspace(low, high, 1 + round(2 * room / _CELL))
+
     spots = []
-    for aside in (wanted, *others[np.argsort(np.abs(others - wanted))]):
-        first, last = np.searchsorted(width, (aside - _ROOM, aside + _ROOM))
-        column = depth[first:last][np.abs(width[first:last] - aside) < 0.5 * _ROOM]
+    for right in (wanted, *others[np.argsort(np.abs(others - wanted))]):
+        first, last = np.searchsorted(width, (right - _ROOM, right + _ROOM))
+        column = depth[first:last][np.abs(width[first:last] - right) < 0.5 * _ROOM]
         column = column if len(column) else depth
-        spots.append((float(aside), room, float(column.min()), float(column.max())))
+        spots.append(_Spot(float(right), room, float(column.min()), float(column.max())))
 
-    return next((spot for spot in spots if spot[3] - depth.min() <= _DEEPEST), spots[0])
+    return next((spot for spot in spots if spot.ends - depth.min() <= _DEEPEST), spots[0])
 
 
-def _blocked(up: np.ndarray, forward: np.ndarray, spot: tuple[float, float, float, float]) -> bool:
+def _blocked(up: np.ndarray, forward: np.ndarray, spot: _Spot) -> bool:
     """Whether something stands up, at places ``up`` (N, 2), where legs would hang over an edge."""
-    aside, _, _, high = spot
-    along, across = up @ forward - high, up @ np.array([forward[1], -forward[0]]) - aside
+    along = up @ forward - spot.ends
+    across = up @ np.array([forward[1], -forward[0]]) - spot.right
     return bool(((along > -0.1) & (along < _LEGS) & (np.abs(across) < _LEGS)).any())
+
+
+def _facing(
+    field: HeightField,
+    *,
+    places: np.ndarray,
+    level: float,
+    floor: float,
+    axes: np.ndarray,
+    towards: np.ndarray,
+    near: np.ndarray | None,
+) -> tuple[np.ndarray, bool]:
+    """The direction (2,) in which one looks who sits on ``places`` (N, 2), and whether one leans
+    against a back.
+
+    ``field`` holds the whole piece, whose seat is at ``level`` over ``floor``; ``axes`` (2, 2): the
+    seat's longer and shorter side.
+    """
+    longer, shorter = axes
+    middle = places.mean(0)
+    upright = field.middles(np.argwhere(field.top - floor > level + _BACK))
+    side = upright.mean(0) - middle if len(upright) else np.zeros(2)
+    if np.linalg.norm(side) <= _ONE_SIDED:
+        square = np.ptp(places @ longer) < _SQUARE * np.ptp(places @ shorter)
+        ways = np.stack([longer, -longer, shorter, -shorter] if square else [shorter, -shorter])
+        return _nearest(ways, towards - middle), False
+
+    ways = np.stack([longer, -longer, shorter, -shorter])
+    forward = _snapped(-side / np.linalg.norm(side), ways)
+    if _spot(places, forward, near).ends - (places @ forward).min() <= _DEEPEST:
+        return forward, True
+
+    legs = field.middles(np.argwhere(field.top - floor > level + _FLAT))
+    free = [way for way in ways if not _blocked(legs, way, _spot(places, way, near))]
+    return _nearest(np.array(free or ways), towards - middle), False
 
 
 @stepwise
@@ -227,75 +304,82 @@ def seat_of(
     """Where one sits on one piece of furniture, made of ``solids``; world, metres, people of 1.75
     m.
 
-    With a back on one side one sits before it and looks away from it; without, one looks along the
-    seat's shorter side, to where ``towards`` (2,) lies. On what is as deep as a bed one sits on an
-    edge towards there, at which nothing stands up. On a wide seat one sits in the middle, or beside
-    ``near`` (2,) where given. Raises InputError where there is nothing to sit on: a level
-    surface between 22 and 85 cm over ``floor``. ``size``: of the character, over 1.75 m, for what
-    is said of the scene.
+    One sits in front of a back and looks away from it. Without a back one looks along the seat's
+    shorter side, to where ``towards`` (2,) lies; on what is as deep as a bed one sits on an edge
+    towards there, at which nothing stands up. On a wide seat one sits in the middle, or beside
+    ``near`` (2,) where given. Raises InputError where there is nothing to sit on, which is a level
+    surface between 22 and 85 cm over ``floor``. ``size``: of the character, over 1.75 m, by which
+    messages give lengths.
     """
     parts = yield from within(parts_of_surfaces.steps(solids, 0.6 * _CELL), 0.0, 0.5)
+    field = yield from within(_field_of(parts, floor), 0.5, 0.6)
+    found = (yield from within(_seat_level(field, floor), 0.6, 1.0)) if field else None
+    if field is None or found is None:
+        raise InputError(_why_not_a_seat(solids, name, size))
+
+    level, cells = found
+    places = field.middles(cells)
+    yield 1.0
+    axes = _axes(field.middles(_ends_of_rows(cells)))
+    yield 1.0
+    forward, back = _facing(
+        field, places=places, level=level, floor=floor, axes=axes, towards=towards, near=near
+    )
+    yield 1.0
+
+    spot = _spot(places, forward, near)
+    middle = 0.5 * (spot.begins + spot.ends)
+    if back:
+        ahead = min(spot.begins + _BEFORE_BACK, max(middle, spot.ends - _ON_IT))
+    else:
+        ahead = max(middle, spot.ends - _FROM_EDGE)
+
+    return SeatPlace(
+        position=ahead * forward + spot.right * np.array([forward[1], -forward[0]]),
+        yaw=facing(forward),
+        height=floor + level,
+        back=back,
+        aside=spot.room,
+        edge=spot.ends - ahead,
+    )
+
+
+def _field_of(
+    parts: Sequence[np.ndarray], floor: float
+) -> Generator[float, None, HeightField | None]:
+    """The heights of furniture that has its surface points in ``parts`` (N, 3), without the floor
+    and what is overhead; None where nothing else is left.
+    """
     kept, corners = [], []
     for part in parts:
         part = part[(part[:, 2] < floor + _OVERHEAD) & (part[:, 2] > floor + 0.02)]
         if len(part):
             kept.append(part)
             corners += [part[:, :2].min(0), part[:, :2].max(0)]
-        yield 0.5
+        yield 0.0
 
-    found = None
-    if kept:
-        low, high = np.min(corners, axis=0), np.max(corners, axis=0)
-        cell = max(_CELL, float(np.sqrt((high - low).prod() / _MAX_CELLS)))
-        field = height_field(np.zeros((0, 3)), low, high, cell)
-        for k, part in enumerate(kept):
-            field.add(part)
-            yield 0.5 + 0.1 * k / len(kept)
+    if not kept:
+        return None
 
-        found = yield from within(_seat_level(field, floor), 0.6, 1.0)
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    cell = max(_CELL, float(np.sqrt((high - low).prod() / _MAX_CELLS)))
+    field = height_field(np.zeros((0, 3)), low, high, cell)
+    for k, part in enumerate(kept):
+        field.add(part)
+        yield k / len(kept)
 
-    if found is None:
-        if not _SMALLEST < (across := extent(solids)) < _LARGEST:
-            raise InputError(
-                f"'{name}' is {metres(across * size)} across: is its unit right? Scale it to the "
-                "character's size."
-            )
-        raise InputError(
-            f"'{name}' has no level surface between 22 and 85 cm over the floor to sit on; choose "
-            "a seat."
+    return field
+
+
+def _why_not_a_seat(solids: Sequence[Box | Mesh], name: str, size: float) -> str:
+    """What to say of a piece of furniture that nobody can sit on."""
+    across = extent(solids)
+    if not _SMALLEST < across < _LARGEST:
+        return (
+            f"'{name}' is {metres(across * size)} across: is its unit right? Scale it to the "
+            "character's size."
         )
-
-    level, cells = found
-    places = field.middles(cells)
-    middle = places.mean(0)
-    yield 1.0
-    longer, shorter = _axes(field.middles(_ends_of_rows(cells)))
-    yield 1.0
-    up = field.middles(np.argwhere(field.top - floor > level + _BACK))
-    side = up.mean(0) - middle if len(up) else np.zeros(2)
-    back = bool(np.linalg.norm(side) > _ONE_SIDED)
-    if back:
-        forward = -side / np.linalg.norm(side)
-        ways = np.stack([longer, -longer, shorter, -shorter])
-        forward = _snapped(forward, ways)
-        spot = _spot(places, forward, near)
-        if spot[3] - (places @ forward).min() > _DEEPEST:
-            back = False
-            legs = field.middles(np.argwhere(field.top - floor > level + _FLAT))
-            free = [way for way in ways if not _blocked(legs, way, _spot(places, way, near))]
-            forward = _nearest(np.array(free or ways), towards - middle)
-    else:
-        square = np.ptp(places @ longer) < 1.3 * np.ptp(places @ shorter)
-        ways = np.stack([longer, -longer, shorter, -shorter] if square else [shorter, -shorter])
-        forward = _nearest(ways, towards - middle)
-
-    yield 1.0
-    aside, room, low, high = _spot(places, forward, near)
-    if back:
-        at = min(low + _BEFORE_BACK, max(0.5 * (low + high), high - _ON_IT))
-    else:
-        at = max(0.5 * (low + high), high - _FROM_EDGE)
-
-    position = at * forward + aside * np.array([forward[1], -forward[0]])
-    yaw = facing(forward)
-    return SeatPlace(position, yaw, floor + level, back, room, high - at)
+    return (
+        f"'{name}' has no level surface between 22 and 85 cm over the floor to sit on; choose a "
+        "seat."
+    )

@@ -1,6 +1,4 @@
-"""Ways over the floor between furniture, and root paths that follow them to a seat or a place to
-stand.
-"""
+"""Ways around furniture, and root paths that follow them to a seat or to a place to stand."""
 
 import heapq
 from collections.abc import Generator, Sequence
@@ -20,22 +18,43 @@ from .surfaces import HeightField, boxes_of, height_field, parts_of_surfaces
 __all__ = ["NoWay", "around", "unit_doubt", "walk_to", "way_round", "ways"]
 
 _CELL = 0.08
-_KNEE_LOW = 0.07  # metres over the floor; what lies lower is stepped over
-_HEAD_HIGH = 1.85  # metres over the floor; what hangs higher is not met
-_RADIUS = 0.30  # metres that the body's middle keeps from furniture
-_AROUND = 2.0  # metres of floor beyond start and goal
-_FARTHEST = 100.0  # metres between start and goal; so many cells are searched in seconds
-_NEAREST = 0.3  # metres between start and goal, under which one is there already
-_TINY = 1.0  # metres across: no room is
-_SMALLEST = 0.15  # metres, of the longest side of furniture
-_TALLEST = 15.0  # metres over the floor, of furniture
-_LOW = 0.05  # height over length, of what is long and low
-_BESIDE = 10.0  # metres from a way within which furniture tells the scene's unit
-_SAMPLED = 0.3  # progress of a search when the furniture's points are made
-_CELLS_AT_ONCE = 5_000  # cells that are searched between two steps of the job
-_WAVES_AT_ONCE = 200  # waves between two steps of the job
-_ROWS_AT_ONCE = 100  # rows of cells between two steps of the job
-_AHEAD = 500  # cells within which a way is cut short
+"""Metres; of the cells that ways are searched over."""
+_RADIUS = 0.30
+"""Metres that the body's middle keeps from furniture."""
+_KNEE_LOW = 0.07
+"""Metres over the floor; what lies lower is stepped over."""
+_HEAD_HIGH = 1.85
+"""Metres over the floor; what hangs higher is not met."""
+_AROUND = 2.0
+"""Metres of floor beyond start and goal in which ways are looked for."""
+_FARTHEST = 100.0
+"""Metres between start and goal; so many cells are searched in seconds."""
+_NEAREST = 0.3
+"""Metres between start and goal, under which one is there already."""
+_APART = 0.25
+"""Metres between the corners of a way, at least: a path needs some length to turn."""
+
+# What tells that a scene's unit is wrong.
+_TINY = 1.0
+"""Metres across: rooms are larger."""
+_SMALLEST = 0.15
+"""Metres, of the longest side of furniture."""
+_TALLEST = 15.0
+"""Metres over the floor, of furniture."""
+_LOW = 0.05
+"""Height over length, of what is long and low: ground, rugs, skirting."""
+_BESIDE = 10.0
+"""Metres from a way within which furniture tells the scene's unit."""
+
+# How much is done between two steps of the job.
+_SAMPLED = 0.3
+"""Progress of a search once the furniture's points are made."""
+_CELLS_AT_ONCE = 5_000
+_WAVES_AT_ONCE = 200
+_ROWS_AT_ONCE = 100
+
+_AHEAD = 500
+"""Cells within which a way is cut short."""
 _NEIGHBOURS = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
 
 
@@ -120,8 +139,8 @@ def _search(
 
 
 def _connected(walls: np.ndarray, first: int, last: int) -> Generator[float, None, bool]:
-    """Whether there is a way at all: a wave over the free cells finds out in no time, where the
-    search would try them all.
+    """Whether there is a way at all: a wave over the free cells finds out at once, while the search
+    would try them all.
     """
     free = ~walls.ravel()
     front, waves = np.array([first]), 0
@@ -147,11 +166,11 @@ def _clear(blocked: np.ndarray, a: np.ndarray, b: np.ndarray) -> bool:
 def way_round(
     points: np.ndarray, start: np.ndarray, goal: np.ndarray, size: float = 1.0
 ) -> Generator[float, None, list[tuple[float, float]]]:
-    """Corners (x, y) of a short way from ``start`` (2,) to ``goal`` (2,) that keeps off what has
-    ``points`` (N, 3), z over the floor; without the ends.
+    """Corners (x, y) of a short way from ``start`` (2,) to ``goal`` (2,), without these, around
+    furniture with surface ``points`` (N, 3), z over the floor.
 
     Raises InputError where there is no way, or the goal is too far away. ``size``: of the
-    character, over 1.75 m, for what is said of the scene.
+    character, over 1.75 m, by which messages give lengths.
     """
     return (yield from _way([points], start, goal, 0.0, size))
 
@@ -199,8 +218,7 @@ def _way(
     if not np.abs(goal - start).max() <= _FARTHEST:
         raise InputError(
             f"The goal is {np.linalg.norm(goal - start) * size:,.0f} m away: is the scene's unit "
-            "right? "
-            f"Choose one within {_FARTHEST * size:.0f} m, or walk there in parts."
+            f"right? Choose one within {_FARTHEST * size:.0f} m, or walk there in parts."
         )
 
     field = height_field(np.zeros((0, 3)), *around(both), _CELL)
@@ -242,14 +260,12 @@ def _way(
 
 
 def _apart(points: np.ndarray, start: np.ndarray, goal: np.ndarray) -> list[np.ndarray]:
-    """The points that are no nearer than 25 cm to one another and to both ends: a path needs some
-    length between corners.
-    """
+    """The points that are at least ``_APART`` from one another and from both ends."""
     kept: list[np.ndarray] = []
     for point in points:
         if (
-            np.linalg.norm(point - (kept[-1] if kept else start)) > 0.25
-            and np.linalg.norm(point - goal) > 0.25
+            np.linalg.norm(point - (kept[-1] if kept else start)) > _APART
+            and np.linalg.norm(point - goal) > _APART
         ):
             kept.append(point)
     return kept
@@ -288,13 +304,14 @@ def unit_doubt(
     floor: float = 0.0,
     size: float = 1.0,
 ) -> Generator[float, None, str | None]:
-    """A sentence that asks for the scene's unit where furniture is plainly of another one than the
-    character that goes to the ``places`` (2,); None where it may be right.
+    """A sentence that asks whether the scene's unit is right, where the furniture is plainly far
+    too large or too small for a character that goes to the ``places`` (2,); None where it may be
+    right.
 
-    It is too large where all that stands within 10 m of the places, or else all there is, is taller
-    than 15 m: a bench between towers is right, and a hall that nothing stands in. What is long and
-    low (ground, rugs, skirting) tells nothing. It is too small where no solid is 15 cm long and all
-    of them lie within a metre.
+    It is too large if everything that stands within 10 m of the places, or else everything there
+    is, is taller than 15 m: a bench between towers is right, and so is an empty hall. What is long
+    and low (ground, rugs, skirting) does not count. It is too small if no solid is 15 cm long and
+    all of them lie within a metre.
     """
     boxes = yield from boxes_of.steps(solids)
     boxes = boxes[~np.isnan(boxes[:, 0, 0])]
@@ -307,9 +324,9 @@ def unit_doubt(
     stands = (boxes[:, 0, 2] < floor + _HEAD_HIGH) & (rises > np.maximum(_KNEE_LOW, _LOW * longest))
     low, high = np.min(places, axis=0) - _BESIDE, np.max(places, axis=0) + _BESIDE
     near = stands & ((boxes[:, 1, :2] >= low) & (boxes[:, 0, :2] <= high)).all(axis=1)
-    told = rises[near if near.any() else stands]
+    judged = rises[near if near.any() else stands]
     too_small = extent < _TINY and longest.max() < _SMALLEST
-    if not too_small and not (len(told) and told.min() > _TALLEST):
+    if not too_small and not (len(judged) and judged.min() > _TALLEST):
         return None
 
     return (

@@ -297,7 +297,7 @@ def all_curves(action) -> list:
         (repeated, "modifiers on curves"),
         (sampled, "sampled curves"),
         (linked, "linked action"),
-        (shared, "in common with 'Other'"),
+        (shared, "shares its keys with 'Other'"),
         (added_up, "blending to Replace"),
         (half, "blending to Replace"),
         (in_tweak_mode, "tweak"),
