@@ -5,6 +5,7 @@ from typing import Any
 import bpy
 
 from ..dafnet_addon.blender.character.armature import character_of
+from ..dafnet_addon.blender.character.settings import CLEAN_UP
 from ..dafnet_addon.blender.character.takes import active_take
 from ..operators.generate import DAFNET_OT_generate
 from ..operators.takes import (
@@ -23,9 +24,7 @@ _NAME_WIDTH = 0.45
 
 
 def _text(figure: float, factor: float = 1.0) -> str:
-    """A figure in the unit that is ``factor`` times as small; a dash where it is negative, which
-    stands for none.
-    """
+    """A figure times ``factor``, or a dash where it is negative, which stands for none."""
     return "–" if figure < 0 else f"{factor * figure:.2f}"
 
 
@@ -151,6 +150,6 @@ class DAFNET_PT_clean_up(CharacterPanel, bpy.types.Panel):
         layout.use_property_decorate = False
         own: Any = character_of(context)
         column = layout.column()
-        for name in ("plant_feet", "rest_on_seats", "reach_targets", "clear_furniture", "smooth"):
+        for name in CLEAN_UP:
             column.prop(own.dafnet, name, slider=True)
         layout.operator(DAFNET_OT_clean_again.bl_idname, icon="BRUSH_DATA")

@@ -163,9 +163,9 @@ class Take:
     ``unchanged`` (M, 66): those that it would have gone on with over each change of mode, one after
     another, if there had been none: what resuming and cleaning again need. ``log_likelihood``: of a
     standardised pose after those before it, mean over the frames, nats. ``raw_metrics``,
-    ``metrics``: ``metrics.summary`` of the model's own motion and of this one after the clean-up,
-    at these frames and canonical size. ``seconds``: time spent by stage. ``warnings``: sentences
-    for the user.
+    ``metrics``: ``metrics.motion_metrics`` of the model's own motion and of this one after the
+    clean-up, at these frames and canonical size. ``seconds``: time spent by stage. ``warnings``:
+    sentences for the user.
     """
 
     fps: float

@@ -31,7 +31,7 @@ _OVERHEAD = 1.5
 _LEVEL_STEP = 0.02
 """Between the heights that are tried."""
 _FLAT = 0.05
-"""Over the seat: what is no higher still is seat."""
+"""Over the seat: what rises by less belongs to it."""
 _BACK = 0.15
 """Over the seat: what is higher is a back or an arm."""
 _LEAST = 0.035

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import fields
 from pathlib import Path
 from types import ModuleType
 
@@ -11,7 +12,10 @@ import bpy
 import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon import cli, demo
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.properties import CharacterSettings
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.settings import CLEAN_UP, Settings
 from bl_ext.user_default.dafnet.dafnet_addon.blender.showcase.demo_room import build_room
+from bl_ext.user_default.dafnet.dafnet_addon.core.cleanup import CleanUp
 
 from kit.places import ROOT
 from kit.stage import Stage, keys_of
@@ -195,3 +199,18 @@ def test_the_demo_runs_in_a_process_of_its_own(tmp_path: Path) -> None:
         0.88 < report["standing_pelvis_height"] < 1.0
         and report["metrics"]["ground_truth"]["clips"] > 0
     )
+
+
+def test_every_clean_up_can_be_set_everywhere(
+    blender: ModuleType, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By a property, by a field of the settings, by an option of the command, in every preset."""
+    assert cli.main(["bake", "--help"]) == 0
+    said = capsys.readouterr().out
+    presets = list((ROOT / "dafnet_addon/blender/presets/dafnet").glob("*.py"))
+    assert {*CLEAN_UP.values()} == {strength.name for strength in fields(CleanUp)}
+    for name in CLEAN_UP:
+        assert name in {setting.name for setting in fields(Settings)}
+        assert name in CharacterSettings.__annotations__
+        assert f"--{name.replace('_', '-')} SHARE" in said
+        assert presets and all(f"own.{name} = " in p.read_text(encoding="utf-8") for p in presets)

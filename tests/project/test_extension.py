@@ -11,6 +11,7 @@ import re
 import subprocess
 import sys
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
 import pytest
@@ -172,21 +173,65 @@ def test_the_extension_imports_itself_relatively(path: Path) -> None:
         assert "from __future__ import annotations" not in text
 
 
-def test_what_is_translated_is_said_somewhere() -> None:
-    """Every word of the translation tables is one that the add-on shows."""
-    sources = "\n".join(
-        file.read_text(encoding="utf-8")
-        for folder in ("operators", "panels", "dafnet_addon/blender")
-        for file in (ROOT / folder).rglob("*.py")
-        if file.name != "translations.py"
-    )
+def interface_files() -> list[Path]:
+    files = modules("operators", "panels", "dafnet_addon/blender")
+    return [file for file in files if file.name != "translations.py"]
+
+
+def translated() -> list[str]:
+    """The words of the translation tables."""
     tables = ast.parse((ROOT / "dafnet_addon/blender/translations.py").read_text(encoding="utf-8"))
-    words = [
-        key.value
+    return [
+        str(key.value)
         for node in ast.walk(tables)
         if isinstance(node, ast.Dict)
         for key in node.keys
         if isinstance(key, ast.Constant) and key.value != "de_DE"
     ]
-    assert len(words) > 50
-    assert not [word for word in words if f'"{word}"' not in sources]
+
+
+def test_what_is_translated_is_said_somewhere() -> None:
+    """Every word of the translation tables is one that the add-on shows."""
+    sources = "\n".join(file.read_text(encoding="utf-8") for file in interface_files())
+    assert len(translated()) > 50
+    assert not [word for word in translated() if f'"{word}"' not in sources]
+
+
+BLENDERS_OWN = {
+    *("Action", "End", "FK", "Head", "Height", "IK", "Name", "Next", "Object", "Preset"),
+    *("Previous", "Sensor", "Speed", "Start", "Step"),
+}
+"""Words that Blender translates itself."""
+
+THE_SAME = {"DAFNet", "DAFNet Rig", "EE", "FREE", "FULL", "NumPy"}
+"""Words that are the same in all languages."""
+
+UNSEEN = {
+    *("Collisions before", "Convention", "Jerk before", "Miss before", "Row", "Sliding before"),
+    *("Task", "This"),
+}
+"""Names of properties that no panel shows by them."""
+
+
+def interface_words(file: Path) -> Iterator[str]:
+    """The labels of a source's operators, panels, properties and buttons."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "bl_label":
+            yield ast.literal_eval(node.value)
+        if not isinstance(node, ast.Call):
+            continue
+
+        called = ast.unparse(node.func)
+        given = {keyword.arg: keyword.value for keyword in node.keywords}
+        label = given.get("name" if called.endswith("Property") else "text")
+        if isinstance(label, ast.Constant) and re.search(
+            r"Property$|\.(operator|label|prop)$", called
+        ):
+            yield label.value
+        if called == "EnumProperty" and isinstance(items := given["items"], ast.List):
+            yield from (ast.literal_eval(item.elts[1]) for item in items.elts)  # type: ignore[attr-defined]
+
+
+def test_what_the_interface_says_is_translated() -> None:
+    shown = {word for file in interface_files() for word in interface_words(file) if word}
+    assert shown - {*translated(), *BLENDERS_OWN, *THE_SAME, *UNSEEN} == set()

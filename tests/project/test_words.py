@@ -39,6 +39,7 @@ NAMES = {
     "doubted": "unit_doubt",
     "in_names_of": "with_bone_names_of",
     "in_order": "frames_to_play",
+    "test_motions": "held_out_motions",
     "may_direct": "can_direct",
     "clean_again_of": "clean_up_again",
     "_adopted": "_adopt",

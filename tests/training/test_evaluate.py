@@ -80,7 +80,7 @@ def test_a_test_clip_that_is_not_the_frozen_one_is_refused(monkeypatch, tmp_path
 
     def read(clip: dict[str, object], motions: dict[str, h.Motion]) -> list[h.HeldClip]:
         h.FROZEN.write_text(json.dumps({"version": 1, "clips": [clip]}), encoding="utf-8")
-        monkeypatch.setattr(h, "test_motions", lambda folder: motions)
+        monkeypatch.setattr(h, "held_out_motions", lambda folder: motions)
         return h.held_out(tmp_path)
 
     (clip,) = read(frozen, {"b/a": motion})

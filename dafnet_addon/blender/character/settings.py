@@ -16,12 +16,12 @@ MAX_TAKES = 64
 
 CLEAN_UP = {
     "plant_feet": "feet",
-    "reach_targets": "reach",
     "rest_on_seats": "seat",
+    "reach_targets": "reach",
     "clear_furniture": "clear",
     "smooth": "smooth",
 }
-"""The strengths of ``core.cleanup.CleanUp`` by the names of the settings."""
+"""The strengths of ``core.cleanup.CleanUp`` by the names of the settings, in the panel's order."""
 
 _LAST_FRAME = 1_048_574
 """Blender's last frame; its first one is as far below zero."""

@@ -33,7 +33,7 @@ __all__ = [
     "frozen_text",
     "held_out",
     "is_frozen",
-    "test_motions",
+    "held_out_motions",
 ]
 
 FROZEN = Path(__file__).with_name("captured.json")
@@ -115,7 +115,7 @@ def frozen_text(frozen: dict[str, Any]) -> str:
     return f'{head[:-1]}, "clips": [\n{lines}\n]}}\n'
 
 
-def test_motions(folder: Path) -> dict[str, Motion]:
+def held_out_motions(folder: Path) -> dict[str, Motion]:
     """All motions of the test by name: those of ``load_motions``, and of sources that are never
     trained on.
     """
@@ -175,7 +175,7 @@ def held_out(folder: Path) -> list[HeldClip]:
     """The frozen clips, cut from the motion files in ``folder``. Raises InputError where one is
     missing or not the same.
     """
-    motions = test_motions(folder)
+    motions = held_out_motions(folder)
     clips = []
     for frozen in json.loads(FROZEN.read_text(encoding="utf-8"))["clips"]:
         recipe = frozen.get("composed")

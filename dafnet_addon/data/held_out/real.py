@@ -32,7 +32,7 @@ from ..motion.motion import Motion
 from ..motion.rests import Rest, rest_of
 from ..motion.retarget import at_seat_height
 from ..motion.uses import lying
-from .captured import HeldClip, fingerprint, held_out, is_frozen, test_motions
+from .captured import HeldClip, fingerprint, held_out, held_out_motions, is_frozen
 from .freezing import freeze
 
 __all__ = ["FROZEN_REAL", "freeze_real", "real_test"]
@@ -76,7 +76,7 @@ def freeze_real(folder: Path, library: Path) -> dict[str, Any]:
     """Fit the test anew: what ``real.json`` holds. It is done once, before any weights are
     measured on it.
     """
-    motions = test_motions(folder)
+    motions = held_out_motions(folder)
     pieces, _ = read_library(library)
     clips: list[dict[str, Any]] = []
     for role in ("choose", "tell"):
@@ -239,7 +239,7 @@ def real_test(folder: Path, library: Path, role: str) -> list[HeldClip]:
         for clip in json.loads(FROZEN_REAL.read_text(encoding="utf-8"))["clips"]
         if clip["role"] == role
     ]
-    motions = test_motions(folder)
+    motions = held_out_motions(folder)
     beds = (
         {clip.name: clip for clip in held_out(folder)}
         if any("lies" in clip for clip in frozen)

@@ -1,5 +1,7 @@
 """Which bones are which joints: detected by name, guessed, chosen by hand, kept as presets."""
 
+import json
+from dataclasses import fields
 from pathlib import Path
 
 import bpy
@@ -7,6 +9,7 @@ import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import is_character
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import detection, maps, properties
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import JOINTS, LIMBS
 from bl_ext.user_default.dafnet.panels.rig import DAFNET_PT_rig, DAFNET_UL_rig
 
 from kit import humanoids
@@ -33,6 +36,18 @@ def test_conventions_are_detected(stage: RigStage, kind: str) -> None:
     assert (found.name, len(found.joints)) == DETECTED[kind]
     assert not is_character(rig)
     assert is_character(stage.ann)
+
+
+@pytest.mark.parametrize("file", sorted(maps.map_files().values()), ids=lambda file: file.stem)
+def test_a_map_that_ships_is_whole(file: Path) -> None:
+    """It has every joint that is needed, and no name that would be passed over in silence."""
+    told = json.loads(file.read_text(encoding="utf-8"))
+    rig_map = maps.load_map(file)
+    assert set(maps.NEEDED) <= rig_map.joints.keys() <= set(JOINTS)
+    assert told["joints"] == rig_map.joints and told.get("places", {}) == rig_map.places
+    assert told.keys() <= {field.name for field in fields(rig_map)}
+    assert rig_map.name and rig_map.about and rig_map.known_by
+    assert rig_map.limbs.keys() in (set(), set(LIMBS))
 
 
 @pytest.mark.parametrize("prefix", ["", "mixamorig1:", "mixamorig_", "Mia:"])
