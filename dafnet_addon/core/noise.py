@@ -21,9 +21,8 @@ class TakeNoise:
     second, and that is what makes a body that sits or stands look alive.
 
     ``lasting`` (66, 66): what a take holds is this times N(0, I). ``passing`` (66, 66): what comes
-    and goes is at each frame this times N(0, I), and its values follow one another as those of
-    white noise under the filters ``taps`` (66, 49) do, each of unit length. Zeros where the weights
-    do not say: such takes hold their noise.
+    and goes is white noise, this times N(0, I) at each frame, under the filters ``taps`` (66, 49),
+    each of unit length at most. Zeros where the weights do not say: such takes hold their noise.
     """
 
     lasting: np.ndarray

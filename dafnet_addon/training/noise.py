@@ -5,9 +5,14 @@ motion a part of it lasts, and the rest comes and goes within a second. A vector
 that is held is a body that nobody moves like, and one that holds only what lasts is a statue. So
 takes draw both (``core.noise.TakeNoise``), as they are found along captured windows: temperature 1
 is then how far, and how, real takes differ.
+
+What comes and goes has the spectrum that was found, but for this: noise along captured motion is
+tied to that motion, and noise that is drawn is not. Where it comes and goes fast, what is made of
+it trembles more than people do. So each frequency is damped until poses move as fast in it as
+captured ones.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,17 +20,19 @@ import torch
 from torch import Tensor
 
 from ..core.noise import TAPS
-from ..model.config import POSE_SIZE
 from ..model.flow import BodyFlow
 from ..model.predictor import ActionPredictor
 from .batches import Batch, Pool, Statistics
 
-__all__ = ["PartNoise", "noise_along", "part_noise", "take_noise"]
+__all__ = ["PartNoise", "kept_of_noise", "noise_along", "part_noise", "take_noise"]
 
 _SETTLED = 20
 """Frames in which the flow's memory fills."""
 _AT_ONCE = 50
 """Windows."""
+_DAMPED_OVER = 400
+"""Windows."""
+_SMOOTH = np.array([0.25, 0.5, 0.25])
 _HAIR = 1e-6
 """Of variance, for what a few windows leave out of the space."""
 
@@ -47,13 +54,18 @@ class PartNoise:
 
     def draw(self, windows: int, frames: int) -> Tensor:
         """Noise (B, T, n) at temperature 1, as takes draw it, of torch's own generator."""
+        held, passing = self.draw_apart(windows, frames)
+        return held + passing
+
+    def draw_apart(self, windows: int, frames: int) -> tuple[Tensor, Tensor]:
+        """The same in two: what lasts (B, 1, n), and what comes and goes (B, T, n)."""
         size, device = len(self.spread), self.spread.device
         held = torch.randn(windows, 1, size, device=device) @ self.spread.T
         white = torch.randn(windows, frames + TAPS - 1, size, device=device) @ self.passing.T
 
         filters = self.taps[:, None]
         passing = torch.nn.functional.conv1d(white.transpose(1, 2), filters, groups=size)
-        return held + passing.transpose(1, 2)
+        return held, passing.transpose(1, 2)
 
 
 @torch.no_grad()
@@ -66,17 +78,12 @@ def noise_along(
     """Noise of each of these parts (None: all) of the flow (B, T, …) along captured windows in FREE
     mode, each beside the captured parts before it.
     """
-    observation = torch.zeros(*batch.upper.shape[:2], POSE_SIZE, device=batch.upper.device)
-    given = observation[..., :22]
-    base = batch.past
-    if predictor is not None:
-        base = torch.cat([predictor(batch.past, batch.occupancy), batch.root], dim=-1)
-
+    told = _told(predictor, batch)
     pose = torch.cat([batch.upper, batch.lower], dim=-1)
     found = {}
     for name, part in flow.parts().items():
         if parts is None or name in parts:
-            condition = flow.condition(name, base, observation, given, pose)
+            condition = _condition(flow, name, told, pose)
             found[name] = part(pose[..., flow.partition[name]], condition, batch.occupancy)[0]
 
     return found
@@ -112,6 +119,14 @@ def take_noise(
         tensors[f"{part}.passing"] = _root(passing.reshape(-1, passing.shape[-1]))
         tensors[f"{part}.taps"] = _filters(passing)
 
+    batches = (
+        pool.batch(some, statistics, flow.config, noise=0.0)
+        for some in rows[:_DAMPED_OVER].split(_AT_ONCE)
+    )
+    drawn = {part: _part_noise(tensors, part, pool.device) for part in found}
+    for part, kept in kept_of_noise(flow, predictor, batches, statistics, drawn).items():
+        tensors[f"{part}.taps"] = _damped(tensors[f"{part}.taps"], kept)
+
     return {name: tensor.astype(np.float32) for name, tensor in tensors.items()}
 
 
@@ -127,12 +142,110 @@ def part_noise(
     device.
     """
     found = take_noise(flow, predictor, pool, statistics, windows, [part])
+    return _part_noise(found, part, pool.device)
+
+
+def _part_noise(tensors: Mapping[str, np.ndarray], part: str, device: torch.device) -> PartNoise:
     return PartNoise(
         **{
-            name: torch.from_numpy(found[f"{part}.{name}"]).to(pool.device)
+            name: torch.as_tensor(tensors[f"{part}.{name}"], dtype=torch.float32, device=device)
             for name in PartNoise.__annotations__
         }
     )
+
+
+@torch.no_grad()
+def kept_of_noise(
+    flow: BodyFlow,
+    predictor: ActionPredictor | None,
+    batches: Iterable[Batch],
+    statistics: Statistics,
+    noise: Mapping[str, PartNoise],
+) -> dict[str, np.ndarray]:
+    """Of each of these parts' noise, how much of what comes and goes is kept at each frequency of
+    its filters (25,), in amplitude.
+
+    Poses made of what lasts alone move too little at a frequency, those made of all of it too much;
+    power adds, so that between them lies the captured motion's.
+    """
+    powers: dict[str, np.ndarray] = {}
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(0)
+        for batch in batches:
+            for name, power in _powers(flow, predictor, batch, statistics, noise).items():
+                powers[name] = powers.get(name, 0.0) + power
+
+    kept = {}
+    for name, (captured, lasting, all_of_it) in powers.items():
+        added = np.maximum(all_of_it - lasting, 1e-12)
+        share = np.convolve(np.pad((captured - lasting) / added, 1, mode="edge"), _SMOOTH, "valid")
+        found_at = np.linspace(0.0, 0.5, len(share))
+        kept[name] = np.sqrt(np.clip(np.interp(np.fft.rfftfreq(TAPS), found_at, share), 0.0, 1.0))
+
+    return kept
+
+
+def _powers(
+    flow: BodyFlow,
+    predictor: ActionPredictor | None,
+    batch: Batch,
+    statistics: Statistics,
+    noise: Mapping[str, PartNoise],
+) -> dict[str, np.ndarray]:
+    """Power (3, F) of how fast each of these parts moves in some windows: captured, made of the
+    noise that lasts, and of all of it. The second part sees what was made of the first, as in a
+    take.
+    """
+    told = _told(predictor, batch)
+    captured = torch.cat([batch.upper, batch.lower], dim=-1)
+    lasting, passing = captured.clone(), captured.clone()
+    powers = {}
+    for name, part in flow.parts().items():
+        if name not in noise:
+            continue
+
+        columns = flow.partition[name]
+        held, comes = noise[name].draw_apart(len(captured), captured.shape[1] - _SETTLED)
+        for poses, z in ((lasting, held.expand_as(comes)), (passing, held + comes)):
+            condition = _condition(flow, name, told, poses)
+            poses[:, _SETTLED:, columns] = part.free_run(
+                captured[..., columns], condition, batch.occupancy, z, _SETTLED
+            )[1]
+
+        metres = statistics.pose_std[columns]
+        powers[name] = np.stack(
+            [
+                _speed_spectrum(poses[:, _SETTLED:, columns].double().cpu().numpy() * metres)
+                for poses in (captured, lasting, passing)
+            ]
+        )
+
+    return powers
+
+
+def _told(predictor: ActionPredictor | None, batch: Batch) -> Tensor:
+    """What every part is told of captured windows (B, T, …), beside what it sees of the body."""
+    if predictor is None:
+        return batch.past
+    return torch.cat([predictor(batch.past, batch.occupancy), batch.root], dim=-1)
+
+
+def _condition(flow: BodyFlow, part: str, told: Tensor, pose: Tensor) -> Tensor:
+    """What a part's flow is told (B, T, …) in FREE mode, beside ``pose`` (B, T, 66)."""
+    nothing = torch.zeros_like(pose)
+    return flow.condition(part, told, nothing, nothing[..., :22], pose)
+
+
+def _speed_spectrum(poses: np.ndarray) -> np.ndarray:
+    """Power (F,) of how fast poses (B, T, n) move, from 0 to half the frame rate."""
+    speed = np.diff(poses, axis=1)
+    taper = np.hanning(speed.shape[1])[:, None]
+    return (np.abs(np.fft.rfft(speed * taper, axis=1)) ** 2).sum(axis=(0, 2))
+
+
+def _damped(taps: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Filters (n, 49) of which as much is ``kept`` (25,) at each frequency."""
+    return np.fft.irfft(np.fft.rfft(taps, axis=1) * kept, TAPS, axis=1)
 
 
 def _root(values: np.ndarray) -> np.ndarray:
@@ -150,5 +263,8 @@ def _filters(passing: np.ndarray) -> np.ndarray:
     power[0] = 0.0  # is what lasts, which the taper lets through
     impulse = np.fft.irfft(np.sqrt(power), axis=0)
     middle = TAPS // 2
-    taps = np.roll(impulse, middle, axis=0)[:TAPS].T
+    # Filters that end abruptly tremble. What lasts, which the taper lets through, is taken off.
+    taper = np.hanning(TAPS + 2)[1:-1]
+    taps = np.roll(impulse, middle, axis=0)[:TAPS].T * taper
+    taps -= taper * taps.sum(axis=1, keepdims=True) / taper.sum()
     return taps / np.linalg.norm(taps, axis=1, keepdims=True)
