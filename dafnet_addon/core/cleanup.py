@@ -8,15 +8,16 @@ asks for it. What bends all of the motion comes first; feet before the seat, sin
 the pelvis; targets last.
 """
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from dataclasses import astuple, dataclass
+from types import MappingProxyType
 
 import numpy as np
 
 from .errors import InputError
 from .kinematics import on_bones, two_bone
 from .progress import stepwise
-from .resting import Distance, on_legs, rested
+from .resting import Distance, across_of, on_legs, rested
 from .root import gaussian
 from .rotations import matrix_from_vector
 from .series import MODEL_FPS, runs, smoothstep
@@ -24,12 +25,14 @@ from .skeleton import (
     ANKLES,
     END_EFFECTORS,
     FEET,
+    FEET_ASKED,
     HIPS,
     JOINTS,
     KNEES,
     LIMBS,
     OFFSETS,
     PARENTS,
+    TARGETS,
     TOE_HEIGHT,
     joint,
 )
@@ -91,7 +94,7 @@ _STEP = 0.10  # metres in one round, at most
 @dataclass(frozen=True)
 class CleanUp:
     """Strengths from 0 (off) to 1 of what is done after the model: ``feet`` stand still where they
-    are planted, head and hands ``reach`` their targets, a body that rests on a ``seat`` is as
+    are planted, head, hands and feet ``reach`` their targets, a body that rests on a ``seat`` is as
     high as that carries it, hands and feet are kept ``clear`` of furniture, and motion is made more
     ``smooth``.
     """
@@ -183,12 +186,16 @@ def standing_still(
 
 
 def planted(
-    joints: np.ndarray, floor: np.ndarray | float = 0.0, strength: float = 1.0
+    joints: np.ndarray,
+    floor: np.ndarray | float = 0.0,
+    strength: float = 1.0,
+    targets: Mapping[str, np.ndarray] = MappingProxyType({}),
 ) -> np.ndarray:
     """Joints (T, 22, 3) with every standing foot held at one place, legs and, where they do not
     reach, the pelvis following.
 
-    Metres, world, 30 frames a second; ``floor``: its height, one or one for each frame.
+    Metres, world, 30 frames a second; ``floor``: its height, one or one for each frame. A foot that
+    has a target (``reach_targets``) is left to it.
     """
     heights = np.broadcast_to(np.asarray(floor, float), len(joints))
     stands = standing_still(joints, floor)
@@ -203,12 +210,19 @@ def planted(
         moved[start:end, foot] = strength * (place - toe)
         held[start:end, foot] = True
 
-    for foot in (0, 1):
+    for foot, name in enumerate(FEET_ASKED):
+        held[_asked(targets, name, len(joints)), foot] = False
         moved[:, foot] = _between(moved[:, foot], held[:, foot])
 
     ankles = joints[:, ANKLES] + moved
     down = _lowered(joints[:, HIPS], ankles, held)
     return on_legs(joints, -down, ankles, joints[:, KNEES] + moved / 2)
+
+
+def _asked(targets: Mapping[str, np.ndarray], name: str, frames: int) -> np.ndarray:
+    """Where (T,) something has a target."""
+    target = targets.get(name)
+    return np.zeros(frames, bool) if target is None else np.isfinite(target).all(-1)
 
 
 def _lowered(hips: np.ndarray, ankles: np.ndarray, held: np.ndarray) -> np.ndarray:
@@ -269,8 +283,8 @@ def cleared(
     if not out_of.any():
         return joints
 
-    for k, name in enumerate(_ARMS):
-        out_of[np.isfinite(targets.get(name, np.full((len(joints), 3), np.nan))).all(-1), k] = 0.0
+    for k, name in enumerate((*_ARMS, *FEET_ASKED)):
+        out_of[_asked(targets, name, len(joints)), k] = 0.0
 
     out_of[:, 2:, 2] = 0.0
     out = on_legs(
@@ -317,7 +331,7 @@ def _wished(
     for name, target in targets.items():
         asked = np.isfinite(target).all(-1)
         if asked.any():
-            place = joints[:, END_EFFECTORS[name]]
+            place = joints[:, TARGETS[name]]
             offset = np.where(asked[:, None], target - place, 0.0)
             out[name] = place + strength * _between(offset, asked, fps)
     return out
@@ -329,14 +343,18 @@ def reach_targets(
     strength: float = 1.0,
     fps: float = MODEL_FPS,
 ) -> np.ndarray:
-    """Joints (T, 22, 3) whose head and wrists are at their ``targets``: (T, 3) by the names of
-    ``END_EFFECTORS``, NaN if free.
+    """Joints (T, 22, 3) whose head, wrists and ankles are at their ``targets``: (T, 3) by the names
+    of ``TARGETS``, NaN if free.
 
-    Damped least squares over spine, neck, collars and arms: a straight arm is shortened by the
-    trunk rather than by a sudden elbow. A target that is out of reach is approached as near as arms
-    and a modest lean allow.
+    Legs first: they bend to their targets, knees forward, and the pelvis comes down where they are
+    too short. Then damped least squares over spine, neck, collars and arms: a straight arm is
+    shortened by the trunk rather than by a sudden elbow. A target that is out of reach is
+    approached as near as arms and a modest lean allow.
     """
-    wished = _wished(joints, targets, strength, fps)
+    feet = {name: target for name, target in targets.items() if name in FEET_ASKED}
+    joints = _feet_led(joints, _wished(joints, feet, strength, fps), feet)
+    upper = {name: target for name, target in targets.items() if name not in FEET_ASKED}
+    wished = _wished(joints, upper, strength, fps)
     if not wished:
         return joints
 
@@ -371,6 +389,28 @@ def reach_targets(
             )
 
     return out
+
+
+def _feet_led(
+    joints: np.ndarray, wished: Mapping[str, np.ndarray], targets: Mapping[str, np.ndarray]
+) -> np.ndarray:
+    """Joints whose ankles are where they are ``wished`` (T, 3), by the names of ``FEET_ASKED``;
+    toes go with them.
+    """
+    if not wished:
+        return joints
+
+    ankles, held = joints[:, ANKLES].copy(), np.zeros((len(joints), 2), dtype=bool)
+    for foot, name in enumerate(FEET_ASKED):
+        if name in wished:
+            ankles[:, foot], held[:, foot] = wished[name], _asked(targets, name, len(joints))
+
+    moved = ankles - joints[:, ANKLES]
+    forward = np.cross((0.0, 0.0, 1.0), across_of(joints))[:, None]
+    knees = joints[:, KNEES] + moved / 2
+    knees += forward * np.linalg.norm(moved, axis=-1, keepdims=True)
+    down = _lowered(joints[:, HIPS], ankles, held)
+    return on_legs(joints, -down, ankles, knees)
 
 
 def _bent(
@@ -432,7 +472,7 @@ def cleaned(
         joints = cleared(joints, distance, targets, settings.clear)
         yield 0.4
     if settings.feet > 0.0:
-        joints = planted(joints, floor, settings.feet)
+        joints = planted(joints, floor, settings.feet, targets)
         yield 0.6
     if settings.seat > 0.0 and support is not None:
         joints = rested(joints, support, settings.seat, distance)

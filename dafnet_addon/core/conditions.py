@@ -25,11 +25,11 @@ from .resampling import (
     resample_rigid,
 )
 from .root import RootPath, ahead, root_from_matrices, smoothed, to_root, to_world, velocities
-from .rotations import normalised
+from .rotations import frame_from, normalised, rotate, transpose
 from .sampler import Conditions
 from .sensor import SPHERES
 from .series import MODEL_FPS, smoothstep
-from .skeleton import END_EFFECTORS, MODEL_ORDER, UPPER
+from .skeleton import FEET_ASKED, LOWER, MODEL_ORDER, OFFSETS, PARENTS, TARGETS, UPPER
 from .solids import Box, Mesh, Scene
 from .take import Controls
 
@@ -50,14 +50,19 @@ PREROLL = 70
 settled.
 """
 
-_EFFECTORS = {name: MODEL_ORDER.index(j) for name, j in END_EFFECTORS.items()}
+_SLOTS = {name: MODEL_ORDER.index(j) for name, j in TARGETS.items()}
+_TOES = {name: PARENTS.index(j) for name, j in FEET_ASKED.items()}
+_COUNTS_IN = {name: ("EE", "FULL") if name in FEET_ASKED else ("EE",) for name in TARGETS}
+"""The modes in which a target counts."""
 _TILT = np.radians(5.0)  # of a root, above which the user is told that it is flattened
 _SPRINT = 10.5  # metres a second, which nobody runs: a root that is faster jumps
 
-# A sphere that holds every head and wrist of the training poses: its centre over the root, and its
-# radius, metres.
+# A sphere that holds every head and wrist of the training poses, and one that holds every ankle:
+# its centre over the root, and its radius, metres.
 _REACH_FROM = np.array([0.0, 0.0, 1.0])
 _REACH = 1.25
+_FEET_REACH_FROM = np.array([0.0, 0.0, 0.7])
+_FEET_REACH = 1.1
 
 _STILL = 0.02  # metres or radians in the whole shot, under which a root does not move
 _CROWDED = 0.35  # share of the sensor that furniture fills, above which the user is told
@@ -165,27 +170,41 @@ def _targets(
     )
 
 
-def _body(controls: Controls, times: np.ndarray, target: np.ndarray, path: RootPath) -> np.ndarray:
-    """The upper body to follow (N, 14, 3), root frame; between a frame that has one and one that
-    has none, the nearest's.
+def _body(
+    controls: Controls, name: str, times: np.ndarray, target: np.ndarray, path: RootPath
+) -> np.ndarray:
+    """The upper or the lower body to follow (N, J, 3), root frame; between a frame that has one and
+    one that has none, the nearest's.
     """
-    if controls.upper_body is None:
-        raise InputError(
-            "The mode is FULL but there is no upper body to follow; choose a source, or use FREE "
-            "or EE."
-        )
-
-    body = np.asarray(controls.upper_body, float) / controls.scale
+    body = np.asarray(getattr(controls, name), float) / controls.scale
     full = _modes(controls) == "FULL"
     if not np.isfinite(body[full]).all():
         raise InputError(
-            "The upper body to follow has a joint that is not a number; fix its animation."
+            f"The {name.replace('_', ' ')} to follow has a joint that is not a number; fix its "
+            "animation."
         )
 
     between = resample_positions(body, times, target)
     return to_root(
         path, np.where(np.isfinite(between), between, resample_nearest(body, times, target))
     )
+
+
+def _to_toes(
+    controls: Controls, name: str, times: np.ndarray, target: np.ndarray, path: RootPath
+) -> np.ndarray:
+    """From a foot's ankle to its toe base (N, 3), root frame, as its rotation asks; NaN where that
+    is free.
+    """
+    asked = getattr(controls, f"{name}_rotation")
+    if asked is None:
+        return np.full((len(path), 3), np.nan)
+    known = np.isfinite(asked).all(axis=(1, 2))
+    ahead, up = (np.where(known[:, None], asked[..., k], np.eye(3)[k]) for k in (1, 2))
+    axes = frame_from(ahead, up, "yz")
+    offsets = np.where(known[:, None], axes @ OFFSETS[_TOES[name]], np.nan)
+    across = normalised(resample_positions(offsets, times, target))
+    return rotate(transpose(path.rotation), across * np.linalg.norm(OFFSETS[_TOES[name]]))
 
 
 def _influence(controls: Controls, name: str, times: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -211,32 +230,51 @@ def _observed(
     """
     frames = len(path)
     observation, share = np.zeros((frames, 22, 3)), np.zeros((frames, 22))
-    for name, slot in _EFFECTORS.items():
+    full = modes == "FULL"
+    if full.any() and controls.upper_body is None and controls.lower_body is None:
+        raise InputError(
+            "The mode is FULL but there is no upper body to follow; choose a source, or use FREE "
+            "or EE."
+        )
+
+    for name, joints in (("upper_body", UPPER), ("lower_body", LOWER)):
+        if not full.any() or getattr(controls, name) is None:
+            continue
+
+        body = _body(controls, name, times, target, path)
+        rows = full & np.isfinite(body).all(axis=(1, 2))
+        slots = [MODEL_ORDER.index(j) for j in joints]
+        observation[np.ix_(rows, slots)], share[np.ix_(rows, slots)] = body[rows], 1.0
+        if name == "upper_body":
+            share[rows, MODEL_ORDER.index(0)] = float(controls.pelvis_given)
+
+    for name, slot in _SLOTS.items():
         place = _targets(controls, name, times, target, path)
         if place is None:
             continue
 
         influence = _influence(controls, name, times, target)
-        used = (modes == "EE") & np.isfinite(place).all(-1) & (influence > 0.0)
-        far = np.linalg.norm(place - _REACH_FROM, axis=-1)
-        if (used & (far > _REACH)).any():
+        used = np.isin(modes, _COUNTS_IN[name]) & np.isfinite(place).all(-1) & (influence > 0.0)
+        middle, reach = (
+            (_FEET_REACH_FROM, _FEET_REACH) if name in FEET_ASKED else (_REACH_FROM, _REACH)
+        )
+        far = np.linalg.norm(place - middle, axis=-1)
+        if (used & (far > reach)).any():
             metres = float(np.nanmax(np.where(used, far, np.nan))) * controls.scale
             words = name.replace("_", " ")
             warnings.append(
                 f"The target of '{words}' is up to {metres:.1f} m away; it is reached for, not "
                 "reached."
             )
-            within = _REACH_FROM + normalised(place - _REACH_FROM) * _REACH
-            place = np.where((far > _REACH)[:, None], within, place)
+            within = middle + normalised(place - middle) * reach
+            place = np.where((far > reach)[:, None], within, place)
 
         observation[used, slot], share[used, slot] = place[used], influence[used]
-
-    full = modes == "FULL"
-    if full.any():
-        body = _body(controls, times, target, path)
-        full &= np.isfinite(body).all(axis=(1, 2))
-        observation[full, : len(UPPER)], share[full, : len(UPPER)] = body[full], 1.0
-        share[full, MODEL_ORDER.index(0)] = float(controls.pelvis_given)
+        if name in FEET_ASKED:
+            toes = place + _to_toes(controls, name, times, target, path)
+            used &= np.isfinite(toes).all(-1)
+            slot = MODEL_ORDER.index(_TOES[name])
+            observation[used, slot], share[used, slot] = toes[used], influence[used]
 
     return observation.reshape(frames, -1), share
 
@@ -311,8 +349,8 @@ def _altered(change: Change, observation: np.ndarray, share: np.ndarray) -> np.n
 
 
 def targets_of(path: RootPath, request: Request) -> dict[str, np.ndarray]:
-    """Where head and wrists have to be: world positions (N, 3), canonical metres, NaN where they
-    are free, even in part, or on their way from what another mode asked.
+    """Where head, wrists and ankles have to be: world positions (N, 3), canonical metres, NaN where
+    they are free, even in part, or on their way from what another mode asked.
     """
     places = to_world(path, request.observation.reshape(-1, 22, 3))
     given = request.share >= 1.0
@@ -320,27 +358,29 @@ def targets_of(path: RootPath, request: Request) -> dict[str, np.ndarray]:
         given[change.frames] &= ~_altered(change, request.observation, request.share)
     return {
         name: np.where(given[:, slot, None], places[:, slot], np.nan)
-        for name, slot in _EFFECTORS.items()
+        for name, slot in _SLOTS.items()
     }
 
 
 def turns_of(controls: Controls, path: RootPath) -> dict[str, Turn]:
-    """How head and hands have to be turned, at the controls' own frames, those of ``path``: by
-    name, where anything is asked.
+    """How head, hands and feet have to be turned, at the controls' own frames, those of ``path``:
+    by name, where anything is asked.
 
-    As positions do, a rotation counts in the mode EE, by its influence, and more and more after a
-    change of mode.
+    As positions do, a rotation counts in the mode EE, a foot's in FULL as well, by its influence,
+    and more and more after a change of mode.
     """
     modes, times = _modes(controls), frame_times(len(controls), controls.fps)
     out = {}
-    for name in END_EFFECTORS:
+    for name in TARGETS:
         asked = getattr(controls, f"{name}_rotation")
         if asked is None:
             continue
 
         asked = np.array(asked, float)
         known = np.isfinite(asked).all(axis=(1, 2))
-        counts = np.where((modes == "EE") & known, _influence(controls, name, times, times), 0.0)
+        counts = np.where(
+            np.isin(modes, _COUNTS_IN[name]) & known, _influence(controls, name, times, times), 0.0
+        )
         share = counts.copy()
         for start, ease in _starts(modes, controls.blend * controls.fps):
             frames = slice(start, start + len(ease))

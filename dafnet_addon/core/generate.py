@@ -30,7 +30,7 @@ from .root import RootPath, to_root, to_world
 from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix
 from .sampler import Sampler, Unchanged
 from .series import MODEL_FPS
-from .skeleton import model_order
+from .skeleton import UPPER, model_order
 from .softness import support_under
 from .solids import Scene
 from .take import Controls, Take
@@ -53,6 +53,11 @@ _HAIR = 1e-3  # metres, radians, fractions: what comes back from single precisio
 _LEAD = 30  # frames before a change of mode that tell how straight limbs were twisted
 _CONDITIONED = 0.15  # progress when the conditions are known
 _SAMPLED = 0.85  # progress when the poses are made
+_LEGS = slice(len(UPPER), None)  # joints in the model's order
+_LEGS_UNHEARD = (
+    "These weights were not trained with targets for feet and legs; only Reach Targets brings the "
+    "feet there, after the motion is made."
+)
 
 
 @dataclass(frozen=True)
@@ -123,6 +128,17 @@ def cleaned_up(
     return (
         yield from within(cleaned.steps(joints, targets, settings, floor, support, reach), 0.2, 1.0)
     )
+
+
+def _told(share: np.ndarray, weights: Weights) -> np.ndarray:
+    """How far joints (N, 22) count for these weights: those of the legs not, where training never
+    gave any.
+    """
+    if weights.heeds_legs:
+        return share
+    told = share.copy()
+    told[:, _LEGS] = 0.0
+    return told
 
 
 def _led_over(observation: np.ndarray, share: np.ndarray, free: np.ndarray) -> np.ndarray:
@@ -280,6 +296,8 @@ def takes_steps(
     started = perf_counter()
     yield 0.0
     shot = yield from within(shot_steps(scene, controls), 0.0, _CONDITIONED)
+    if not weights.heeds_legs and shot.request.share[:, _LEGS].any():
+        shot = replace(shot, warnings=(*shot.warnings, _LEGS_UNHEARD))
     conditioned = perf_counter()
     sampler = Sampler(weights, device)
     frames = len(shot.conditions)
@@ -303,8 +321,11 @@ def takes_steps(
             )
             watch(frame - PREROLL, to_world(at, pose.reshape(1, 22, 3))[0] * controls.scale)
 
-    conditions, share, sampling = shot.conditions, rolled(shot.request.share), _CONDITIONED
-    changes = shot.request.changes
+    share, sampling = rolled(_told(shot.request.share, weights)), _CONDITIONED
+    conditions = replace(shot.conditions, given=(share > 0.0).astype(float))
+    changes = tuple(
+        replace(each, share=_told(each.share, weights)) for each in shot.request.changes
+    )
     if any(
         ((each > 0.0) & (each < 1.0)).any()
         for each in (share, *(change.share for change in changes))

@@ -23,13 +23,14 @@ from .rotations import (
 from .series import MODEL_FPS
 from .skeleton import (
     COLLARS,
-    END_EFFECTORS,
+    FEET_ASKED,
     LIMB_AXES,
     LIMB_BENDS,
     LIMBS,
     OFFSETS,
     PARENTS,
     PELVIS,
+    TARGETS,
     joint,
 )
 
@@ -57,19 +58,21 @@ _CLEAR_BEND = 0.25
 _CARRY = 4.0  # weight of the neighbouring frames, against 1 at a clear bend
 _PULL = 0.05  # weight of the parent's reference
 
-# columns: x, where the face looks or the fingers point, crown or back of the hand; as they lie in
-# the rest pose
+# columns: x, where the face looks or fingers or toes point, crown or back of hand or foot; as they
+# lie in the rest pose
 _AXES_REST = {
     "head": np.eye(3),
     "hand_left": np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]),
     "hand_right": np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
+    "foot_left": np.eye(3),
+    "foot_right": np.eye(3),
 }
 
 
 class Turn(NamedTuple):
-    """How a head or hand has to be turned: world ``axes`` (T, 3, 3), y where the face looks or the
-    fingers point, z the crown or the back of the hand; ``share`` (T,): how far they count; where
-    that is 0 they may be NaN.
+    """How a head, hand or foot has to be turned: world ``axes`` (T, 3, 3), y where the face looks
+    or fingers or toes point, z the crown or the back of the hand or foot; ``share`` (T,): how far
+    they count; where that is 0 they may be NaN.
     """
 
     axes: np.ndarray
@@ -253,14 +256,14 @@ def _between(a: np.ndarray, b: np.ndarray, t: float | np.ndarray) -> np.ndarray:
 
 
 def turned(frames: np.ndarray, turns: Mapping[str, Turn]) -> np.ndarray:
-    """Global joint frames (T, 22, 3, 3) with head and hands turned as ``turns`` ask, by the names
-    of ``END_EFFECTORS``.
+    """Global joint frames (T, 22, 3, 3) with head, hands and feet turned as ``turns`` ask, by the
+    names of ``TARGETS``.
 
-    The neck takes its half of the head's twist. No joint moves.
+    The neck takes its half of the head's twist. No joint moves but a turned foot's toes.
     """
     out = frames.copy()
     for name, (axes, share) in turns.items():
-        at, given = END_EFFECTORS[name], (share > 0.0)[:, None, None]
+        at, given = TARGETS[name], (share > 0.0)[:, None, None]
         axes = np.where(given, axes, np.eye(3))
         asked = frame_from(axes[..., 1], axes[..., 2], "yz") @ _AXES_REST[name].T
         if name == "head":
@@ -269,9 +272,12 @@ def turned(frames: np.ndarray, turns: Mapping[str, Turn]) -> np.ndarray:
             bone = rotation_between(half @ OFFSETS[at], frames[:, neck] @ OFFSETS[at])
             out[:, neck] = np.where(given, bone @ half, frames[:, neck])
 
-        parent = out[:, PARENTS[at]]
-        part = np.where(given, _between(parent, asked, share), parent)
+        # Hands, and the head, go on as their parents where they are free; a foot as it was made.
+        free = out[:, at] if name in FEET_ASKED else out[:, PARENTS[at]]
+        part = np.where(given, _between(free, asked, share), free)
         out[:, at] = np.where((share >= 1.0)[:, None, None], asked, part)
+        if name in FEET_ASKED:
+            out[:, PARENTS.index(at)] = out[:, at]
 
     return out
 

@@ -123,13 +123,13 @@ def end_effector_distance(joints: np.ndarray, targets: Mapping[str, np.ndarray |
     """EED: mean distance of head and wrists from their targets, over a stature of 1.7 m. NaN where
     there is no target.
 
-    Paper, 6.2. ``targets``: (T, 3) by the names of ``skeleton.END_EFFECTORS``, None or NaN where
-    free.
+    Paper, 6.2. ``targets``: (T, 3) by the names of ``skeleton.TARGETS``, None or NaN where free;
+    feet do not count.
     """
     errors = [
         np.linalg.norm(joints[:, END_EFFECTORS[name]] - target, axis=-1)
         for name, target in targets.items()
-        if target is not None
+        if target is not None and name in END_EFFECTORS
     ]
     given = (
         np.concatenate([error[np.isfinite(error)] for error in errors]) if errors else np.zeros(0)

@@ -27,7 +27,7 @@ from .skeleton import (
 )
 from .softness import LIES_LOWER, OVER_HARD, Support
 
-__all__ = ["on_legs", "rested", "resting"]
+__all__ = ["Distance", "across_of", "on_legs", "rested", "resting"]
 
 Distance = Callable[[np.ndarray], np.ndarray]
 """Signed distances (T, N) of world points (T, N, 3) to the furniture, negative inside; metres."""
@@ -173,13 +173,13 @@ def _lifted(joints: np.ndarray, lift: np.ndarray, top: np.ndarray) -> np.ndarray
     shorter = np.minimum(length, np.maximum(bent, before))
     ankles = hips + legs * shorter / np.maximum(length, 1e-9)
 
-    forward = np.cross((0.0, 0.0, 1.0), _across(joints))
+    forward = np.cross((0.0, 0.0, 1.0), across_of(joints))
     poles = joints[:, KNEES] + (np.abs(lift)[:, None] * forward)[:, None]
     poles[..., 2] += lift[:, None] / 2
     return on_legs(joints, lift, ankles, poles)
 
 
-def _across(joints: np.ndarray) -> np.ndarray:
+def across_of(joints: np.ndarray) -> np.ndarray:
     """Level unit vectors (T, 3) from the left hip to the right one."""
     left, right = (joints[:, hip] for hip in HIPS)
     return normalised((right - left) * (1.0, 1.0, 0.0), np.array([1.0, 0.0, 0.0]))
@@ -222,7 +222,7 @@ def _off_the_back(
     """Joints whose trunk leans forward as far as the back of a seat asks for, by ``counts``
     (T,)."""
     trunk = joints[:, _TRUNK]
-    across = _across(joints)
+    across = across_of(joints)
     forward = np.cross((0.0, 0.0, 1.0), across)
     ahead = _until_free(trunk, forward, distance, _BACK_SKIN - _GIVES_WAY * softness)
     over = np.maximum((trunk - joints[:, PELVIS, None])[..., 2], _LEAST_LEVER)

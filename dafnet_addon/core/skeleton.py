@@ -24,6 +24,8 @@ __all__ = [
     "smpl_order",
     "MIRROR",
     "END_EFFECTORS",
+    "FEET_ASKED",
+    "TARGETS",
     "OFFSETS",
     "REST",
     "STANDING_PELVIS",
@@ -157,6 +159,11 @@ def smpl_order(poses: np.ndarray) -> np.ndarray:
 
 
 END_EFFECTORS = {"head": HEAD, "hand_left": WRISTS[0], "hand_right": WRISTS[1]}
+"""The paper's: joints of the upper body that may have targets."""
+FEET_ASKED = {"foot_left": ANKLES[0], "foot_right": ANKLES[1]}
+"""Joints of the lower body that may have targets."""
+TARGETS = END_EFFECTORS | FEET_ASKED
+"""All joints that may have targets."""
 
 
 def _swap(name: str) -> str:

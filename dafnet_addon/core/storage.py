@@ -23,7 +23,7 @@ from .errors import InputError
 from .network import MAX_ACTIONS
 from .resampling import covering_frames
 from .root import RootPath
-from .skeleton import END_EFFECTORS, UPPER
+from .skeleton import LOWER, TARGETS, UPPER
 from .take import Controls, Take
 from .text import printable, read_json
 
@@ -36,9 +36,10 @@ _MAX_FIGURE = 1e30
 _ROWS: dict[str, tuple[int, ...]] = {
     "controls.root": (4, 4),
     "controls.upper_body": (len(UPPER), 3),
-    **{f"controls.{name}": (3,) for name in END_EFFECTORS},
-    **{f"controls.{name}_rotation": (3, 3) for name in END_EFFECTORS},
-    **{f"controls.{name}_influence": () for name in END_EFFECTORS},
+    "controls.lower_body": (len(LOWER), 3),
+    **{f"controls.{name}": (3,) for name in TARGETS},
+    **{f"controls.{name}_rotation": (3, 3) for name in TARGETS},
+    **{f"controls.{name}_influence": () for name in TARGETS},
     "take.joints": (22, 3),
     "take.rotations": (22, 4),
     "take.root": (4, 4),

@@ -12,7 +12,7 @@ from .checks import FARTHEST, MAX_FRAMES, inside, number, rotations, shaped
 from .errors import InputError
 from .resampling import covering_frames
 from .root import RootPath
-from .skeleton import END_EFFECTORS, UPPER
+from .skeleton import LOWER, TARGETS, UPPER
 from .text import printable
 
 __all__ = ["MODES", "Controls", "Take"]
@@ -32,13 +32,15 @@ class Controls:
 
     ``fps``: frames a second of every array here. ``root`` (T, 4, 4): x right, y forward, z up, on
     the ground under the pelvis. ``mode``: FREE, EE or FULL, one word or one for each frame.
-    ``head``, ``hand_left``, ``hand_right`` (T, 3): targets of the head and wrist joints, NaN where
-    free; the matching ``…_rotation`` (T, 3, 3) turn head and hands (y where the face looks or the
-    fingers point, z the crown or the back of the hand), NaN where free. ``upper_body`` (T, 14, 3):
-    the joints ``skeleton.UPPER`` for FULL; ``pelvis_given``: whether its pelvis counts, or only the
-    rest of it. ``…_influence`` (T,): how far a target counts, from 0, where it is free, to 1; all
-    of it where None. ``blend``: seconds in which the body comes over where the mode changes.
-    ``scale``: the character's size over the canonical body of 1.75 m.
+    ``head``, ``hand_left``, ``hand_right``, ``foot_left``, ``foot_right`` (T, 3): targets of the
+    head, wrist and ankle joints, NaN where free; those of head and hands count in EE, those of feet
+    in EE and FULL. The matching ``…_rotation`` (T, 3, 3) turn head, hands and feet (y where the
+    face looks, or fingers or toes point, z the crown, the back of the hand or of the foot), NaN
+    where free. ``upper_body`` (T, 14, 3), ``lower_body`` (T, 8, 3): the joints ``skeleton.UPPER``
+    and ``skeleton.LOWER`` for FULL, either or both; ``pelvis_given``: whether the upper body's
+    pelvis counts, or only the rest of it. ``…_influence`` (T,): how far a target counts, from 0,
+    where it is free, to 1; all of it where None. ``blend``: seconds in which the body comes over
+    where the mode changes. ``scale``: the character's size over the canonical body of 1.75 m.
 
     Lists will do for arrays. Raises InputError, which names the field, for what cannot be used:
     another shape, what is not a number, a rotation that is none, a mode that is unknown, more than
@@ -51,13 +53,20 @@ class Controls:
     head: np.ndarray | None = None
     hand_left: np.ndarray | None = None
     hand_right: np.ndarray | None = None
+    foot_left: np.ndarray | None = None
+    foot_right: np.ndarray | None = None
     upper_body: np.ndarray | None = None
+    lower_body: np.ndarray | None = None
     head_rotation: np.ndarray | None = None
     hand_left_rotation: np.ndarray | None = None
     hand_right_rotation: np.ndarray | None = None
+    foot_left_rotation: np.ndarray | None = None
+    foot_right_rotation: np.ndarray | None = None
     head_influence: np.ndarray | None = None
     hand_left_influence: np.ndarray | None = None
     hand_right_influence: np.ndarray | None = None
+    foot_left_influence: np.ndarray | None = None
+    foot_right_influence: np.ndarray | None = None
     pelvis_given: bool = True
     blend: float = 1 / 3
     scale: float = 1.0
@@ -82,8 +91,11 @@ class Controls:
             )
 
         like, free = ", like the root's frames", "give metres, or NaN where it is free"
-        shapes: dict[str, tuple[int, ...]] = {"upper_body": (frames, len(UPPER), 3)}
-        for name in END_EFFECTORS:
+        shapes: dict[str, tuple[int, ...]] = {
+            "upper_body": (frames, len(UPPER), 3),
+            "lower_body": (frames, len(LOWER), 3),
+        }
+        for name in TARGETS:
             shapes |= {
                 name: (frames, 3),
                 f"{name}_rotation": (frames, 3, 3),

@@ -239,6 +239,13 @@ class Weights:
             )
         return tensor
 
+    @property
+    def heeds_legs(self) -> bool:
+        """Whether training gave targets of feet and lower bodies: its words say "legs" under
+        ``told``.
+        """
+        return "legs" in self.metadata.get("told", "").split()
+
     def says(self, key: str) -> Any:
         """What the metadata says under a key: parsed where it is JSON, as it stands where not, None
         where it says nothing.

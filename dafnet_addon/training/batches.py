@@ -13,7 +13,15 @@ import torch
 from torch import Tensor
 
 from ..core.sensor import RADIUS, REACH, SPHERES
-from ..core.skeleton import END_EFFECTORS, MODEL_ORDER, UPPER, UPPER_SIZE, model_order
+from ..core.skeleton import (
+    END_EFFECTORS,
+    FEET_ASKED,
+    MODEL_ORDER,
+    PARENTS,
+    UPPER,
+    UPPER_SIZE,
+    model_order,
+)
 from ..data.capture.archive import mapped_arrays
 from ..data.dataset.prepare import POSE_UNIT, load_pool
 from ..data.furnish.flesh import NO_BANK
@@ -34,6 +42,8 @@ __all__ = [
 
 _EFFECTORS = [MODEL_ORDER.index(j) for j in END_EFFECTORS.values()]
 _PELVIS = MODEL_ORDER.index(0)
+_ANKLES = [MODEL_ORDER.index(j) for j in FEET_ASKED.values()]
+_TOES = [MODEL_ORDER.index(PARENTS.index(j)) for j in FEET_ASKED.values()]
 NOISE = 0.003
 """Dequantisation (metres): constant bone lengths would else make the likelihood unbounded."""
 _SEGMENTS = 4
@@ -41,6 +51,9 @@ _ROOM = "boxes", "shapes", "root"  # what the sensor's sight is made of
 _AT_ONCE = 2  # windows: what is computed of them stays in a core's cache
 _AT_ONCE_ELSEWHERE = 50  # windows: enough to keep another device busy
 _FREE, _EE, _FULL = range(3)
+_WITH_TOES = 0.75  # share of the windows in which a foot's toe base is given with its ankle
+_ALL_OF_LEGS = 0.3  # share of FULL in which the whole lower body is given
+_LEGS_ALONE = 0.3  # share of those, in which the upper body is not
 
 
 @dataclass(frozen=True)
@@ -334,11 +347,17 @@ def chance(shape: Sequence[int], share: float, device: torch.device) -> Tensor:
     return drawn <= least - 1 if least else torch.zeros_like(drawn, dtype=torch.bool)
 
 
-def observation_for(upper: Tensor) -> tuple[Tensor, Tensor]:
+def observation_for(
+    upper: Tensor, lower: Tensor | None = None, legs: float = 0.0
+) -> tuple[Tensor, Tensor]:
     """A random observation (B, T, 66) of the true upper bodies (B, T, 42), and its mask (B, T, 22).
 
     In EE any subset of head and hands is given, in FULL the upper body with or without the pelvis.
     The mode may change between four segments of a window, as the author's code has it.
+
+    In a share ``legs`` of the windows something may be given of the true ``lower`` bodies (B, T,
+    24) as well: in EE any subset of head, hands and feet, in FULL either foot, or all of it, beside
+    the upper body or alone. A foot is its ankle, in three of four windows with the toe base.
     """
     windows, frames, _ = upper.shape
     device = upper.device
@@ -357,6 +376,43 @@ def observation_for(upper: Tensor) -> tuple[Tensor, Tensor]:
     body[..., _PELVIS] = with_pelvis.float()
     given[..., : len(UPPER)] = torch.where(full, body, given[..., : len(UPPER)])
     segment = torch.arange(frames, device=device) * _SEGMENTS // frames
-    mask = given[:, segment]
-    whole = torch.nn.functional.pad(upper, (0, 24))
+    if lower is None or not legs:
+        mask = given[:, segment]
+        whole = torch.nn.functional.pad(upper, (0, 24))
+    else:
+        some = torch.rand(windows, 1, 1, device=device) < legs
+        mask = torch.where(some, _with_legs(given, modes, lasts), given)[:, segment]
+        whole = torch.cat([upper, lower], dim=-1)
     return whole * mask.repeat_interleave(3, dim=-1), mask
+
+
+def _with_legs(given: Tensor, modes: Tensor, lasts: Tensor) -> Tensor:
+    """What is ``given`` (B, S, 22) of the upper bodies in segments of these ``modes`` (B, S), with
+    something of the legs; where a mode ``lasts`` (B, 1), the same joints all along.
+    """
+    windows, device = len(given), given.device
+
+    def drawn(count: int, share: float) -> Tensor:
+        found = torch.rand(windows, _SEGMENTS, count, device=device) < share
+        return torch.where(lasts[..., None], found[:, :1], found)
+
+    ee, full = ((modes == mode)[..., None] for mode in (_EE, _FULL))
+    five = drawn(len(_EFFECTORS) + len(_ANKLES), 0.5)
+    at_least = torch.rand(windows, _SEGMENTS, five.shape[-1], device=device).argsort(-1) == 0
+    five |= torch.where(lasts[..., None], at_least[:, :1], at_least)
+    feet = five[..., len(_EFFECTORS) :]
+    toes = torch.rand(windows, 1, 1, device=device) < _WITH_TOES
+
+    out = given.clone()
+    out[..., _EFFECTORS] = torch.where(
+        ee, five[..., : len(_EFFECTORS)].float(), out[..., _EFFECTORS]
+    )
+    out[..., _ANKLES] = (feet & (ee | full)).float()
+    out[..., _TOES] = (feet & toes & (ee | full)).float()
+
+    all_of_them = drawn(1, _ALL_OF_LEGS) & full
+    alone = drawn(1, _LEGS_ALONE) & all_of_them
+    joints = len(UPPER)
+    out[..., joints:] = torch.where(all_of_them, 1.0, out[..., joints:])
+    out[..., :joints] = torch.where(alone, 0.0, out[..., :joints])
+    return out

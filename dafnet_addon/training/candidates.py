@@ -87,7 +87,9 @@ def write_weights(folder: Path, dataset: Path, file: Path, device: str = "cpu") 
 
 
 def provenance(folder: Path, dataset: Path) -> dict[str, str]:
-    """What a weights file says of its making, as metadata: licence, data, and training."""
+    """What a weights file says of its making, as metadata: licence, data, training, and what it was
+    ``told`` of the body.
+    """
     runs = saved_runs(folder)
     training: dict[str, Any] = {
         part: {"steps": run.step, "minutes": round(run.seconds / 60, 1)}
@@ -97,7 +99,9 @@ def provenance(folder: Path, dataset: Path) -> dict[str, str]:
     if last.adopted:
         training["begun_with"] = last.adopted
 
+    told = ["head", "hands", "upper-body", *(["legs"] if last.config.legs_given else [])]
     return {
+        "told": " ".join(told),
         "licence": "CC-BY-4.0; provenance in LICENSE-WEIGHTS.md",
         "data": (dataset / "dataset.json").read_text(encoding="utf-8"),
         "training": json.dumps({**training, "settings": asdict(last.config)}),

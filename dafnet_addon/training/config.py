@@ -26,6 +26,7 @@ class TrainingConfig:
     of the windows (the paper hides them in all; then only whole layers of spheres are told apart,
     and seats are met to 12 cm).
     ``ahead_hidden``: share of windows in which the way ahead is hidden, as it is from a live root.
+    ``legs_given``: share in which feet, or the whole lower body, may be given (``batches``).
     ``clip_norm``: largest gradient norm. ``free_run``: weight of the losses of motion that the flow
     makes by itself (see ``free_run``; 0 as in the paper), which begins after ``captured`` frames of
     a window, in a share ``cold`` of the batches after the first, with an empty memory, as a take
@@ -49,6 +50,7 @@ class TrainingConfig:
     environment_dropout: float = 0.5
     dropout_windows: float = 0.5
     ahead_hidden: float = 0.0
+    legs_given: float = 0.0
     clip_norm: float = 50.0
     free_run: float = 0.0
     captured: int = 20

@@ -103,20 +103,26 @@ def free_run_loss(
     if part != "upper":
         legs, captured = (metres(each[..., -LOWER_SIZE:], lower) for each in (made, true))
         hips = metres(pelvis, slice(0, 3))[..., 0, :]
-        loss = loss + lower_loss(legs, captured, calm, hips, step)
+        loss = loss + lower_loss(legs, captured, calm, hips, step, given[..., len(UPPER) :])
 
     return loss
+
+
+def _missed(made: Tensor, true: Tensor, given: Tensor) -> Tensor:
+    """How far made joints (B, T, J, 3) are from the captured ones where these are ``given``
+    (B, T, J).
+    """
+    return ((made - true).norm(dim=-1) * given).sum() / given.sum().clamp_min(1.0)
 
 
 def upper_loss(made: Tensor, true: Tensor, calm: Tensor, given: Tensor) -> Tensor:
     """Loss of made upper bodies (B, T, 14, 3) beside the captured; ``calm`` (B,) where z = 0;
     ``given`` (B, T, 14).
     """
-    missed = ((made - true).norm(dim=-1) * given).sum() / given.sum().clamp_min(1.0)
     height = (made[..., 0, 2] - true[..., 0, 2]).abs().mean()
     return (
         _followed(made, true, calm)
-        + _GIVEN * missed
+        + _GIVEN * _missed(made, true, given)
         + _HEIGHT * height
         + _BONE * _bone_error(made, _UPPER_BONES)
     )
@@ -137,9 +143,16 @@ def sliding(feet: Tensor, step: Tensor) -> Tensor:
     return MODEL_FPS * ((feet[:, 1:, :, :2] - moved).square().sum(-1) + 1e-8).sqrt()
 
 
-def lower_loss(made: Tensor, true: Tensor, calm: Tensor, pelvis: Tensor, step: Tensor) -> Tensor:
-    """Loss of made lower bodies (B, T, 8, 3) under the captured ``pelvis`` (B, T, 3); the rest as
-    above.
+def lower_loss(
+    made: Tensor,
+    true: Tensor,
+    calm: Tensor,
+    pelvis: Tensor,
+    step: Tensor,
+    given: Tensor,
+) -> Tensor:
+    """Loss of made lower bodies (B, T, 8, 3) under the captured ``pelvis`` (B, T, 3); ``given``
+    (B, T, 8); the rest as above.
 
     Calm feet stay where the captured ones do; others where they themselves are low.
     """
@@ -151,4 +164,5 @@ def lower_loss(made: Tensor, true: Tensor, calm: Tensor, pelvis: Tensor, step: T
 
     weight = torch.where(calm[:, None, None], planted.float(), low)
     slid = (sliding(made[:, :, _FEET], step) * weight).sum() / weight.sum().clamp_min(1.0)
-    return _followed(made, true, calm) + _BONE * bones + _SLIDE * slid
+    missed = _GIVEN * _missed(made, true, given)
+    return _followed(made, true, calm) + _BONE * bones + _SLIDE * slid + missed

@@ -147,7 +147,8 @@ class FlowRun(Run):
         """
         wide = torch.bfloat16 if self.config.mixed else torch.float32
         occupancy = self.dropped_out(batch.seen, wide)
-        observation, given = observation_for(batch.upper)
+        legs = self.config.legs_given
+        observation, given = observation_for(batch.upper, batch.lower, legs)
         base = self._base(batch, occupancy)
 
         pose = torch.cat([batch.upper, batch.lower], dim=-1)

@@ -135,6 +135,35 @@ def test_observations_show_only_what_a_mode_gives():
     assert {row.index(1) for row in alone} == set(effectors), "one hand alone is a valid request"
 
 
+def test_observations_may_show_feet_and_legs():
+    upper, lower = torch.randn(4000, 4, 42), torch.randn(4000, 4, 24)
+    torch.manual_seed(3)
+    without = observation_for(upper)
+    torch.manual_seed(3)
+    assert all(map(torch.equal, observation_for(upper, lower, 0.0), without)), "off, to the bit"
+
+    observation, given = observation_for(upper, lower, 1.0)
+    mask = given.repeat_interleave(3, -1)
+    assert torch.equal(observation, torch.cat([upper, lower], dim=-1) * mask)
+    rows = {tuple(row) for row in given[:, 0].numpy().astype(int).tolist()}
+    legs = {row[14:] for row in rows}
+    assert {row for row in legs if sum(row) == 8} == {(1,) * 8}
+    # LOWER: hips, knees, ankles, feet
+    assert legs - {(1,) * 8} == {
+        (0, 0, 0, 0, left, right, left * toes, right * toes)
+        for left in (0, 1)
+        for right in (0, 1)
+        for toes in (0, 1)
+    }
+    uppers = {sum(row[:14]) for row in rows if sum(row[14:]) == 8}
+    assert uppers == {0, 13, 14}, "all of the legs beside an upper body, or alone"
+    assert any(sum(row[:14]) == 0 and row[14:] == (0, 0, 0, 0, 1, 0, 1, 0) for row in rows)
+    assert any(sum(row[:14]) == 0 and sum(row[14:]) == 0 for row in rows), "nothing at all is FREE"
+
+    few = observation_for(upper, lower, 0.3)[1][:, :, 14:].any(-1).any(-1).float().mean()
+    assert 0.05 < float(few) < 0.3
+
+
 def _pool(dataset: Path) -> Pool:
     return Pool(lambda: sorted(dataset.glob("pool-????.npz")), torch.device("cpu"))
 
@@ -637,13 +666,22 @@ def test_free_running_loss_is_zero_for_the_captured_motion_and_knows_sliding():
         torch.zeros(3, 8, 3),
     )
     assert float(upper_loss(upper, upper, calm, given)) < 1e-3
-    still = float(lower_loss(lower, lower, calm, upper[:, :, 0], step))
+    free = torch.zeros(3, 8, 8)
+    still = float(lower_loss(lower, lower, calm, upper[:, :, 0], step, free))
     assert still < 0.2  # where nothing moves, speeds are the square root's floor
     # The root goes 1 cm to the right each frame and turns; feet that stay in its frame slide over
     # the floor.
     step[..., 0] = 0.01
     assert torch.allclose(sliding(lower, step), torch.tensor(0.3), atol=1e-3)
-    assert float(lower_loss(lower, lower, ~calm, upper[:, :, 0], step)) > still + 1.0
+    assert float(lower_loss(lower, lower, ~calm, upper[:, :, 0], step, free)) > still + 1.0
+    asked = free.clone()
+    asked[..., 4:] = 1.0
+    away = lower + torch.tensor([0.0, 0.05, 0.0])
+    told, not_told = (
+        float(lower_loss(away, lower, ~calm, upper[:, :, 0], 0.0 * step, each))
+        for each in (asked, free)
+    )
+    assert told - not_told == pytest.approx(10.0, rel=0.01), "200 for each metre that feet are off"
     turning = torch.zeros(1, 2, 3)
     turning[..., 2] = 0.1
     fixed = torch.tensor([[0.0, 1.0, 0.0], [0.1, 0.995, 0.0]])[None, :, None]
