@@ -5,9 +5,8 @@ is capture, all of it.
 import numpy as np
 import pytest
 
-from dafnet_addon.core.kinematics import two_bone
 from dafnet_addon.core.rotations import yaw_matrix
-from dafnet_addon.core.skeleton import LOWER, OFFSETS, PARENTS, REST, joint
+from dafnet_addon.core.skeleton import LOWER, OFFSETS, PARENTS, joint
 from dafnet_addon.data.motion.canonical import pose_legs
 from dafnet_addon.data.motion.motion import Motion, motion_of
 from dafnet_addon.data.motion.uses import stroking, working
@@ -16,6 +15,7 @@ from dafnet_addon.data.synthesis.compose import composed
 from dafnet_addon.data.synthesis.joins import handed, joined, lent
 from dafnet_addon.data.synthesis.pieces import entrance
 from kit.places import MOCAP
+from kit.sitting import sit_down, standing
 
 BONES = np.linalg.norm(OFFSETS[1:], axis=1)
 TOES = [joint("left_foot"), joint("right_foot")]
@@ -26,42 +26,12 @@ def _lengths(joints: np.ndarray) -> np.ndarray:
     return np.linalg.norm(joints[:, 1:] - joints[:, list(PARENTS[1:])], axis=-1)
 
 
-def _standing(frames: int, sway: float = 0.0) -> np.ndarray:
-    """A body that stands with hanging arms and sways sideways by ``sway`` metres over planted
-    feet.
-    """
-    pose = REST.copy()
-    for side, sign in (("left_", -1.0), ("right_", 1.0)):
-        shoulder = REST[joint(side + "shoulder")]
-        wrist = shoulder + np.array([sign * 0.03, 0.12, -0.45])
-        middle = shoulder + np.array([sign * 0.1, -0.2, -0.25])
-        pose[joint(side + "elbow")], pose[joint(side + "wrist")] = two_bone(
-            shoulder, wrist, middle, 0.26, 0.25
-        )
-    pose[:, 2] -= np.where(np.isin(np.arange(22), LEGS), 0.0, 0.04)  # soft knees
-    pose[[joint("left_knee"), joint("right_knee")], 1] += 0.1
-    joints = np.repeat(pose[None], frames, axis=0)
-    upper = [j for j in range(22) if j not in LEGS]
-    joints[:, upper, 0] += sway * np.sin(np.arange(frames) * 2 * np.pi / 60)[:, None]
-    return pose_legs(joints)
-
-
-def _sit_down(frames: int = 150, start: int = 40) -> np.ndarray:
-    """The pelvis goes back and down to a seat in 45 frames and rests; feet stay."""
-    t = np.clip((np.arange(frames) - start) / 45, 0, 1)
-    ease = t * t * (3 - 2 * t)
-    joints = _standing(frames)
-    upper = [j for j in range(22) if j not in LEGS]
-    joints[:, upper] += np.array([0.0, -0.4, -0.36]) * ease[:, None, None]
-    return pose_legs(joints)
-
-
 def _speed(joints: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.diff(joints, axis=0), axis=-1).max(1) * 30
 
 
 def test_a_join_neither_jumps_nor_slides_a_standing_foot():
-    stand, sit = _standing(100, sway=0.05), _sit_down()
+    stand, sit = standing(100, sway=0.05), sit_down()
     sit[:, LEGS, 0] *= 1.4  # the feet of the one stand farther apart than the other's
     sit = pose_legs(sit)
     turned = sit @ yaw_matrix(np.array(2.0)).T + (3.0, -1.0, 0.0)
@@ -79,7 +49,7 @@ def test_a_join_neither_jumps_nor_slides_a_standing_foot():
 
 
 def test_a_foot_works_off_its_difference_while_it_swings():
-    stand, step = _standing(60), _standing(90)
+    stand, step = standing(60), standing(90)
     swing = np.clip((np.arange(90) - 40) / 20, 0, 1)
     step[:, [joint("left_ankle"), joint("left_foot")], 1] += (
         0.4 * (swing * swing * (3 - 2 * swing))[:, None]
@@ -94,8 +64,8 @@ def test_a_foot_works_off_its_difference_while_it_swings():
 
 
 def test_a_lent_upper_body_keeps_legs_and_moves_the_chest_and_arms_as_the_other_does():
-    sit = _sit_down()[100:]
-    waving = _standing(50)
+    sit = sit_down()[100:]
+    waving = standing(50)
     waving[:, joint("right_elbow")] = waving[:, joint("right_shoulder")] + (0.26, 0.0, 0.0)
     waving[:, joint("right_wrist")] = waving[:, joint("right_elbow")] + (0.0, 0.0, 0.25)
     seated = lent(sit, waving @ yaw_matrix(np.array(1.0)).T, np.linspace(0, 1, 50))
@@ -108,7 +78,7 @@ def test_a_lent_upper_body_keeps_legs_and_moves_the_chest_and_arms_as_the_other_
 
 
 def test_a_led_hand_is_where_it_is_led_and_the_other_is_left_alone():
-    body = _standing(40)
+    body = standing(40)
     wrist = np.tile([0.2, 0.3, 1.2], (40, 1))
     led = handed(body, "right_", wrist, np.linspace(0, 1, 40))
     assert np.abs(led[-1, joint("right_wrist")] - wrist[-1]).max() < 1e-6
@@ -119,13 +89,13 @@ def test_a_led_hand_is_where_it_is_led_and_the_other_is_left_alone():
 
 
 def test_nothing_is_composed_of_nothing():
-    still = motion_of("stand", "made", "one", "standing", _standing(100))
+    still = motion_of("stand", "made", "one", "standing", standing(100))
     assert composed([]) == [] and composed([still]) == []
 
 
 @pytest.fixture(scope="module")
 def captured(tmp_path_factory) -> list[Motion]:
-    from dafnet_addon.data.dataset.prepare import load_motions
+    from dafnet_addon.data.dataset.usable import load_motions
 
     folder = tmp_path_factory.mktemp("mocap")
     for name in ("rocketbox", "cmu69"):

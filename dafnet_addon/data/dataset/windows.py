@@ -5,18 +5,35 @@ Paper, section 5.2. Each draw picks a clip, may move a seat's height, mirror, re
 may roughen or smooth its root path as an animator would, and furnishes the room anew.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core.root import RootPath, ahead, root_from_joints, smoothed, to_root, velocities
+from ...core.root import (
+    POSITION_SIGMA,
+    RootPath,
+    ahead,
+    root_from_joints,
+    smoothed,
+    to_root,
+    velocities,
+)
 from ...core.skeleton import PELVIS
 from ..furnish.boxes import near
 from ..furnish.flesh import NO_BANK
 from ..furnish.furniture import furnished
 from ..furnish.shapes import ABSENT_SHAPE, SHAPES, ShapeBank
 from ..motion.motion import Motion, mirrored
+from ..motion.rests import resting
 from ..motion.retarget import at_seat_height, at_top_height
+from ..motion.timing import (
+    Transition,
+    at_clock,
+    clock_of,
+    smoothed_by_hand,
+    transitions,
+)
 from ..motion.uses import working
 
 __all__ = [
@@ -32,8 +49,12 @@ __all__ = [
 
 HISTORY, LENGTH = 10, 70
 _FRAMES = HISTORY + LENGTH
-_MARGIN = 32  # the root is smoothed over 24 frames and known 30 ahead
-_AROUND = 100  # frames before and after that, in which the body shows what furniture there is
+_MARGIN = 32  # frames that a root is known ahead, and two
+_AROUND = 130  # frames before and after a window, in which the body shows what furniture there is
+_KNOWN = 200  # frames before and after a moment that a window may be drawn of
+_SITS = 24  # frames of rest by which a seat is known
+_SMOOTHING = (POSITION_SIGMA, 20.0)  # frames; sigma of a root's path, from captured to keyed
+_WRONG = 0.25  # of the paths, that are a little off
 LOWEST, HIGHEST = 0.36, 0.95
 """Metres over the floor at which a pelvis may rest: from a step of 0.22 to a bar stool of 0.81."""
 _USUAL = 0.38, 0.66  # metres: the pelvis on sofas and chairs
@@ -59,21 +80,15 @@ class Window:
     shapes: np.ndarray
 
 
-def _retimed(joints: np.ndarray, speed: float) -> np.ndarray:
-    times = np.arange(0.0, len(joints) - 1, speed)
-    low = times.astype(int)
-    share = (times - low)[:, None, None]
-    return joints[low] * (1 - share) + joints[low + 1] * share
-
-
-def _animated_by_hand(rng: np.random.Generator, path: RootPath) -> RootPath:
-    """The root as an animator's curves give it: without the gait's sway, or smoothly a little
-    wrong.
+def _animated_by_hand(
+    rng: np.random.Generator, path: RootPath, ways: Sequence[Transition]
+) -> RootPath:
+    """The root as an animator's curves give it: without the gait's sway, and now and then smoothly
+    a little wrong.
     """
-    if rng.random() < 0.5:
-        path = smoothed(path, rng.uniform(4, 12), rng.uniform(4, 12))
-
-    if rng.random() < 0.5:
+    wanted = rng.uniform(*_SMOOTHING)
+    path = smoothed_by_hand(path, np.sqrt(wanted**2 - _SMOOTHING[0] ** 2), ways)
+    if rng.random() < _WRONG:
         wobble = smoothed(
             RootPath(rng.normal(size=path.position.shape), rng.normal(size=len(path))), 12.0, 12.0
         )
@@ -84,12 +99,24 @@ def _animated_by_hand(rng: np.random.Generator, path: RootPath) -> RootPath:
 
 
 def _farthest(valid: np.ndarray, frame: int, step: int) -> int:
-    """The last valid frame within ``_AROUND`` of a valid one, in the direction of ``step``."""
-    for _ in range(_AROUND):
+    """The last valid frame within ``_KNOWN`` of a valid one, in the direction of ``step``."""
+    for _ in range(_KNOWN):
         if not (0 <= frame + step < len(valid) and valid[frame + step]):
             break
         frame += step
     return frame
+
+
+def _whole_ways(ways: Sequence[Transition], start: int, stop: int, frames: int) -> slice:
+    """The frames ``start`` to ``stop`` of a motion, and as many more as it takes to begin and end
+    in the middle of no way to a seat or back: one sits down on what is known to be there.
+    """
+    for way in ways:
+        if way.start - _SITS < start < way.stop:
+            start = way.start - _SITS
+        if way.start < stop < way.stop + _SITS:
+            stop = way.stop + _SITS
+    return slice(max(0, start), min(stop, frames))
 
 
 def lowest_pelvis(height: float) -> float:
@@ -140,44 +167,50 @@ def draw(
     Real pieces of ``bank`` stand among the furniture, where one is given.
     """
     total = len(motion.joints)
-    speed = rng.uniform(0.85, 1.2) if rng.random() < 0.4 else 1.0
-    span = int(np.ceil(_FRAMES * speed)) + 2
-    if total < span:
-        return None
     if focus is None:
-        start = int(rng.integers(0, max(1, total - span)))
-    else:
-        start = int(np.clip(focus - rng.integers(HISTORY, span - 10), 0, max(0, total - span)))
-
-    low, high = max(0, start - _MARGIN), min(total, start + span + _MARGIN)
-    if not motion.valid[low:high].all():
+        focus = int(rng.integers(total))
+    if not motion.valid[focus]:
         return None
 
     # What is used a few seconds earlier or later is there meanwhile.
-    low, high = _farthest(motion.valid, low, -1), _farthest(motion.valid, high - 1, 1) + 1
+    low, high = _farthest(motion.valid, focus, -1), _farthest(motion.valid, focus, 1) + 1
     joints = motion.joints[low:high]
     rests = [r for r in motion.rests if r.start < high and r.end > low]
     if rests:
         height = float(rests[0].position[2])
         joints = at_seat_height(joints, height, _seat_height(rng, height))
         joints = at_another_desk(rng, joints)
-    if speed != 1.0:
-        joints = _retimed(joints, speed)
 
-    first = min(round((start - low) / speed), len(joints) - _FRAMES)
-    seated = bool(rests)
-    if rng.random() < (0.4 if seated else 0.08):
-        joints, first = joints[::-1], len(joints) - _FRAMES - first
+    backward = bool(rng.random() < (0.4 if rests else 0.08))
+    speed = rng.uniform(0.85, 1.2) if rng.random() < 0.4 else 1.0
+    ways = transitions(joints, [replace(r, start=r.start - low, end=r.end - low) for r in rests])
+    clock = clock_of(rng, len(joints), ways, speed, backward)
+    if len(clock) < _FRAMES:
+        return None
+
+    joints = at_clock(joints, clock)
+    frame = int(np.searchsorted(clock, focus - low))
+    if backward:
+        joints, frame = joints[::-1], len(joints) - 1 - frame
     if rng.random() < 0.5:
         joints = mirrored(joints)
 
+    first = int(np.clip(frame - rng.integers(HISTORY, _FRAMES - 10), 0, len(joints) - _FRAMES))
     path = root_from_joints(joints)
+    ways = transitions(joints, resting(joints, path))
+    # Seconds farther away nobody uses what this window shows.
+    kept = _whole_ways(ways, first - _AROUND, first + _FRAMES + _AROUND, len(joints))
+    joints, path, first = (
+        joints[kept],
+        RootPath(path.position[kept], path.yaw[kept]),
+        first - kept.start,
+    )
+    ways = [replace(w, start=w.start - kept.start, stop=w.stop - kept.start) for w in ways]
     seen = slice(max(0, first - _MARGIN), first + _FRAMES + _MARGIN)
     room, _ = furnished(rng, joints, path, bank, seen)
     if room is None:
         return None
-    if rng.random() < 0.5:
-        path = _animated_by_hand(rng, path)
+    path = _animated_by_hand(rng, path, ways)
 
     cut = slice(first, first + _FRAMES)
     poses = to_root(path, joints)[cut].reshape(_FRAMES, -1)
