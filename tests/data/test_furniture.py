@@ -12,9 +12,11 @@ from dafnet_addon.data.dataset.windows import at_another_desk
 from dafnet_addon.data.furnish.boxes import distances
 from dafnet_addon.data.furnish.fits import fit_report
 from dafnet_addon.data.furnish.flesh import probes
-from dafnet_addon.data.furnish.furniture import fitted, furnished, scattered, seat_for
+from dafnet_addon.data.furnish.furniture import fitted, furnished
 from dafnet_addon.data.furnish.real_pieces import LIES_OVER
+from dafnet_addon.data.furnish.seats import seat_for
 from dafnet_addon.data.furnish.shapes import PELVIS_OVER
+from dafnet_addon.data.furnish.strays import scattered
 from dafnet_addon.data.motion.canonical import pose_legs
 from dafnet_addon.data.motion.contacts import CONTACTS, contacts
 from dafnet_addon.data.motion.motion import motion_of

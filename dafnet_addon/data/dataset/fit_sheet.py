@@ -15,8 +15,8 @@ from ...core.files import whole_file
 from ...core.root import root_from_joints
 from ...core.rotations import normalised, yaw_matrix
 from ..furnish.flesh import Furnishing, probes
-from ..furnish.furniture import seat_for
 from ..furnish.real_pieces import bed_shape_for, desk_shape_for, seat_shape_for
+from ..furnish.seats import seat_for
 from ..furnish.shapes import ShapeBank
 from ..motion.motion import Motion
 from ..motion.rests import Rest, resting

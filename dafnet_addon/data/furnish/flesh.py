@@ -14,11 +14,14 @@ from .shapes import NO_SHAPES, ShapeBank
 
 __all__ = [
     "FAR",
+    "FOREARMS",
     "NO_BANK",
     "GIVES",
     "LIES_SUNK",
     "PROBES",
     "RADIUS",
+    "STEP",
+    "TRUNK",
     "Furnishing",
     "box_clearance",
     "clearance",
@@ -134,7 +137,18 @@ def pressed(rest: float, **parts: float) -> np.ndarray:
     return out
 
 
-def probes(joints: np.ndarray, step: int = 3) -> np.ndarray:
+STEP = 3
+"""Frames between those whose probes are tried."""
+TRUNK = [i for i, p in enumerate(PROBES) if p[0] in ("spine1", "spine3")]
+"""The probes of the loins and of the chest."""
+FOREARMS = [
+    [i for i, p in enumerate(PROBES) if p[1] == f"{side}_wrist" and p[2] <= 1.0]
+    for side in ("left", "right")
+]
+"""The probes of the left and the right forearm, from elbow to wrist."""
+
+
+def probes(joints: np.ndarray, step: int = STEP) -> np.ndarray:
     """Points (N, P, 3) of the body's flesh at every ``step``-th frame; their radii are known to
     this module.
     """

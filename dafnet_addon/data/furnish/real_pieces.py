@@ -14,6 +14,7 @@ from ..motion.rests import Rest
 from ..motion.uses import Use, across
 from .flesh import GIVES, LIES_SUNK, Furnishing, clearance, nearest_box, pressed, sunk
 from .shapes import STRETCH, Seat, ShapeBank
+from .sitters import leans_back
 
 __all__ = [
     "LIES_OVER",
@@ -47,6 +48,7 @@ _SHARES = {
     "desk": 0.01,
 }
 """How often each kind is sat on, among those that can be as high as the pelvis asks."""
+_LEANT_ON = ("chair", "armchair", "sofa")
 _PIECES, _PLACES = 5, 6  # tried for one rest, and on each of them
 _FROM_USUAL = (-0.08, 0.03)  # metres forward of where ``director.seats`` puts the pelvis, at first
 _LEAST_BEFORE = 0.1  # metres of seat that are left before the pelvis, where one sits forward
@@ -97,6 +99,8 @@ def seat_shape_for(
     """
     pelvis = float(rest.position[2])
     pieces = _pieces(bank, pelvis)
+    if leans_back(rest, points):
+        pieces = {kind: own for kind, own in pieces.items() if kind in _LEANT_ON}
     for _ in range(_PIECES if pieces else 0):
         seats = _drawn(rng, pieces)
         for place in range(_PLACES):

@@ -18,7 +18,7 @@ from ...core.errors import InputError
 from ...core.root import RootPath, raw_root_from_joints
 from ...core.solids import Scene
 from ..capture.mocap import Clip, read_clips
-from ..dataset.prepare import load_motions
+from ..dataset.usable import load_motions
 from ..furnish.flesh import Furnishing
 from ..motion.canonical import calibrate, canonical
 from ..motion.motion import Motion, mirrored, motion_of

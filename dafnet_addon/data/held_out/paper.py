@@ -37,11 +37,12 @@ from ...core.metrics import body_points
 from ...core.root import RootPath, raw_root_from_joints, root_from_joints, velocities
 from ...core.rotations import normalised, rotate, yaw_matrix
 from ...core.skeleton import ANKLES, FEET, PELVIS, REST, SEAT_TO_PELVIS, WRISTS, joint
-from ..dataset.prepare import load_motions
 from ..dataset.splits import TRAINED_ON_PARTLY
+from ..dataset.usable import load_motions
 from ..furnish.boxes import distances
 from ..furnish.flesh import probes
-from ..furnish.furniture import SeatKind, board_for, desk_for, seat_for
+from ..furnish.seats import SeatKind, seat_for
+from ..furnish.tops import board_for, desk_for
 from ..motion.contacts import contacts
 from ..motion.motion import Motion, mirrored
 from ..motion.rests import Rest, rest_of, resting
