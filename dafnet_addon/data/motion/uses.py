@@ -13,17 +13,17 @@ from ...core.rotations import normalised
 from ...core.series import MODEL_FPS, runs
 from ...core.skeleton import ANKLES, ELBOWS, KNEES, SHOULDERS, WRISTS, joint
 
-__all__ = ["Use", "across", "lying", "working", "stroking", "reaching"]
+__all__ = ["Use", "across", "lying", "miming", "working", "stroking", "reaching"]
 
 _PELVIS, _CHEST, _NECK = joint("pelvis"), joint("spine3"), joint("neck")
-_KNEES, _ANKLES = (
-    KNEES,
-    ANKLES,
-)
+_KNEES, _ANKLES = KNEES, ANKLES
 _SECOND = round(MODEL_FPS)
 _SHORT = 8
 _OFF_THE_FLOOR = 0.25
 _ONE_TOP = 0.08  # hands at heights that differ by less may share a table
+_BEFORE_THE_BODY = 0.08  # metres; a wrist that works in the air
+_UNDER_SHOULDERS = 0.12  # metres; a hand that is higher eats, or holds a telephone
+_MIMES = 0.35  # of the time that a hand is there, so that it counts as working
 
 
 @dataclass(frozen=True)
@@ -160,6 +160,32 @@ def working(joints: np.ndarray, path: RootPath) -> list[Use]:
         )
 
     return found
+
+
+def miming(joints: np.ndarray, path: RootPath) -> Use | None:
+    """Hands of a body that stays, which work in the air before it and mostly come back to one
+    level: where a top would have been. None where no hand does.
+
+    ``points`` are where wrists were within a hand's breadth of that level.
+    """
+    local = to_root(path, joints[:, WRISTS])
+    wrists, shoulders = joints[:, WRISTS], joints[:, SHOULDERS]
+    before = (
+        (local[..., 1] > _BEFORE_THE_BODY)
+        & (wrists[..., 2] < shoulders[..., 2] - _UNDER_SHOULDERS)
+        & (wrists[..., 2] > joints[:, [_PELVIS], 2])
+    )
+    low = []
+    for hand in (0, 1):
+        own = wrists[before[:, hand], hand]
+        if len(own) > _MIMES * len(joints):
+            level = np.quantile(own[:, 2], 0.15)
+            low.append(own[np.abs(own[:, 2] - level) < _ONE_TOP / 2])
+
+    if not low:
+        return None
+    away = _away(forward_of(path.yaw))
+    return Use("desk", 0, len(joints), np.concatenate(low), away)
 
 
 def stroking(joints: np.ndarray, path: RootPath) -> list[Use]:

@@ -7,6 +7,7 @@ is added are joins, lent upper bodies and courses of hands.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from ...core.rotations import normalised, rotate, yaw_matrix
 from ...core.series import runs
 from ...core.skeleton import PELVIS, SEAT_TO_PELVIS, joint
 from ..motion.motion import Motion, mirrored
+from ..motion.retarget import at_top_height
+from ..motion.uses import miming
 from .courses import AT_DESKS, course_through, drawing, lettering, wandering
 from .joins import (
     FEET,
@@ -45,8 +48,9 @@ from .pieces import (
     upper_bodies,
     ways_of,
 )
+from .postures import POSTURES, posture_of, sitting_in
 
-__all__ = ["LEANS", "at_board", "at_top", "composed", "seated_work"]
+__all__ = ["LEANS", "at_board", "at_top", "composed", "let_down", "seated_work"]
 
 _BUSY = {
     "standing_gesture",
@@ -57,12 +61,17 @@ _BUSY = {
     "reach-hand-task",
     "standing_idle",
 }
+_AT_DESKS = {"desk_mime"}  # standing: what is above the hips is lent to one who sits
+_AT_COUNTERS = {"kitchen_mime"}
+_COUNTERS = (0.72, 1.05)  # metres over the floor
+_OVER_SEATS = (0.24, 0.33)  # metres from a seat up to a desk
+_WRIST_OVER = 0.045  # metres, of one whose hand works on a top
 _HIGHEST_BED = 0.62
 # metres over a bed: of a body, against the bare floor; and of a wrist whose hand lies on it
 _CARRIES, _WRIST_LIES = 0.02, 0.09
 _TURNING = 66  # frames of getting onto a bed
 _WAITS = 90  # frames
-_SITS = 16  # sit-downs of one body that are composed with
+_SITS = 12  # sit-downs of one body that are composed with
 _IDLES = 45  # pieces of standing that are used, of many that are alike
 _BOARD = np.array([0.0, 0.6])  # from the root that stands before it; or a counter
 LEANS = (-0.3, -0.15, 0.0, 0.0, 0.15, 0.3)  # radians; back is positive
@@ -179,34 +188,79 @@ def at_board(rng: np.random.Generator, joints: np.ndarray, start: int, end: int)
     return handed(joints, "right_", wrist, presence(len(joints), start, end))
 
 
+def let_down(joints: np.ndarray, start: int, end: int, top: float) -> np.ndarray:
+    """The motion (T, 22, 3) whose hands mimed work in the air in frames ``start`` to ``end``, with
+    that work on a top at this height; what they lift, they lift as before. Unchanged where they
+    did no such work.
+    """
+    part = joints[start:end]
+    mimed = miming(part, root_from_joints(part))
+    if mimed is None:
+        return joints
+
+    use = replace(mimed, start=start, end=end)
+    return at_top_height(joints, use, top + _WRIST_OVER - float(use.points[:, 2].min()))
+
+
 def _while_seated(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed]:
     """Seated legs under upper bodies that gesture, greet and reach ("work"), or whose hands work at
-    a desk ("desk").
+    a desk ("desk"): led there, or let down from where somebody mimed it standing.
     """
     rng = np.random.default_rng(12)
     seated = upper_bodies(motions, {"seated_chair", "seated_table"})
-    busy = upper_bodies(motions, _BUSY) + seated
+    mimed = upper_bodies(motions, _AT_DESKS)
+    busy = upper_bodies(motions, _BUSY) + seated + mimed
     for sit in sits * 3:
-        for kind, uppers, leans in (("work", busy, LEANS), ("desk", seated, _AT_DESK_LEANS)):
+        for kind, uppers, leans in (
+            ("work", busy, LEANS),
+            ("desk", seated, _AT_DESK_LEANS),
+            ("desk", mimed, _AT_DESK_LEANS),
+        ):
             if not uppers:
                 continue
+
             upper = uppers[rng.integers(len(uppers))]
             upper = upper if rng.random() < 0.5 else mirrored(upper)
             body, rest = seated_work(rng, sit.joints, upper, leans)
             frames = len(body)
             if kind == "desk":
-                top = body[rest + 20, 0, 2] - SEAT_TO_PELVIS + rng.uniform(0.24, 0.33)
-                body = at_top(rng, body, rest + 5, frames + 60, top)
+                seat = body[rest + 20, PELVIS, 2] - SEAT_TO_PELVIS
+                top = float(seat + rng.uniform(*_OVER_SEATS))
+                body = (
+                    let_down(body, rest + 20, frames, top)
+                    if uppers is mimed
+                    else at_top(rng, body, rest + 5, frames + 60, top)
+                )
+
             yield from made(
                 kind, sit.name, sit.subject, "seated", body, np.arange(rest, frames - 20, 5)
             )
 
 
+def _in_postures(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed]:
+    """Who has sat down goes from one posture to another, hands and head as of somebody who sits."""
+    rng = np.random.default_rng(15)
+    seated = upper_bodies(motions, {"seated_chair", "seated_table"})
+    names, about = list(POSTURES), list(POSTURES.values())
+    share = np.array([row[0] for row in about])
+    for sit in sits * 2 if seated else ():
+        upper = seated[rng.integers(len(seated))]
+        body, rest = seated_work(rng, sit.joints, upper, (0.0,))
+        drawn = [names[k] for k in rng.choice(len(names), 2, p=share / share.sum())]
+        postures = [posture_of(rng, name) for name in drawn]
+        whole = sitting_in(rng, body, rest + 20, postures)
+        name = f"{drawn[0]}, then {drawn[1]}: {sit.name}"
+        yield from made(
+            "posture", name, sit.subject, "seated", whole, np.arange(rest + 20, len(whole) - 20, 5)
+        )
+
+
 def _while_standing(motions: list[Motion], to: Pool, away: Pool) -> Iterator[Composed]:
     """A walk up to a board ("write") or a counter ("counter"), work there on captured standing, and
-    a walk away.
+    a walk away; at some counters the work is what somebody mimed in a kitchen.
     """
     rng = np.random.default_rng(13)
+    mimed = upper_bodies(motions, _AT_COUNTERS)
     behind = range(DIRECTIONS // 4, 3 * DIRECTIONS // 4 + 1)
     idles = upper_bodies([m for m in motions if m.source != TOELESS], {"standing_idle", "standing"})
     for idle in idles[:: max(1, len(idles) // _IDLES)]:
@@ -223,8 +277,10 @@ def _while_standing(motions: list[Motion], to: Pool, away: Pool) -> Iterator[Com
                     joined(come[rng.integers(len(come))], stands), go[rng.integers(len(go))]
                 )
                 start, end = BEFORE + 8, BEFORE + WORKS - 4
-                if kind == "counter":
-                    whole = at_top(rng, whole, start, end, rng.uniform(0.72, 1.05))
+                if kind == "counter" and mimed and rng.random() < 0.5:
+                    whole = _in_a_kitchen(rng, whole, start, end, mimed)
+                elif kind == "counter":
+                    whole = at_top(rng, whole, start, end, rng.uniform(*_COUNTERS))
                 else:
                     whole = at_board(rng, whole, start, end)
                 if rng.random() < 0.5:
@@ -237,6 +293,20 @@ def _while_standing(motions: list[Motion], to: Pool, away: Pool) -> Iterator[Com
                     whole,
                     np.arange(start - 30, end + 30, 5),
                 )
+
+
+def _in_a_kitchen(
+    rng: np.random.Generator, joints: np.ndarray, start: int, end: int, mimed: list[np.ndarray]
+) -> np.ndarray:
+    """The motion whose upper body does in frames ``start`` to ``end`` what somebody mimed, with the
+    hands on a counter.
+    """
+    upper = mimed[rng.integers(len(mimed))]
+    upper = upper if rng.random() < 0.5 else mirrored(upper)
+    after = len(joints) - BEFORE - len(upper)
+    upper = np.pad(upper, ((BEFORE, max(0, after)), (0, 0), (0, 0)), mode="edge")[: len(joints)]
+    body = lent(joints, upper, presence(len(joints), start, end, 30))
+    return let_down(body, start + 30, end - 30, float(rng.uniform(*_COUNTERS)))
 
 
 def _lying_down(motions: list[Motion]) -> list[np.ndarray]:
@@ -346,7 +416,8 @@ def composed(motions: list[Motion]) -> list[Composed]:
     motions.
     """
     to, away = pool_of(motions, arriving=True), pool_of(motions, arriving=False)
-    sits = list(sit_downs(motions))
+    # Windows are seen in a mirror as often as not, whatever they are composed of.
+    sits = [sit for sit in sit_downs(motions) if not sit.in_mirror]
     # Many of those with borrowed arms, and all of them begin in front of the seat.
     sits = (
         _some_of_each_body([s for s in sits if not s.borrowed])
@@ -356,6 +427,7 @@ def composed(motions: list[Motion]) -> list[Composed]:
         *_to_and_from_seats(motions, sits, to, away),
         *_waiting(sits),
         *_while_seated(motions, sits),
+        *_in_postures(motions, sits),
         *_while_standing(motions, to, away),
         *_lying(motions, sits),
     ]

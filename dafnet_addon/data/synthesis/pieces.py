@@ -131,6 +131,7 @@ class Piece:
     subject: str
     borrowed: bool
     joints: np.ndarray
+    in_mirror: bool = False
 
 
 def sit_downs(motions: list[Motion]) -> Iterator[Piece]:
@@ -152,6 +153,7 @@ def sit_downs(motions: list[Motion]) -> Iterator[Piece]:
                         m.subject,
                         m.source == "ui_prmd",
                         mirrored(piece),
+                        in_mirror=True,
                     )
                 ended = end
 
