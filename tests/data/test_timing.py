@@ -4,11 +4,18 @@ import numpy as np
 import pytest
 
 from dafnet_addon.core.root import root_from_joints
-from dafnet_addon.core.skeleton import FEET, OFFSETS, PARENTS, PELVIS
+from dafnet_addon.core.skeleton import FEET, NECK, OFFSETS, PARENTS, PELVIS
 from dafnet_addon.data.dataset import windows
 from dafnet_addon.data.motion.motion import Motion, motion_of
 from dafnet_addon.data.motion.rests import resting
-from dafnet_addon.data.motion.timing import at_clock, clock_of, smoothed_by_hand, transitions
+from dafnet_addon.data.motion.timing import (
+    at_clock,
+    braced,
+    clock_of,
+    smoothed_by_hand,
+    stretches_of,
+    transitions,
+)
 from kit.sitting import sit_down, standing
 
 BONES = np.linalg.norm(OFFSETS[1:], axis=1)
@@ -36,7 +43,8 @@ def test_times_are_as_peoples_and_motion_is_as_smooth_as_before() -> None:
     taken: dict[bool, list[float]] = {True: [], False: []}
     ways = transitions(motion.joints, motion.rests)
     for _ in range(60):
-        joints = at_clock(motion.joints, clock_of(rng, len(motion.joints), ways))
+        clock = clock_of(len(motion.joints), ways, stretches_of(rng, ways))
+        joints = at_clock(motion.joints, clock)
         again = transitions(joints, resting(joints, root_from_joints(joints)))
         assert len(again) == 2
         for way in again:
@@ -62,14 +70,33 @@ def test_played_backward_what_was_a_way_down_takes_as_long_as_ways_up_do() -> No
     ways = [way for way in transitions(motion.joints, motion.rests) if way.down]
     taken = []
     for seed in range(60):
-        clock = clock_of(np.random.default_rng(seed), len(motion.joints), ways, backward=True)
-        joints = at_clock(motion.joints, clock)
+        stretches = stretches_of(np.random.default_rng(seed), ways, backward=True)
+        joints = at_clock(motion.joints, clock_of(len(motion.joints), ways, stretches))
         taken.append(transitions(joints, resting(joints, root_from_joints(joints)))[0].seconds)
     assert abs(np.median(taken) - 1.05) < 0.2, "between 0.6 and 2.2 s, most often 0.9"
 
 
+def test_who_takes_long_bends_forward_to_keep_the_balance() -> None:
+    motion = _down_and_up(30)
+    ways = transitions(motion.joints, motion.rests)
+    middle = (ways[0].start + ways[0].stop) // 2
+
+    def bent(joints: np.ndarray, frame: int) -> float:
+        trunk = joints[frame, NECK] - joints[frame, PELVIS]
+        return float(np.degrees(np.arctan2(trunk[1], trunk[2])))
+
+    slow, quick = (braced(motion.joints, ways, [s, s]) for s in (2.2 / ways[0].seconds, 1.0))
+    assert bent(motion.joints, middle) < 10.0
+    assert bent(slow, middle) == pytest.approx(38.0, abs=4.0)
+    assert bent(quick, middle) == pytest.approx(18.0, abs=4.0)
+    for joints in (slow, quick):
+        assert np.abs(joints[:, FEET] - motion.joints[:, FEET]).max() < 1e-3
+        assert abs(bent(joints, ways[0].stop + 40) - bent(motion.joints, ways[0].stop + 40)) < 1.0
+        assert abs(bent(joints, 5) - bent(motion.joints, 5)) < 1.0
+
+
 def test_another_speed_alone_reads_frames_evenly() -> None:
-    clock = clock_of(np.random.default_rng(0), 100, [], speed=1.25)
+    clock = clock_of(100, [], [], speed=1.25)
     assert np.allclose(np.diff(clock), 1.25) and 79 <= len(clock) <= 80
 
 

@@ -30,8 +30,10 @@ from ..motion.retarget import at_seat_height, at_top_height
 from ..motion.timing import (
     Transition,
     at_clock,
+    braced,
     clock_of,
     smoothed_by_hand,
+    stretches_of,
     transitions,
 )
 from ..motion.uses import working
@@ -184,11 +186,12 @@ def draw(
     backward = bool(rng.random() < (0.4 if rests else 0.08))
     speed = rng.uniform(0.85, 1.2) if rng.random() < 0.4 else 1.0
     ways = transitions(joints, [replace(r, start=r.start - low, end=r.end - low) for r in rests])
-    clock = clock_of(rng, len(joints), ways, speed, backward)
+    stretches = stretches_of(rng, ways, backward)
+    clock = clock_of(len(joints), ways, stretches, speed)
     if len(clock) < _FRAMES:
         return None
 
-    joints = at_clock(joints, clock)
+    joints = at_clock(braced(joints, ways, stretches), clock)
     frame = int(np.searchsorted(clock, focus - low))
     if backward:
         joints, frame = joints[::-1], len(joints) - 1 - frame

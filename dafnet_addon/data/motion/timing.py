@@ -11,12 +11,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.root import RootPath, gaussian
+from ...core.root import RootPath, gaussian, root_from_joints, to_root
 from ...core.series import MODEL_FPS, smoothstep
-from ...core.skeleton import PELVIS
+from ...core.skeleton import NECK, PELVIS
+from ..synthesis.joins import swayed
 from .rests import Rest
 
-__all__ = ["SLOWEST", "Transition", "at_clock", "clock_of", "smoothed_by_hand", "transitions"]
+__all__ = [
+    "Transition",
+    "at_clock",
+    "braced",
+    "clock_of",
+    "smoothed_by_hand",
+    "stretches_of",
+    "transitions",
+]
 
 QUICKEST, SLOWEST = 0.6, 2.2
 """Seconds from 10 to 90 % of the way down or up, between which motion is retimed."""
@@ -33,6 +42,7 @@ _BLEND = 4.0  # frames; sigma of the change from one speed to another
 _OF_TRANSITION = 0.25
 """Sigma of a root's smoothing at a seat, at most, as a share of the way's time: a path that was
 smoothed more would tell of a slower descent than the body's."""
+_BENT = np.radians([18.0, 38.0])  # of a trunk half-way, on the quickest and the slowest ways
 _FADES = 20  # frames over which one smoothing goes over into another
 
 
@@ -99,21 +109,52 @@ def transitions(joints: np.ndarray, rests: Sequence[Rest]) -> list[Transition]:
     return sorted((t for t in found if t), key=lambda t: t.start)
 
 
-def clock_of(
-    rng: np.random.Generator,
-    frames: int,
-    ways: Sequence[Transition],
-    speed: float = 1.0,
-    backward: bool = False,
-) -> np.ndarray:
-    """Frames of a motion (N,), fractions of them too, at which it is to be read to go at another
-    ``speed``, its ways down and up taking times as people's do; ``backward``: it will be played so.
+def stretches_of(
+    rng: np.random.Generator, ways: Sequence[Transition], backward: bool = False
+) -> list[float]:
+    """How many times as long each way is to take as it was captured, for times as people's are;
+    ``backward``: it will be played so.
     """
-    rate = np.full(frames, np.log(speed))
+    stretches = []
     for way in ways:
         usual = USUAL_DOWN if way.down != backward else USUAL_UP
         wanted = np.exp(rng.triangular(*np.log([QUICKEST, usual, SLOWEST])))
-        stretch = np.clip(wanted / way.seconds, *_STRETCHED)
+        stretches.append(float(np.clip(wanted / way.seconds, *_STRETCHED)))
+    return stretches
+
+
+def braced(
+    joints: np.ndarray, ways: Sequence[Transition], stretches: Sequence[float]
+) -> np.ndarray:
+    """The motion (T, 22, 3) whose trunk bends forward as far on its ways as it takes to keep one's
+    balance for so long: who drops onto a seat falls the last of it, who takes two seconds cannot.
+    """
+    path = root_from_joints(joints)
+    trunk = to_root(path, joints[:, NECK]) - to_root(path, joints[:, PELVIS])
+    bent = np.arctan2(trunk[:, 1], trunk[:, 2])
+    further = np.zeros(len(joints))
+    frames = np.arange(len(joints))
+    for way, stretch in zip(ways, stretches, strict=True):
+        middle = (way.start + way.stop) // 2
+        wanted = np.interp(way.seconds * stretch, (QUICKEST, SLOWEST), _BENT)
+        lacks = max(0.0, float(wanted - bent[middle]))
+        first, last = sorted((way.begins, way.stop if way.down else way.start))
+        half = max(middle - first, last - middle) + _ROUND
+        further += lacks * smoothstep(1.5 * (1.0 - np.abs(frames - middle) / half))
+    return swayed(joints, -further, np.zeros(len(joints))) if further.any() else joints
+
+
+def clock_of(
+    frames: int,
+    ways: Sequence[Transition],
+    stretches: Sequence[float],
+    speed: float = 1.0,
+) -> np.ndarray:
+    """Frames of a motion (N,), fractions of them too, at which it is to be read to go at another
+    ``speed``, and its ways down and up in so many times as long as they were.
+    """
+    rate = np.full(frames, np.log(speed))
+    for way, stretch in zip(ways, stretches, strict=True):
         first, last = (
             (way.begins, way.stop + _ROUND) if way.down else (way.start - _ROUND, way.begins)
         )
