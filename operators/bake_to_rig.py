@@ -36,6 +36,7 @@ class DAFNET_OT_bake_to_rig(DafnetOperator, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> None:
         """Bake, and say how near the result is."""
         rig: Any = rig_of(context)
+
         own = rig.dafnet_rig
         baked = bake_onto_rig(
             context,
@@ -45,8 +46,10 @@ class DAFNET_OT_bake_to_rig(DafnetOperator, bpy.types.Operator):
             root_motion=own.root_motion,
             limbs=own.limbs,
         )
+
         if off := _deviations(baked):
             bones = ", ".join(f"'{bone}'" for bone in baked.overruled[:3])
+
             why = (
                 f"mute the constraints and drivers of {bones} and bake again"
                 if bones

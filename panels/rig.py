@@ -60,9 +60,11 @@ class DAFNET_PT_rig(bpy.types.Panel):
         layout = self.layout
         rig: Any = rig_of(context)
         own = rig.dafnet_rig
+
         row = layout.row()
         row.label(text=rig.name, icon="ARMATURE_DATA")
         row.label(text=own.convention)
+
         row = layout.row(align=True)
         row.operator(DAFNET_OT_detect_rig.bl_idname, icon="VIEWZOOM")
         row.operator_menu_enum(DAFNET_OT_load_rig_map.bl_idname, "preset", text="", icon="PRESET")
@@ -81,6 +83,7 @@ class DAFNET_PT_rig(bpy.types.Panel):
             column.prop_search(own, "root_bone", rig.data, "bones")
 
         column.prop(own, "limbs")
+
         row = layout.row()
         row.scale_y = 1.5
         row.operator(DAFNET_OT_bake_to_rig.bl_idname, icon="ACTION")

@@ -44,24 +44,30 @@ class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
         _, seat = character_and_goal(context)
         curve, source = (character_and_source(context, fits)[1] for fits in (is_curve, may_move))
         points = floor_points(context)
+
         column = self.layout.column(align=True)
         row = column.row(align=True)
         row.enabled = seat is not None
         text = f"Sit on {seat.name}" if seat else "Sit on Selected"
         row.operator(DAFNET_OT_walk_to.bl_idname, text=text, icon="TRACKING_FORWARDS").goal = "SEAT"
+
         column.operator(
             DAFNET_OT_walk_to.bl_idname, text="Walk to Cursor", icon="PIVOT_CURSOR"
         ).goal = "CURSOR"
+
         text = f"Walk along {curve.name}" if curve else DAFNET_OT_walk_along_curve.bl_label
         column.operator(DAFNET_OT_walk_along_curve.bl_idname, text=text, icon="CURVE_DATA")
+
         text = (
             f"Walk through {len(points)} Points"
             if len(points) > 1
             else DAFNET_OT_walk_through_points.bl_label
         )
         column.operator(DAFNET_OT_walk_through_points.bl_idname, text=text, icon="EMPTY_AXIS")
+
         text = f"Root from {source.name}" if source else DAFNET_OT_root_from_object.bl_label
         column.operator(DAFNET_OT_root_from_object.bl_idname, text=text, icon="CON_FOLLOWPATH")
+
         column = self.layout.column(align=True)
         column.operator(DAFNET_OT_find_furniture.bl_idname, icon="VIEWZOOM")
         column.operator(DAFNET_OT_add_targets.bl_idname, icon="EMPTY_ARROWS")

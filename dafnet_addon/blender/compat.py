@@ -50,20 +50,19 @@ def new_action(
 
 
 def assign_action(owner: bpy.types.Object, action: bpy.types.Action) -> None:
-    """Let ``owner`` play ``action`` and nothing mixed into it; a slot that is not assigned plays
-    nothing.
-    """
+    """Let ``owner`` play ``action``, with nothing mixed into it."""
     data = owner.animation_data_create()
     data.action = action
     data.action_blend_type, data.action_influence = "REPLACE", 1.0
     if _SLOTS:
+        # Without one the action would not play.
         data.action_slot = action.slots[0]
 
 
 def playback_restorer(owner: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
-    """A function that lets ``owner`` play again what it plays now, mixed as it is now.
+    """A function that makes ``owner`` play again what it plays now, mixed as it is now.
 
-    It is given the object, which may have to be found again after an undo.
+    It takes the object, which may have to be found again after an undo.
     """
     data = owner.animation_data
     if data is None:

@@ -56,9 +56,11 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="the scene to use instead of the one that is active in the file",
     )
+
     parser.add_argument(
         "--character", metavar="ARMATURE", help="needed where the scene has several characters"
     )
+
     for name, setting in _OBJECTS.items():
         parser.add_argument(
             f"--{name}", dest=setting, metavar="NAME", help="overrides the character's own setting"
@@ -71,6 +73,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="A:B",
         help="first and last frame; write --frames=A:B if A is negative",
     )
+
     for name, effect in _SHARES.items():
         parser.add_argument(f"--{name}", type=number(float, 0.0, 1.0), metavar="SHARE", help=effect)
 
@@ -81,6 +84,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="how many takes; the first one plays",
     )
+
     add_noise(parser, temperature=None)
     add_weights(parser)
 
@@ -107,6 +111,7 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
         progress=progress,
         changes=_changes(options),
     )
+
     report: dict[str, Any] = {
         "output": str(output),
         "takes": [
@@ -124,6 +129,7 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
         "warnings": list(result.warnings),
         "seconds": {stage: round(spent, 4) for stage, spent in result.seconds.items()},
     }
+
     return report, _as_text(report)
 
 

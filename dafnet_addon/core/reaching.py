@@ -82,6 +82,7 @@ def bring_head(pose: Pose, head: np.ndarray, fixed: tuple[int, ...] = ()) -> Non
     meant = frames[:, trunk].copy()
 
     pose.place(*_TRUNK, HEAD)
+
     for _ in range(_HEAD_ROUNDS if trunk else 0):
         for k, j in enumerate(trunk):
             turn = rotation_between(joints[:, HEAD] - joints[:, j], head - joints[:, j])

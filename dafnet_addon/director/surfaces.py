@@ -114,9 +114,12 @@ def parts_of_surfaces(
         return []
 
     longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(1)
+
     parts = np.maximum(1, np.ceil(longest / spacing)).astype(int)
+
     coarser = np.sqrt(max(1.0, float((parts.astype(float) ** 2 / 2).sum()) / _MAX_POINTS))
     parts = np.maximum(1, np.ceil(parts / coarser)).astype(int)
+
     found, done = [], 0
     for n in np.unique(parts):
         alike = triangles[parts == n]

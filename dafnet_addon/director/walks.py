@@ -228,6 +228,7 @@ def _way(
         yield 0.2 * k / len(parts)
 
     blocked = yield from within(_blocked(field, _RADIUS), 0.2, 0.2)
+
     ends = []
     for end in both:
         ends.append(_nearest_free(blocked, field.index(end)))

@@ -260,6 +260,7 @@ def _armature_object(
     collection.objects.link(armature)
     context.view_layer.objects.active = armature
     bpy.ops.object.mode_set(mode="EDIT")
+
     for j, joint_name in enumerate(JOINTS):
         bone = armature.data.edit_bones.new(joint_name)
         bone.head = scale * FACING @ REST[j]

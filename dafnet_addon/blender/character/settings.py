@@ -101,6 +101,7 @@ def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides:
         "upper_body_source",
         "upper_body_take",
     )
+
     values: dict[str, Any] = {
         name: target.name_full if (target := getattr(own, name)) else None for name in links
     }
@@ -112,4 +113,5 @@ def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides:
             for name in ("seed", "temperature", "take_count", "blend_frames", *CLEAN_UP)
         },
     }
+
     return Settings(armature=armature.name_full, scene=scene.name_full, **(values | overrides))

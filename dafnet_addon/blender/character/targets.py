@@ -83,8 +83,10 @@ def add_targets(context: bpy.types.Context, armature: bpy.types.Object) -> list[
         bone, name, shown = _TARGETS[role]
         target = bpy.data.objects.new(f"{armature.name} {name}", None)
         target.empty_display_type, target.empty_display_size = "ARROWS", shown * size
+
         target.location = evaluated.matrix_world @ evaluated.pose.bones[bone].head
         armature.users_collection[0].objects.link(target)
+
         setattr(armature.dafnet, role, target)
         added.append(target)
 

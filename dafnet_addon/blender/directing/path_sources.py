@@ -21,7 +21,7 @@ from ..compat import action_curves
 from ..scene.dependencies import Dependencies
 from ..scene.lookup import find_object
 from ..scene.playback import play_steps
-from .root_keys import MOVES, key_route, keyable_root, unchanged_on_failure
+from .root_keys import MOVES, first_key, key_route, keyable_root, unchanged_on_failure
 from .walking import Start, Walk, extend_range, passage_warnings, rest_at, start_of, walk
 
 __all__ = [
@@ -242,17 +242,14 @@ def along_curve(
     """
     settings, name = settings_of(armature, context.scene), curve.name
     line = _line_of(context, curve)[:: -1 if backwards else 1]
-    keys = [
-        p.co[0]
-        for c in action_curves(keyable_root(settings))
-        if c.data_path in MOVES
-        for p in c.keyframe_points
-    ]
+    first = first_key(keyable_root(settings))
+
     at = yield from within(start_of(context, settings, context.scene.frame_current), 0.0, _READ)
     points = line[:, :2] * at.unit
     away = float(np.linalg.norm(points[0] - at.place[:2]))
+
     start = None
-    if away < _THERE or (keys and min(keys) < at.first):
+    if away < _THERE or (first is not None and first < at.first):
         start = yield from within(rest_at(at), _READ, _READ)
     if start is not None and away >= _THERE:
         way = yield from within(_corners_through(at, start, [points[0]]), _READ, _FOUND)
@@ -321,20 +318,20 @@ def along_object(
     scene, name = context.scene, source.name
     settings = settings_of(armature, scene)
     keys = [
-        p.co[0]
-        for c in action_curves(source)
-        if c.data_path == "location"
-        for p in c.keyframe_points
+        point.co[0]
+        for curve in action_curves(source)
+        if curve.data_path == "location"
+        for point in curve.keyframe_points
     ]
-    first, last = (
-        (int(np.floor(min(keys))), int(np.ceil(max(keys))))
-        if keys
-        else (scene.frame_start, scene.frame_end)
-    )
+    first, last = scene.frame_start, scene.frame_end
+    if keys:
+        first, last = int(np.floor(min(keys))), int(np.ceil(max(keys)))
+
     moves = places_over_time.steps(context, source, range(first, last + 1))
     at = yield from within(start_of(context, settings, first), 0.0, _READ)
     places = (yield from within(moves, _READ, _FOUND))[:, :2] * at.unit
     moved = followed(places, at.fps, at.yaw, at.floor)
+
     fastest = float(np.linalg.norm(np.diff(moved.path.position, axis=0), axis=1).max() * at.fps)
     hurried = (
         f"'{name}' moves at up to {fastest:.1f} m/s, faster than this character can walk; "
@@ -370,6 +367,7 @@ def through_points(
         context.scene.cursor.location
     ] * to_cursor
     flat = [np.array(spot, float)[:2] for spot in spots]
+
     at = yield from within(start_of(context, settings), 0.0, _READ)
     places = [spot * at.unit for spot in flat]
     if len(places) > 1 and np.linalg.norm(places[0] - at.place[:2]) < _SAME_PLACE:
@@ -377,6 +375,7 @@ def through_points(
 
     start = yield from within(rest_at(at), _READ, _READ)
     way = yield from within(_corners_through(at, start, places), _READ, _FOUND)
+
     last = way[-1] - (way[-2] if len(way) > 1 else np.array(start.position))
     via = [(float(x), float(y)) for x, y in way]
     goal = Stop(via.pop(), facing(last), seconds)

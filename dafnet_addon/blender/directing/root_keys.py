@@ -16,7 +16,15 @@ from ..compat import action_curves, shares_curves
 from ..scene.lookup import find_object
 from ..scene.playback import frame_kept
 
-__all__ = ["MOVES", "keyable_root", "key_route", "last_key", "unchanged_on_failure", "write_keys"]
+__all__ = [
+    "MOVES",
+    "first_key",
+    "keyable_root",
+    "key_route",
+    "last_key",
+    "unchanged_on_failure",
+    "write_keys",
+]
 
 MOVES = ("location", "rotation_euler")
 """What is keyed of a root."""
@@ -110,13 +118,22 @@ def _reasons_in_curve(curve: bpy.types.FCurve) -> Iterator[str]:
 
 def last_key(root: bpy.types.Object) -> int | None:
     """The frame of a root's last key, rounded up; None where it has no keys."""
-    keyed = [
-        float(p.co[0])
-        for c in action_curves(root)
-        if c.data_path in MOVES
-        for p in c.keyframe_points
+    frames = _key_frames(root)
+    return int(np.ceil(max(frames))) if frames else None
+
+
+def first_key(root: bpy.types.Object) -> float | None:
+    """The frame of a root's first key; None where it has no keys."""
+    return min(_key_frames(root), default=None)
+
+
+def _key_frames(root: bpy.types.Object) -> list[float]:
+    return [
+        float(point.co[0])
+        for curve in action_curves(root)
+        if curve.data_path in MOVES
+        for point in curve.keyframe_points
     ]
-    return int(np.ceil(max(keyed))) if keyed else None
 
 
 @contextmanager

@@ -87,13 +87,13 @@ def start_of(
     ((size, location, yaw),) = seen
     unit = metres_per_unit(scene) / size
     return Start(
-        first,
-        scene.render.fps / scene.render.fps_base,
-        unit,
-        size,
-        location * unit,
-        yaw,
-        scaled(Scene(solids), 1.0 / size),
+        first=first,
+        fps=scene.render.fps / scene.render.fps_base,
+        unit=unit,
+        size=size,
+        place=location * unit,
+        yaw=yaw,
+        scene=scaled(Scene(solids), 1.0 / size),
     )
 
 
@@ -127,11 +127,12 @@ def walk(
     settings = settings_of(armature, scene, furniture=furniture.name_full if furniture else None)
     names = [seat.name, *(child.name for child in seat.children_recursive)] if seat else []
     goal = np.array(scene.cursor.location, float)
+
     start = yield from within(start_of(context, settings), 0.0, _READ)
-    found = yield from within(
+    route, met, warnings = yield from within(
         _route(start, names, goal[:2] * start.unit, seconds, speed), _READ, 1.0
     )
-    route, met, warnings = found
+
     root = keyable_root(settings)
     character = find_object(settings, settings.armature, "character")
     own = find_collection(settings.furniture) if settings.furniture is not None else None
@@ -189,41 +190,56 @@ def _route(
     """The walk in metres of the canonical body to the seat, whose parts have these ``names``, or
     where there are none to ``goal`` (2,); the furniture that it leads through; warnings.
     """
-    solids, floor, size = start.scene.solids, start.floor, start.size
     here = yield from within(rest_at(start), 0.0, 0.05)
-    if not names:
-        away = goal - start.place[:2]
-        end = Stop((float(goal[0]), float(goal[1])), facing(away), seconds)
-        way = walk_to.steps(solids, here, end, speed, start.fps, floor, size)
-        route = yield from within(way, 0.05, 0.6)
-        met = met_along.steps(start.scene, route.path, start.fps, end=())
-        passages = yield from within(met, 0.6, 0.95)
-        doubt = yield from within(
-            unit_doubt.steps(solids, route.path.position[:, :2], floor, size), 0.95, 1.0
+    if names:
+        route, passages = yield from within(
+            _route_to_seat(start, here, names, seconds, speed), 0.05, 1.0
         )
-        return route, passages, (doubt,) if doubt else ()
+        return route, passages, ()
 
+    solids, floor, size = start.scene.solids, start.floor, start.size
+    end = Stop((float(goal[0]), float(goal[1])), facing(goal - start.place[:2]), seconds)
+    way = walk_to.steps(solids, here, end, speed, start.fps, floor, size)
+    route = yield from within(way, 0.05, 0.6)
+
+    met = met_along.steps(start.scene, route.path, start.fps, end=())
+    passages = yield from within(met, 0.6, 0.95)
+    doubt = yield from within(
+        unit_doubt.steps(solids, route.path.position[:, :2], floor, size), 0.95, 1.0
+    )
+    return route, passages, (doubt,) if doubt else ()
+
+
+def _route_to_seat(
+    start: Start, here: Stop, names: Sequence[str], seconds: float, speed: float
+) -> Generator[float, None, tuple[Route, tuple[Passage, ...]]]:
+    """The walk from ``here`` to the seat, and the furniture that it leads through. ``InputError``
+    where something stands before the seat.
+    """
+    solids, floor, size = start.scene.solids, start.floor, start.size
     seat, *_ = names
     parts = [solid for solid in solids if solid.name in names]
     if not parts:
         raise InputError(f"'{seat}' is not in the character's furniture collection; move it there.")
 
     spot = yield from within(
-        seat_of.steps(parts, start.place[:2], floor, seat, size=size), 0.05, 0.2
+        seat_of.steps(parts, start.place[:2], floor, seat, size=size), 0.0, 0.15
     )
     end = Stop((float(spot.position[0]), float(spot.position[1])), spot.yaw, seconds, seated=True)
     way = walk_to.steps(solids, here, end, speed, start.fps, floor, size)
-    route = yield from within(way, 0.2, 0.6)
+    route = yield from within(way, 0.15, 0.6)
+
     sat_on = SatOn(spot.position, spot.height, frozenset(solid.name for solid in parts))
     met = met_along.steps(start.scene, route.path, start.fps, [sat_on])
     passages = yield from within(met, 0.6, 1.0)
+
     gap = np.linalg.norm(route.path.position[:, :2] - spot.position, axis=1)
-    comes = int(np.flatnonzero(gap > _SITTING_DOWN)[-1])
+    sits_down_after = int(np.flatnonzero(gap > _SITTING_DOWN)[-1])
     for each in passages:
-        if each.stop - 1 > comes and each.name not in names:
+        if each.stop - 1 > sits_down_after and each.name not in names:
             raise InputError(
                 f"'{each.name}' is in the way of sitting down on '{seat}'; pull "
                 f"'{seat}' out, or choose another seat."
             )
 
-    return route, passages, ()
+    return route, passages

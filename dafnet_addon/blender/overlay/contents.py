@@ -131,6 +131,7 @@ def _path(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Drawi
     action, scene, own = played_take(armature), context.scene, armature.dafnet
     unit = metres_per_unit(scene)
     fps = scene.render.fps / scene.render.fps_base
+
     ranges = (
         scene.frame_start,
         scene.frame_end,

@@ -72,6 +72,7 @@ def _keyed_matrices(root: bpy.types.Object, frames: range) -> np.ndarray | None:
         )
 
     basis = np.tile(np.eye(4), (len(frames), 1, 1))
+
     basis[:, :3, 3] = values("location", root.location)
     if root.rotation_mode == "QUATERNION":
         basis[:, :3, :3] = matrix_from_quaternion(

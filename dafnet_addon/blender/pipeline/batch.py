@@ -132,6 +132,7 @@ def _warnings_about_file(in_place: bool) -> Iterator[str]:
             f"The file was saved by Blender {bpy.data.version[0]}.{bpy.data.version[1]}, which is "
             "newer than this one"
         )
+
         if in_place:
             raise InputError(f"{newer}; bake it with that Blender, or name an output.")
         yield (

@@ -1,4 +1,4 @@
-"""Copies of animation curves, with everything that makes them play as they do."""
+"""Copies animation curves with everything that makes them play as they do."""
 
 from collections.abc import Callable
 from typing import Any
@@ -19,7 +19,7 @@ _NOT_COPIED = {
     "lock",
     "name",
 }
-"""Properties that follow from others, that say what is selected, or that are copied apart."""
+"""Properties that follow from others, say what is selected, or are copied separately."""
 _KINDS = {"FLOAT": np.float32, "INT": np.int32, "ENUM": np.int32, "BOOLEAN": np.bool_}
 
 
@@ -36,7 +36,9 @@ def copy_curve(
     group = source.group
     target = add_curve(source.data_path, source.array_index, group.name if group else "")
     _copy_properties(source, target, ("data_path", "array_index"))
-    _copy_keys(source, target)  # after the settings, some of which let Blender lay the handles anew
+    _copy_keys(
+        source, target
+    )  # after the settings: some of them make Blender recompute the handles
     for modifier in source.modifiers:
         _copy_modifier(modifier, target.modifiers.new(modifier.type))
 
@@ -82,7 +84,7 @@ def _copy_modifier(source: bpy.types.FModifier, target: bpy.types.FModifier) -> 
     old, new = source.control_points, target.control_points
     for k in range(len(old)):
         new.add(float(k))
-    # set one by one, each may crash Blender: it takes the point for a modifier then
+    # Not point by point: setting a single one may crash Blender, which takes it for a modifier.
     for name in ("frame", "min", "max"):
         values = np.empty(len(old), np.float32)
         old.foreach_get(name, values)
@@ -90,7 +92,7 @@ def _copy_modifier(source: bpy.types.FModifier, target: bpy.types.FModifier) -> 
 
 
 def _copy_properties(source: Any, target: Any, skipped: tuple[str, ...] = ()) -> None:
-    """Copy all plain properties of ``source`` but some to ``target``."""
+    """Copy all plain properties of ``source`` to ``target``, except those ``skipped``."""
     for kind in source.bl_rna.properties:
         if (
             kind.type in {*_KINDS, "STRING"}

@@ -100,6 +100,7 @@ def run(
     started = perf_counter()
     used = names_in_use(settings)
     resume, resume_frame = _kept_take(settings)
+
     try:
         read = yield from within(read_scene.steps(context, settings), 0.0, _READ)
     except ReferenceError as error:
@@ -134,6 +135,7 @@ def run(
     seconds |= takes[0].seconds | {"fitting": sum(take.seconds["fitting"] for take in takes)}
     seconds["baking"] = perf_counter() - started
     yield 1.0
+
     return Result(
         actions=tuple(actions),
         takes=tuple(takes),
@@ -183,6 +185,7 @@ def _bake_steps(
         undo.callback(_remove_bake, settings, names, state_restorer(_character(settings)))
         for take, draw in zip(takes, draws, strict=True):
             armature = _character(settings)
+
             with undone_on_failure(armature):
                 unit = metres_per_unit(find_scene(settings))
                 start = settings.frame_start
@@ -191,6 +194,7 @@ def _bake_steps(
                     armature, action, take=take, controls=controls, draw=draw, frame_start=start
                 )
                 names.append(action.name_full)
+
             if len(names) < len(takes):
                 yield len(names) / len(takes)
 

@@ -108,6 +108,7 @@ def bake_onto_rig(
 
     controls = controls_of(rig, rig_map, limbs, root_motion == "BONE")
     recording = _record(context, character, rig, frames)
+
     options = _BakeOptions(
         root_motion=root_motion,
         limbs=limbs,
@@ -116,6 +117,7 @@ def bake_onto_rig(
         size=size,
         unit=unit,
     )
+
     with frame_kept(context.scene), undone_on_failure(rig):
         return _bake(
             context,
@@ -152,6 +154,7 @@ def _bake(
     recording: _Recording,
     options: _BakeOptions,
 ) -> Baked:
+
     previous = rig.animation_data.action if rig.animation_data else None
     add_curve = prepare_rig(
         context,
@@ -162,16 +165,20 @@ def _bake(
         name=options.name,
         first=options.frames[0],
     )
+
     action = rig.animation_data.action
 
     attachments = find_attachments(context, rig, controls)
+
     evaluated = evaluated_now(context, rig)
     places = [rig_map.place(joint) for joint in JOINTS]
+
     basis = np.array(rig.matrix_basis, float)
     still = recording.above @ basis
     _, scale = rigid_parts(still, f"armature '{rig.name}'")
 
     shape = shape_of(rig, rig_map, pose_matrices(evaluated, places), scale)
+
     path, _ = root_from_matrices(_facing(recording.bodies))
     motion = character_motion(character, recording.bodies, recording.poses)
     retargeted = retarget(motion, canonical_body(options.size), shape.body, path.position)
@@ -200,6 +207,7 @@ def _bake(
         )
         for index, control in enumerate(controls)
     }
+
     if previous:
         previous.use_fake_user = True
 
@@ -222,6 +230,7 @@ def _bake(
         source=motion.joints,
         options=options,
     )
+
     return Baked(
         action=action,
         errors=errors,
@@ -364,6 +373,7 @@ def _measure(
         "head": off[:, [HEAD]],
         "pelvis": off[:, HIPS].mean(axis=1, keepdims=True),
     }
+
     errors = {
         part: mean_and_largest(options.unit * np.linalg.norm(values, axis=-1))
         for part, values in parts.items()

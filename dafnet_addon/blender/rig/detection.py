@@ -155,6 +155,7 @@ def _guess_map(armature: bpy.types.Object) -> RigMap:
         for joint in ("spine1", "spine2", "neck", "left_hip", "right_hip")
         if joint in joints
     ]
+
     put("pelvis", _carrier(armature, joints.get("pelvis"), above))
     return RigMap(
         "Guessed", joints=joints, root=first(None, {"root", "master"}, [joints.get("pelvis", "")])

@@ -301,10 +301,12 @@ def _driven(owner: bpy.types.ID, paths: str | tuple[str, ...]) -> Iterator[_Aspe
             yield from _aspects(
                 bpy.data.objects.get(name) for name in _QUOTED.findall(curve.driver.expression)
             )
+
         for variable in curve.driver.variables:
             for target in variable.targets:
                 if target.id is None:
                     continue
+
                 path = target.data_path if variable.type == "SINGLE_PROP" else ""
                 if _is_setting(path):
                     yield _Aspect(target.id, path)

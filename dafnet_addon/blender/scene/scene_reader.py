@@ -131,6 +131,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     frames = range(settings.frame_start, settings.frame_end + 1)
     simulations = dependencies.simulations([root, *targets.values(), *members], shaped=False)
     simulations += dependencies.simulations(sources)
+
     # Furniture is read once, at the first frame, by when these have given it a shape.
     simulations += [each for each in dependencies.simulations(members) if each.since < frames[0]]
     tracks = _Tracks(armature, root=root, targets=targets, source=source, places=places)

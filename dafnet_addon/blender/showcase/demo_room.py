@@ -149,7 +149,7 @@ FURNITURE: dict[str, tuple[Part, ...]] = {
 }
 """Pieces of furniture, part by part."""
 
-_SHELL = (  # the room itself: no furniture, since nobody sits on a wall
+_SHELL = (  # the room itself is not furniture, since nobody sits on a wall
     Part("Floor", (9.6, 8.6, 0.10), (1.45, -1.80, -0.05), bevel=0.0),
     Part("Wall", (7.0, 0.10, 2.45), (0.15, 2.55, 1.175), bevel=0.0),
     Part("Wall", (0.10, 5.6, 2.45), (-3.40, -0.30, 1.175), bevel=0.0),
@@ -180,8 +180,8 @@ _COLOURS = {
 
 @dataclass(frozen=True)
 class Room:
-    """The built room: its ``scene``, the character's ``armature`` (its ``dafnet`` settings made)
-    and the ``route``.
+    """The room once it is built: its ``scene``, the character's ``armature``, with its settings,
+    and the ``route`` of its root.
     """
 
     scene: bpy.types.Scene
@@ -195,8 +195,10 @@ def build_room(context: bpy.types.Context) -> Room:
     """
     scene = context.scene
     walked = demo_route()
+
     scene.render.fps, scene.render.fps_base = FPS, 1.0
     scene.frame_start, scene.frame_end = 1, len(walked.path)
+
     shell = new_collection(scene, "Room")
     add_piece(shell, "Room", _SHELL, Place((0.0, 0.0), 0.0))
     furniture = new_collection(scene, "Furniture")
@@ -209,15 +211,18 @@ def build_room(context: bpy.types.Context) -> Room:
     armature = create_character(context)
     settings = armature.dafnet
     settings.furniture = furniture
+
     frames = np.arange(1, len(walked.path) + 1)
     turns = np.zeros((len(frames), 3))
     turns[:, 2] = walked.path.yaw
     key_channels(settings.root, frames, location=walked.path.position, rotation_euler=turns)
 
     board = next(rest for rest in walked.rests if rest.place.name == "Whiteboard")
+
     hand = settings.hand_right
     key_channels(hand, frames, location=hand_target(board, frames - 1))
     hand.empty_display_size = 0.08
+
     settings.head = settings.hand_left = None  # the animator asks for the drawing hand only
     for frame, mode in ((1, "FREE"), (board.start + 5, "EE"), (board.stop - 6, "FREE")):
         settings.mode = mode
@@ -260,6 +265,7 @@ def run_demo(
     )
     save_text(folder / "report.json", json.dumps(report, indent=2))
     save_scene(folder / "demo.blend", lambda: progress(generating), compress=True)
+
     if preview:
         frames = np.linspace(room.scene.frame_start, room.scene.frame_end, 16).astype(int).tolist()
         render_sheet(room.scene, folder / "sheet.png", frames)
@@ -327,6 +333,7 @@ def _add(shape: bmesh.types.BMesh, part: Part, material: int) -> None:
         for face in piece.faces
         if len(face.verts) > 4 or (not part.round and face.calc_area() > wide)
     }
+
     vertices = {vertex: shape.verts.new(vertex.co) for vertex in piece.verts}
     for face in piece.faces:
         copy = shape.faces.new([vertices[v] for v in face.verts])

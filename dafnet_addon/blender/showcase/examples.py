@@ -1,4 +1,4 @@
-"""Small scenes to begin with, at the 3D cursor: furniture, a character, its keyed root, mode and
+"""Small scenes to begin with: furniture at the 3D cursor and a character with keyed root, mode and
 targets, ready to generate.
 """
 
@@ -151,6 +151,7 @@ def _bed(fps: float) -> Plan:
         Stop((0.0, 0.0), 0.0, 0.7, seated=True),
         fps=fps,
     )
+
     start = len(sits.path)
     frames = start + round((lasts + stays) * fps)
     after = (np.arange(frames) - start) / fps
@@ -158,7 +159,7 @@ def _bed(fps: float) -> Plan:
     def eased(begin: float, seconds: float) -> np.ndarray:
         return smoothstep((after - begin) / seconds)
 
-    # One leans back before one turns: the legs then come up first, else they would swing through
+    # The body leans back before it turns, so that the legs come up first and do not swing through
     # the bed.
     turned = eased(0.7, 1.9)
     yaw = np.concatenate([sits.path.yaw, np.zeros(frames - start)])
@@ -193,6 +194,7 @@ def _bed(fps: float) -> Plan:
         sits.rests[1],
         Rest(Stop((0.0, -inward), turn), frames - round(stays * fps), frames),
     )
+
     return Plan(Route(path, rests), targets, (start, frames))
 
 
@@ -228,7 +230,7 @@ EXAMPLES = {
 def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
     """Add an example at the 3D cursor, from the scene's first frame on, and return its character.
 
-    The furniture comes into a new collection; the scene's end is moved where the example is longer.
+    The furniture goes into a new collection; the scene's end is moved if the example is longer.
     ``InputError``: Blender is not in object mode; nothing is changed then.
     """
     if context.mode != "OBJECT":
@@ -243,9 +245,9 @@ def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
 
     furniture = new_collection(scene, example.label)
     for name, (parts, place) in example.pieces.items():
-        made = add_piece(furniture, name, parts, place)
-        made.data.transform(Matrix.Scale(1.0 / unit, 4))
-        made.location = middle + made.location / unit
+        piece = add_piece(furniture, name, parts, place)
+        piece.data.transform(Matrix.Scale(1.0 / unit, 4))
+        piece.location = middle + piece.location / unit
 
     path, first = plan.route.path, scene.frame_start
     try:
@@ -258,18 +260,20 @@ def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
     own = armature.dafnet
     own.furniture = furniture
     placed = Route(RootPath(path.position + np.array(middle) * unit, path.yaw), plan.route.rests)
+
     write_keys(own.root, placed, first=first, scale=1.0 / unit, fps=fps)
     _direct(armature, plan, first=first, middle=np.array(middle), unit=unit)
     extend_range(scene, armature, first + len(path) - 1)
     scene.frame_set(first)
+
     return armature
 
 
 def _direct(
     armature: bpy.types.Object, plan: Plan, *, first: int, middle: np.ndarray, unit: float
 ) -> None:
-    """Key the targets while they count, and the mode; targets without a plan are kept, without
-    influence.
+    """Key the mode, and the targets while they count; targets that the plan does not use stay, but
+    have no influence.
     """
     own = armature.dafnet
     for role in ("head", "hand_left", "hand_right"):

@@ -30,7 +30,7 @@ Colour = tuple[float, float, float]
 
 _FLOOR: Colour = (0.86, 0.86, 0.85)
 _EXPOSURE = 0.65
-"""Stops; the studio light alone would leave white at a middle grey."""
+"""Stops; with the studio light alone white would be a middle grey."""
 _JOINTS_DARKER = 0.45
 """How far a mannequin's joints are mixed with a dark grey."""
 _LENS = 70.0
@@ -46,8 +46,8 @@ def mixed(a: Colour, b: Colour, share: float) -> Colour:
 
 
 def solids(parts: Iterable[Part], place: Place) -> list[Box]:
-    """A piece of furniture as the network is told of it: each part a box, a round one of the same
-    area.
+    """A piece of furniture as the network knows it: each part a box, for a round one a box of the
+    same area.
     """
     turn = yaw_matrix(np.array(place.yaw))
     out = []
@@ -71,22 +71,28 @@ class Stage:
         self.scene = bpy.context.scene
         self.seen: list[np.ndarray] = []
         """Points (N, 3) that the picture has to hold."""
+
         self._materials: dict[Colour, bpy.types.Material] = {}
+
         azimuth, elevation = np.radians([toward, above])
         level = np.array([np.cos(azimuth), np.sin(azimuth)])
         back = np.append(level * np.cos(elevation), np.sin(elevation))
         right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
         self.axes = np.stack([right, np.cross(back, right), back])
-        """(3, 3) rows right, up and back of the camera."""
+        """(3, 3): rows are the camera's right, up and back."""
+
         self._light_from = azimuth + np.radians(-35.0)
+
         self._camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
         self._camera.data.lens, self._camera.data.sensor_width = _LENS, _SENSOR
         self._camera.data.sensor_fit = "HORIZONTAL"
         self.scene.collection.objects.link(self._camera)
         self.scene.camera = self._camera
+
         self._place = np.zeros(3)
         self._reach = np.ones(2)
         self._size = (1, 1)
+
         self._template, self._bones, self._rest = self._mannequin()
         floor = 60.0 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
         self._mesh("Floor", floor, [(0, 1, 2, 3)], _FLOOR)
@@ -98,6 +104,7 @@ class Stage:
         armature = bpy.data.objects.new("Mannequin", bpy.data.armatures.new("Mannequin"))
         collection = bpy.data.collections.new("Template")  # in no scene, so never drawn
         body = add_body(collection, armature, 1.0)
+
         names = [group.name for group in body.vertex_groups]
         bones = np.array(
             [JOINTS.index(names[vertex.groups[0].group]) for vertex in body.data.vertices]
@@ -108,11 +115,11 @@ class Stage:
 
     def _material(self, colour: Colour) -> bpy.types.Material:
         if colour not in self._materials:
-            made = bpy.data.materials.new("Colour")
+            material = bpy.data.materials.new("Colour")
             shown = np.array(colour)
             linear = np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
-            made.diffuse_color = (*linear.tolist(), 1.0)
-            self._materials[colour] = made
+            material.diffuse_color = (*linear.tolist(), 1.0)
+            self._materials[colour] = material
         return self._materials[colour]
 
     def _mesh(
@@ -125,8 +132,8 @@ class Stage:
 
     def furnish(self, parts: Iterable[Part], place: Place) -> None:
         """Put a piece of furniture there."""
-        made = add_piece(self.scene.collection, "Furniture", parts, place)
-        corners = np.array([tuple(corner) for corner in made.bound_box])
+        piece = add_piece(self.scene.collection, "Furniture", parts, place)
+        corners = np.array([tuple(corner) for corner in piece.bound_box])
         self.seen.append(
             rotate(yaw_matrix(np.array(place.yaw)), corners) + np.array([*place.position, 0.0])
         )
@@ -136,10 +143,12 @@ class Stage:
         metres.
         """
         joints = forward_kinematics(frames, pelvis)
+
         vertices = joints[self._bones] + rotate(frames[self._bones], self._rest)
         mesh = self._template.copy()
         mesh.vertices.foreach_set("co", vertices.astype(np.float32).ravel())
         mesh.update()
+
         darker = mixed(colour, (0.10, 0.10, 0.12), _JOINTS_DARKER)
         for slot, each in enumerate((colour, darker)):
             mesh.materials[slot] = self._material(each)
@@ -156,9 +165,11 @@ class Stage:
             2,
             True,
         )
+
         spline = curve.splines.new("POLY")
         spline.points.add(len(points) - 1)
         spline.points.foreach_set("co", np.c_[points, np.ones(len(points))].ravel())
+
         curve.materials.append(self._material(colour))
         self.scene.collection.objects.link(bpy.data.objects.new("Line", curve))
         self.seen.append(points)
@@ -184,8 +195,8 @@ class Stage:
     def look(
         self, width: int, height: int, margin: float = 0.05, seen: np.ndarray | None = None
     ) -> None:
-        """Let the camera stand as near as holds all points (N, 3) that are ``seen``, else all that
-        was put on the stage.
+        """Place the camera as near as it can be and still see all points (N, 3) of ``seen``, or
+        else all that was put on the stage.
 
         ``margin``: share of the picture that stays free at each edge.
         """
@@ -220,9 +231,11 @@ class Stage:
         """Write the picture that the camera sees as a PNG."""
         use_workbench(self.scene, *self._size)
         self.scene.view_settings.exposure = _EXPOSURE
+
         display = self.scene.display
         display.render_aa = "8"
         display.shading.show_specular_highlight = False  # or the floor would not be of one tone
+
         # Blender's studio light lies in a frame whose y is up and whose z comes towards a
         # viewer who looks along +y.
         display.light_direction = (
@@ -231,6 +244,7 @@ class Stage:
             -0.6 * np.sin(self._light_from),
         )
         display.shading.shadow_intensity = 0.30
+
         output_image(self.scene)
         self.scene.render.image_settings.color_mode = "RGB"
         self.scene.render.dither_intensity = 0.0  # noise that no palette would keep small
