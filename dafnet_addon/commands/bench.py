@@ -47,8 +47,8 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
     if options.name in _MEASURES:
         if options.furniture and options.name != "rest":
             raise InputError(
-                f"'{options.name}' knows no furniture library; leave --furniture out, or measure "
-                "'rest'."
+                f"'{options.name}' does not use a furniture library; leave --furniture out, or "
+                "measure 'rest'."
             )
         among = {"library": options.furniture} if options.furniture else {}
         found: Result = module.measure(options.weights, progress, **among)
@@ -62,9 +62,9 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
 COMMAND = Command(
     name="bench",
     summary=(
-        "measure: 'rest' cleans up who hovers over seats or sinks into them; 'seats' sits on ten "
-        "heights from three sides; 'speed' times every system; "
-        "'canonical' fits bodies to the skeleton; 'ablation' and 'tables' train and compare"
+        "measure: 'rest' cleans up bodies that hover over seats or sink into them; 'seats' sits on "
+        "ten heights from three sides; 'speed' times every system; 'canonical' fits bodies to the "
+        "skeleton; 'ablation' and 'tables' train and compare"
     ),
     add_arguments=_add_arguments,
     run=_run,
