@@ -5,7 +5,7 @@ themselves.
 from .add_character import DAFNET_OT_add_character
 from .add_example import DAFNET_OT_add_example
 from .add_root import DAFNET_OT_add_root
-from .add_targets import DAFNET_OT_add_targets
+from .add_targets import DAFNET_OT_add_foot_targets, DAFNET_OT_add_targets
 from .bake_to_rig import DAFNET_OT_bake_to_rig
 from .find_furniture import DAFNET_OT_find_furniture
 from .follow_path import (
@@ -43,6 +43,7 @@ CLASSES = (
     DAFNET_OT_root_from_object,
     DAFNET_OT_find_furniture,
     DAFNET_OT_add_root,
+    DAFNET_OT_add_foot_targets,
     DAFNET_OT_add_targets,
     DAFNET_OT_add_example,
     DAFNET_OT_detect_rig,

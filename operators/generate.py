@@ -8,6 +8,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ..dafnet_addon.blender.character.armature import character_of
+from ..dafnet_addon.blender.character.settings import COMES_AND_GOES, HELD
 from ..dafnet_addon.blender.character.takes import active_take, draw_of, frames_of
 from ..dafnet_addon.blender.overlay import display
 from ..dafnet_addon.blender.pipeline import job
@@ -104,6 +105,7 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
             take_count=1,
             seed=draw.seed,
             temperature=draw.temperature,
+            noise=HELD if draw.held else COMES_AND_GOES,
             frame_start=first,
             frame_end=last,
             lower_seed=(draw.lower_seed or 0) + 1,

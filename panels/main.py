@@ -2,15 +2,22 @@
 and Generate.
 """
 
+from collections.abc import Sequence
+
 import bpy
 
 from ..dafnet_addon.blender.character.armature import character_and_goal, character_of
-from ..dafnet_addon.blender.character.targets import lacks_root, missing_targets
+from ..dafnet_addon.blender.character.targets import (
+    FEET,
+    HEAD_AND_HANDS,
+    lacks_root,
+    missing_targets,
+)
 from ..dafnet_addon.blender.compat import action_curves
 from ..dafnet_addon.blender.pipeline.running import running_job
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.add_root import DAFNET_OT_add_root
-from ..operators.add_targets import DAFNET_OT_add_targets
+from ..operators.add_targets import DAFNET_OT_add_foot_targets, DAFNET_OT_add_targets
 from ..operators.find_furniture import DAFNET_OT_find_furniture
 from ..operators.generate import DAFNET_OT_cancel, DAFNET_OT_generate
 from ..operators.walk_to import DAFNET_OT_walk_to
@@ -95,15 +102,13 @@ class DAFNET_PT_character(bpy.types.Panel):
             row.operator(DAFNET_OT_add_root.bl_idname, text="", icon="ADD")
 
         if settings.mode == "EE" or animated:
-            column = layout.column()
-            for role in ("head", "hand_left", "hand_right"):
-                column.prop(settings, role)
-                row = column.row()
-                row.use_property_decorate = True
-                row.active = getattr(settings, role) is not None
-                row.prop(settings, f"{role}_influence", text="Influence", slider=True)
-            if missing_targets(context, character):
-                column.operator(DAFNET_OT_add_targets.bl_idname, icon="EMPTY_ARROWS")
+            _draw_targets(layout.column(), settings, HEAD_AND_HANDS)
+            if missing_targets(context, character, HEAD_AND_HANDS):
+                layout.operator(DAFNET_OT_add_targets.bl_idname, icon="EMPTY_ARROWS")
+        if settings.mode != "FREE" or animated:
+            _draw_targets(layout.column(), settings, FEET)
+            if missing_targets(context, character, FEET):
+                layout.operator(DAFNET_OT_add_foot_targets.bl_idname, icon="EMPTY_ARROWS")
 
         if settings.mode == "FULL" or animated:
             layout.prop(settings, "upper_body_source", icon="ARMATURE_DATA")
@@ -120,9 +125,24 @@ class DAFNET_PT_character(bpy.types.Panel):
 
         column = layout.column()
         column.prop(settings, "temperature", slider=True)
+        row = column.row()
+        row.active = settings.temperature > 0.0 or settings.take_count > 1
+        row.prop(settings, "noise")
         column.prop(settings, "seed")
         column.prop(settings, "take_count")
 
         row = layout.row()
         row.scale_y = 1.5
         row.operator(DAFNET_OT_generate.bl_idname, icon="PLAY").task = "NEW"
+
+
+def _draw_targets(
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, roles: Sequence[str]
+) -> None:
+    """Draw each target and how far it counts."""
+    for role in roles:
+        layout.prop(settings, role)
+        row = layout.row()
+        row.use_property_decorate = True
+        row.active = getattr(settings, role) is not None
+        row.prop(settings, f"{role}_influence", text="Influence", slider=True)

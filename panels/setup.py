@@ -13,7 +13,7 @@ from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.blender.showcase.examples import EXAMPLES
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.add_example import DAFNET_OT_add_example
-from ..operators.add_targets import DAFNET_OT_add_targets
+from ..operators.add_targets import DAFNET_OT_add_foot_targets, DAFNET_OT_add_targets
 from ..operators.find_furniture import DAFNET_OT_find_furniture
 from ..operators.follow_path import (
     DAFNET_OT_root_from_object,
@@ -71,6 +71,13 @@ class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
         column = self.layout.column(align=True)
         column.operator(DAFNET_OT_find_furniture.bl_idname, icon="VIEWZOOM")
         column.operator(DAFNET_OT_add_targets.bl_idname, icon="EMPTY_ARROWS")
+        column.operator(DAFNET_OT_add_foot_targets.bl_idname, icon="EMPTY_ARROWS")
+        if seat is not None:
+            column = self.layout.column(align=True)
+            column.prop(seat.dafnet, "guess_softness", text=f"Guess How Soft {seat.name} Is")
+            row = column.row(align=True)
+            row.enabled = not seat.dafnet.guess_softness
+            row.prop(seat.dafnet, "softness", text="Softness, cm")
 
 
 class DAFNET_MT_add(bpy.types.Menu):

@@ -17,6 +17,8 @@ _OBJECTS = {
     "head": "head",
     "hand-left": "hand_left",
     "hand-right": "hand_right",
+    "foot-left": "foot_left",
+    "foot-right": "foot_right",
     "upper-body": "upper_body_source",
 }
 """Options that name an object or a collection, and the character's settings that they override."""
@@ -26,17 +28,21 @@ _SHARES = {
     "rest-on-seats": (
         "0 leaves the body as generated, 1 brings it to where the seat it rests on carries it"
     ),
-    "reach-targets": "0 leaves head and hands as generated, 1 puts them onto their targets",
+    "reach-targets": "0 leaves head, hands and feet as generated, 1 puts them onto targets",
     "clear-furniture": "0 leaves hands and feet as generated, 1 moves them out of furniture",
     "smooth": "0 leaves the motion as generated, 1 smooths out abrupt changes",
 }
 """Options of the clean-up, each from 0 to 1, and what they do."""
+
+_NOISES = {"comes-and-goes": "COMES_AND_GOES", "held": "HELD"}
+"""The words of the option ``--noise``, and the setting's values."""
 
 _SETTINGS = (
     *_OBJECTS.values(),
     "mode",
     "temperature",
     "seed",
+    "noise",
     *(name.replace("-", "_") for name in _SHARES),
 )
 """The character's settings that the command may override, each by the option of its name."""
@@ -86,12 +92,18 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
     add_noise(parser, temperature=None)
+    parser.add_argument(
+        "--noise",
+        choices=sorted(_NOISES),
+        help="whether what makes takes differ varies during a take, as in real motion, or is held",
+    )
     add_weights(parser)
 
 
 def _changes(options: argparse.Namespace) -> dict[str, Any]:
     """What the options set on the character, by the setting's name."""
     changes = {setting: getattr(options, setting) for setting in _SETTINGS}
+    changes["noise"] = _NOISES.get(options.noise)
     if options.frames:
         changes["frame_start"], changes["frame_end"] = options.frames
     return {setting: value for setting, value in changes.items() if value is not None}

@@ -63,7 +63,8 @@ _LEGS_UNHEARD = (
 @dataclass(frozen=True)
 class Draw:
     """What one take is drawn with: ``seed`` and ``temperature``; the legs may have their own, None
-    goes with the body's.
+    goes with the body's. ``held``: only the noise that lasts all along a take, as in the paper;
+    else what comes and goes in real motion as well, where the weights know it.
 
     Seeds are whole numbers from 0 to ``MAX_SEED``, temperatures from 0 to 10. Raises InputError
     for others.
@@ -73,6 +74,7 @@ class Draw:
     lower_seed: int | None = None
     temperature: float = 0.0
     lower_temperature: float | None = None
+    held: bool = False
 
     def __post_init__(self) -> None:
         hold = partial(object.__setattr__, self)
@@ -303,7 +305,7 @@ def takes_steps(
     frames = len(shot.conditions)
     z = np.concatenate(
         [
-            sampler.noise(frames, d.seed, d.lower_seed, d.temperature, d.lower_temperature)
+            sampler.noise(frames, d.seed, d.lower_seed, d.temperature, d.lower_temperature, d.held)
             for d in draws
         ],
         axis=1,
@@ -424,6 +426,7 @@ def generate(
     seed: int = 0,
     lower_seed: int | None = None,
     temperature: float = 0.0,
+    held: bool = False,
     resume: Take | None = None,
     resume_frame: int = 0,
     device: str | None = None,
@@ -432,13 +435,14 @@ def generate(
     """Generate one take; yields progress in [0, 1] and returns the ``Take``.
 
     ``temperature`` scales the take's noise; 0 is the pose at z = 0, 1 the spread of captured takes.
-    ``lower_seed``: another seed for the legs. The rest is as in ``takes_steps``.
+    ``lower_seed``: another seed for the legs. ``held``: see ``Draw``. The rest is as in
+    ``takes_steps``.
     """
     takes = yield from takes_steps(
         scene,
         controls,
         weights,
-        [Draw(seed, lower_seed, temperature)],
+        [Draw(seed, lower_seed, temperature, held=held)],
         resume=resume,
         resume_frame=resume_frame,
         device=device,

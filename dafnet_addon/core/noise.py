@@ -36,26 +36,32 @@ class TakeNoise:
         lower_seed: int | None = None,
         temperature: float = 1.0,
         lower_temperature: float | None = None,
+        held: bool = False,
     ) -> np.ndarray:
         """The noise of a take's frames (T, 66); of a longer take, the first frames are the same.
+        ``held``: only what lasts, so that it is the same in all of them.
 
         Each part of the body has a seed (0 or more) and, if wished, a temperature of its own, so
         that legs vary under one trunk. At temperature 1 takes differ as captured ones do.
         """
         lower_seed = seed if lower_seed is None else lower_seed
-        held, white = [], []
+        held_draws, white = [], []
         for part, (own_seed, size) in enumerate(((seed, UPPER_SIZE), (lower_seed, LOWER_SIZE))):
             rng = np.random.default_rng([own_seed, part])
-            held.append(rng.standard_normal(size))
+            held_draws.append(rng.standard_normal(size))
             white.append(rng.standard_normal((frames + TAPS - 1, size)))
+
+        heat = np.full(POSE_SIZE, temperature)
+        heat[UPPER_SIZE:] = temperature if lower_temperature is None else lower_temperature
+        lasting = self.lasting @ np.concatenate(held_draws)
+        if held:
+            return np.tile(heat * lasting, (frames, 1))
 
         steps = np.concatenate(white, axis=1) @ self.passing.T
         rows = np.lib.stride_tricks.sliding_window_view(steps, TAPS, axis=0)
         passing = np.einsum("tdk,dk->td", rows, self.taps)
 
-        heat = np.full(POSE_SIZE, temperature)
-        heat[UPPER_SIZE:] = temperature if lower_temperature is None else lower_temperature
-        return heat * (self.lasting @ np.concatenate(held) + passing)
+        return heat * (lasting + passing)
 
     @staticmethod
     def standard_normal() -> "TakeNoise":

@@ -148,9 +148,12 @@ class Sampler:
         lower_seed: int | None = None,
         temperature: float = 1.0,
         lower_temperature: float | None = None,
+        held: bool = False,
     ) -> np.ndarray:
         """One take's noise (T, 1, 66), as ``TakeNoise.draw`` gives it."""
-        drawn = self.network.noise.draw(frames, seed, lower_seed, temperature, lower_temperature)
+        drawn = self.network.noise.draw(
+            frames, seed, lower_seed, temperature, lower_temperature, held
+        )
         return drawn[:, None]
 
     def standardised(self, poses: np.ndarray) -> np.ndarray:

@@ -7,9 +7,10 @@ it is given the scene feature s itself, ten past poses and eleven velocities, be
 code and c_ob. Poses are in the model's order, the upper body first, so the first half of a step's
 pose is 33 of its 42 values.
 
-The lower body first is the paper's outlook (section 7): both parts are given what DAFNet's are, but
-the observation's lower slots, which no user gives, hold the lower body just made when the upper is
-made.
+The lower body first is a baseline for one half of the paper's outlook (section 7): both parts are
+given what DAFNet's are, but when the upper body is made the observation's lower slots hold the
+lower one just made. Feet and legs that are asked for do not need it: each part of DAFNet is given
+the observation of the whole body.
 """
 
 from ..core.errors import InputError

@@ -176,9 +176,9 @@ def test_the_panel_draws(shot: Stage) -> None:
     free = drawn()
     assert "root" in free and "dafnet.generate" in free and "head" not in free
     shot.ann.dafnet.mode = "EE"
-    assert {"head", "hand_left", "hand_right"} <= set(drawn())
+    assert {"head", "hand_left", "hand_right", "foot_left", "foot_right"} <= set(drawn())
     shot.ann.dafnet.mode = "FULL"
-    assert "upper_body_source" in drawn() and "head" not in drawn()
+    assert {"upper_body_source", "foot_left"} <= set(drawn()) and "head" not in drawn()
     shot.ann.dafnet.keyframe_insert("mode", frame=1)
     assert {"upper_body_source", "head"} <= set(drawn())
     running.begin_job().progress = 0.5

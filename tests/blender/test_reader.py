@@ -192,6 +192,34 @@ def test_targets_and_when_their_rotation_counts(stage: Stage) -> None:
     assert stage.read().controls.hand_left_rotation.shape == (10, 3, 3), "keyed, so meant"
 
 
+def test_feet_are_read_as_hands_are(stage: Stage) -> None:
+    own = stage.ann.dafnet
+    stage.box("Chair")
+    assert stage.read().controls.foot_left is None
+    for role in ("foot_left", "foot_right"):
+        empty = bpy.data.objects.new(role, None)
+        setattr(own, role, stage.put(empty, stage.scene.collection, location=(1.0, 2.0, 0.1)))
+    own.foot_right.rotation_euler = (0.0, 0.0, 0.5)
+    key(own, "foot_left_influence", (1, 0.0), (10, 1.0))
+    own.foot_left_influence = 0.0
+    controls = stage.read().controls
+    assert np.allclose(controls.foot_left[3], (1.0, 2.0, 0.1), atol=1e-6)
+    assert controls.foot_left_rotation is None and controls.foot_right_influence is None
+    turned = controls.foot_right_rotation[3, :, 1]
+    assert np.allclose(turned, (-np.sin(0.5), np.cos(0.5), 0), atol=1e-6)
+    own.foot_left.parent = stage.ann
+    stage.cannot_be_read("left foot target .*follows the character itself")
+
+
+def test_furniture_says_how_soft_it_is(stage: Stage) -> None:
+    sofa = stage.box("Sofa")
+    (solid,) = stage.read().scene.solids
+    assert solid.softness is None, "to be guessed"
+    sofa.dafnet.guess_softness, sofa.dafnet.softness = False, 6.0
+    (solid,) = stage.read().scene.solids
+    assert abs(solid.softness - 0.06) < 1e-7
+
+
 def test_the_mode_of_each_frame(stage: Stage) -> None:
     stage.box("Chair")
     assert stage.read().controls.mode == "FREE"

@@ -303,6 +303,18 @@ def test_missing_targets_are_added_where_head_and_hands_are(stage: Set) -> None:
         assert target.name in stage.ann.users_collection[0].objects
 
 
+def test_foot_targets_are_added_where_the_feet_are(stage: Set) -> None:
+    own = stage.ann.dafnet
+    stage.ann.location.x = 2.0
+    assert bpy.ops.dafnet.add_foot_targets() == {"FINISHED"}
+    for bone, target in (("left_ankle", own.foot_left), ("right_ankle", own.foot_right)):
+        place = stage.ann.matrix_world @ stage.ann.pose.bones[bone].head
+        assert (target.location - place).length < 1e-5
+    assert not bpy.ops.dafnet.add_foot_targets.poll(), "it has both"
+    with pytest.raises(RuntimeError, match="already have targets"):
+        bpy.ops.dafnet.add_foot_targets()
+
+
 def test_a_missing_root_is_added_where_the_character_stands(stage: Set) -> None:
     assert not bpy.ops.dafnet.add_root.poll(), "it has one"
     bpy.data.objects.remove(stage.ann.dafnet.root)

@@ -146,6 +146,18 @@ def test_legs_vary_under_the_same_upper_body(shot: Shot) -> None:
     assert shot.listed()[2].dafnet.lower_seed == 6
 
 
+def test_takes_remember_whether_their_noise_was_held(shot: Shot) -> None:
+    own = shot.ann.dafnet
+    assert own.noise == "COMES_AND_GOES" and not job.draws_of(shot.settings())[0].held
+    own.noise, own.take_count = "HELD", 2
+    assert all(draw.held for draw in job.draws_of(shot.settings()))
+    own.take_count, own.temperature = 1, 0.5
+    bpy.ops.dafnet.generate()
+    own.noise = "COMES_AND_GOES"
+    bpy.ops.dafnet.generate(task="LEGS")
+    assert [take.dafnet.held for take in shot.listed()] == [True, True], "as the take it varies"
+
+
 def test_from_here_on_keeps_what_comes_before(shot: Shot) -> None:
     bpy.ops.dafnet.generate()
     first = shot.listed()[0]

@@ -1,9 +1,13 @@
 """The noise that takes are made of: what lasts, what comes and goes, and how they are drawn."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from dafnet_addon import Controls, Scene, generate, load_weights
 from dafnet_addon.core.noise import TAPS, TakeNoise
-from dafnet_addon.core.skeleton import POSE_SIZE
+from dafnet_addon.core.skeleton import POSE_SIZE, UPPER_THEN_LOWER, WRISTS
+from dafnet_addon.core.weights import Weights
 
 
 def _living(passing: float = 0.9, lasting: float = 0.4) -> TakeNoise:
@@ -43,3 +47,36 @@ def test_each_part_has_a_seed_and_a_temperature_of_its_own():
 def test_the_paper_holds_one_vector():
     drawn = TakeNoise.standard_normal().draw(20, 3)
     assert (drawn == drawn[0]).all() and 0.7 < drawn[0].std() < 1.3
+
+
+def test_held_noise_is_what_lasts_and_nothing_else():
+    noise = _living()
+    comes_and_goes, held = noise.draw(200, 3), noise.draw(200, 3, held=True)
+    assert (held == held[0]).all() and held.shape == comes_and_goes.shape
+    assert np.allclose(held[0], noise.draw(1, 3, held=True)[0])
+    quiet = TakeNoise(noise.lasting, 0.0 * noise.passing, noise.taps)
+    assert np.allclose(held, quiet.draw(200, 3), atol=1e-12)
+    legs = noise.draw(200, 3, lower_seed=4, lower_temperature=0.5, held=True)
+    assert np.array_equal(legs[:, :42], held[:, :42]) and abs(legs[:, 42:].std() - 0.2) < 0.1
+
+
+def test_takes_come_and_go_unless_they_are_held():
+    weights = load_weights()
+    living = _living()
+    noise = {}
+    for name, columns in UPPER_THEN_LOWER.items():
+        noise |= {
+            f"{name}.spread": living.lasting[columns, columns].astype(np.float32),
+            f"{name}.passing": living.passing[columns, columns].astype(np.float32),
+            f"{name}.taps": living.taps[columns].astype(np.float32),
+        }
+    lively = replace(weights, tensors={**weights.tensors, **noise})
+    still = Controls(30.0, np.tile(np.eye(4), (90, 1, 1)))
+
+    def stirs(which: Weights, **how: bool) -> float:
+        take = generate(Scene(), still, which, seed=2, temperature=1.0, **how)
+        return float(np.abs(np.diff(take.joints[30:, WRISTS], axis=0)).mean())
+
+    assert stirs(lively) > 5.0 * stirs(lively, held=True)
+    both = (generate(Scene(), still, weights, temperature=1.0, held=held) for held in (False, True))
+    assert np.array_equal(*(take.joints for take in both)), "these weights hold it anyway"

@@ -10,7 +10,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.errors import InputError
-from ...core.skeleton import JOINTS, OFFSETS, PARENTS, REST, STATURE, joint
+from ...core.skeleton import JOINTS, OFFSETS, PARENTS, REST, STATURE, TARGETS, joint
 from .mannequin import FACING, add_body
 
 __all__ = [
@@ -82,9 +82,7 @@ def objects_of(character: bpy.types.Object) -> set[bpy.types.Object]:
         character,
         *character.children_recursive,
         own.root,
-        own.head,
-        own.hand_left,
-        own.hand_right,
+        *(getattr(own, role) for role in TARGETS),
     } - {None}
 
 
@@ -104,9 +102,7 @@ def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
         own = candidate.dafnet
         if candidate.type == "ARMATURE" and active in (
             own.root,
-            own.head,
-            own.hand_left,
-            own.hand_right,
+            *(getattr(own, role) for role in TARGETS),
         ):
             return candidate
 

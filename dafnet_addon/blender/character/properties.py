@@ -14,8 +14,9 @@ from bpy.props import (
     PointerProperty,
 )
 
+from ...core.solids import SOFTEST
 from ..rig import properties as rig_properties
-from .settings import MAX_TAKES
+from .settings import COMES_AND_GOES, HELD, MAX_TAKES
 from .takes import PACKED
 
 __all__ = ["CharacterSettings", "TakeSettings", "ensure_registered", "register", "unregister"]
@@ -49,6 +50,11 @@ class TakeSettings(bpy.types.PropertyGroup):
         name="Legs' Temperature",
         options=set(),
         description="The temperature that its legs were generated at",
+    )
+    held: BoolProperty(
+        name="Held",
+        options=set(),
+        description="Whether its noise was the same all along the take",
     )
     frame_start: IntProperty(name="Start", options=set(), description="The take's first frame")
     accepted: BoolProperty(name="Accepted", options=set(), description="Keep this take")
@@ -120,7 +126,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
             (
                 "EE",
                 "EE",
-                "End effectors: the head and hands reach for their targets. Any of the three may "
+                "End effectors: the head, hands and feet reach for their targets. Any of them may "
                 "be left empty",
             ),
             (
@@ -174,6 +180,26 @@ class CharacterSettings(bpy.types.PropertyGroup):
         description=(
             "Target of the right wrist. Once it is rotated, it turns the hand as well: Y points "
             "along the fingers, Z out of the back of the hand"
+        ),
+    )
+    foot_left: PointerProperty(
+        name="Left Foot",
+        type=bpy.types.Object,
+        poll=_is_not_the_character,
+        options=set(),
+        description=(
+            "Target of the left ankle, in the modes EE and FULL. Once it is rotated, it turns "
+            "the foot as well: Y points along the toes, Z out of the back of the foot"
+        ),
+    )
+    foot_right: PointerProperty(
+        name="Right Foot",
+        type=bpy.types.Object,
+        poll=_is_not_the_character,
+        options=set(),
+        description=(
+            "Target of the right ankle, in the modes EE and FULL. Once it is rotated, it turns "
+            "the foot as well: Y points along the toes, Z out of the back of the foot"
         ),
     )
     upper_body_source: PointerProperty(
@@ -269,6 +295,28 @@ class CharacterSettings(bpy.types.PropertyGroup):
             "for the target and to let go of it"
         ),
     )
+    foot_left_influence: FloatProperty(
+        name="Left Foot Influence",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        description=(
+            "How much the left foot's target counts; at 0 the foot is free. Keyframe it to "
+            "step onto the target and to let go of it"
+        ),
+    )
+    foot_right_influence: FloatProperty(
+        name="Right Foot Influence",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        description=(
+            "How much the right foot's target counts; at 0 the foot is free. Keyframe it to "
+            "step onto the target and to let go of it"
+        ),
+    )
     temperature: FloatProperty(
         name="Temperature",
         default=0.0,
@@ -280,6 +328,41 @@ class CharacterSettings(bpy.types.PropertyGroup):
         description=(
             "How much takes differ: 0 always gives the same calm take, 1 gives as much variety as "
             "real motion has, above 2 they become strange"
+        ),
+    )
+    noise: EnumProperty(
+        name="Noise",
+        default=COMES_AND_GOES,
+        options=set(),
+        description="What makes takes differ, where the temperature is above zero",
+        items=[
+            (
+                COMES_AND_GOES,
+                "Comes and Goes",
+                "It varies during the take, as in real motion, so that a body at rest looks alive. "
+                "Weights that have not learnt this hold it",
+            ),
+            (HELD, "Held", "It is the same all along the take, so that a body at rest is calm"),
+        ],
+    )
+    guess_softness: BoolProperty(
+        name="Guess Softness",
+        default=True,
+        options=set(),
+        description="Guess how soft this piece of furniture is from its name and shape",
+    )
+    softness: FloatProperty(
+        name="Softness",
+        default=0.0,
+        min=0.0,
+        max=100.0 * SOFTEST,
+        soft_max=12.0,
+        step=100,
+        precision=1,
+        options=set(),
+        description=(
+            "Centimetres by which this piece of furniture gives way under a body, compared with a "
+            "hard bench: 3 for wooden chairs, 7 for office and arm chairs, 11 for sofas and beds"
         ),
     )
     plant_feet: FloatProperty(
@@ -302,8 +385,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         subtype="FACTOR",
         options=set(),
         description=(
-            "How far a pelvis that has sunk into a seat is lifted out of it; 0 leaves the raw "
-            "motion"
+            "How far a body that sinks into a seat, or hovers over it, is brought to where the "
+            "seat carries it; 0 leaves the raw motion"
         ),
     )
     reach_targets: FloatProperty(
@@ -314,8 +397,8 @@ class CharacterSettings(bpy.types.PropertyGroup):
         subtype="FACTOR",
         options=set(),
         description=(
-            "How exactly the head and hands are brought onto their targets, as far as arms and "
-            "back allow; 0 leaves the raw motion"
+            "How exactly the head, hands and feet are brought onto their targets, as far as limbs "
+            "and back allow; 0 leaves the raw motion"
         ),
     )
     clear_furniture: FloatProperty(

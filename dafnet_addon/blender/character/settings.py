@@ -7,12 +7,16 @@ import bpy
 
 from ...core.checks import MAX_FRAMES, MAX_SEED, whole
 from ...core.errors import InputError
+from ...core.skeleton import TARGETS
 from ...core.take import MODES
 
-__all__ = ["CLEAN_UP", "MAX_TAKES", "Settings", "settings_of"]
+__all__ = ["CLEAN_UP", "COMES_AND_GOES", "HELD", "MAX_TAKES", "Settings", "settings_of"]
 
 MAX_TAKES = 64
 """How many takes one job may make."""
+
+COMES_AND_GOES, HELD = "COMES_AND_GOES", "HELD"
+"""Values of ``noise``: all of it, or only what lasts all along a take."""
 
 CLEAN_UP = {
     "plant_feet": "feet",
@@ -46,6 +50,8 @@ class Settings:
     head: str | None = None
     hand_left: str | None = None
     hand_right: str | None = None
+    foot_left: str | None = None
+    foot_right: str | None = None
     upper_body_source: str | None = None
     upper_body_take: str | None = None
     mode: str | None = None
@@ -55,6 +61,7 @@ class Settings:
     lower_seed: int | None = None
     temperature: float = 0.0
     lower_temperature: float | None = None
+    noise: str = COMES_AND_GOES
     take_count: int = 1
     kept: str | None = None
     kept_until: int = 0
@@ -95,9 +102,7 @@ def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides:
     links = (
         "root",
         "furniture",
-        "head",
-        "hand_left",
-        "hand_right",
+        *TARGETS,
         "upper_body_source",
         "upper_body_take",
     )
@@ -110,7 +115,7 @@ def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides:
         "frame_end": scene.frame_end if own.use_scene_range else own.frame_end,
         **{
             name: getattr(own, name)
-            for name in ("seed", "temperature", "take_count", "blend_frames", *CLEAN_UP)
+            for name in ("seed", "temperature", "noise", "take_count", "blend_frames", *CLEAN_UP)
         },
     }
 

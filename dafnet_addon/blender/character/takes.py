@@ -60,6 +60,7 @@ def add_take(
     facts.lower_temperature = (
         draw.temperature if draw.lower_temperature is None else draw.lower_temperature
     )
+    facts.held = draw.held
     facts.log_likelihood = take.log_likelihood
     for prefix, metrics in (("", take.metrics), ("raw_", take.raw_metrics)):
         for name, metric in _METRICS.items():
@@ -73,9 +74,15 @@ def add_take(
 
 
 def draw_of(action: bpy.types.Action) -> Draw:
-    """The seeds and temperatures that the take was generated with."""
+    """What the take was drawn with."""
     facts = action.dafnet
-    return Draw(facts.seed, facts.lower_seed, facts.temperature, facts.lower_temperature)
+    return Draw(
+        seed=facts.seed,
+        lower_seed=facts.lower_seed,
+        temperature=facts.temperature,
+        lower_temperature=facts.lower_temperature,
+        held=facts.held,
+    )
 
 
 def takes_of(armature: bpy.types.Object) -> list[bpy.types.Action]:

@@ -1,22 +1,29 @@
-"""The empties that a character follows, added where it has none: the root, and the targets of head
-and hands.
+"""The empties that a character follows, added where it has none: the root, and the targets of head,
+hands and feet.
 """
+
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.skeleton import END_EFFECTORS, FEET_ASKED
 from .armature import character_scale
 
-__all__ = ["add_root", "add_targets", "lacks_root", "missing_targets"]
+__all__ = ["FEET", "HEAD_AND_HANDS", "add_root", "add_targets", "lacks_root", "missing_targets"]
 
 _TARGETS = {
     "head": ("head", "Head", 0.2),
     "hand_left": ("left_wrist", "Left Hand", 0.15),
     "hand_right": ("right_wrist", "Right Hand", 0.15),
+    "foot_left": ("left_ankle", "Left Foot", 0.15),
+    "foot_right": ("right_ankle", "Right Foot", 0.15),
 }
 """Of each target the bone, the name, and the size at which it is drawn, metres on a body of 1.75 m.
 """
+HEAD_AND_HANDS = tuple(END_EFFECTORS)
+FEET = tuple(FEET_ASKED)
 
 
 def lacks_root(context: bpy.types.Context, armature: bpy.types.Object) -> bool:
@@ -49,9 +56,11 @@ def add_root(context: bpy.types.Context, armature: bpy.types.Object) -> bpy.type
     return root
 
 
-def missing_targets(context: bpy.types.Context, armature: bpy.types.Object) -> list[str]:
-    """The targets of the settings that are not set or not in the scene."""
-    found = {role: getattr(armature.dafnet, role) for role in _TARGETS}
+def missing_targets(
+    context: bpy.types.Context, armature: bpy.types.Object, roles: Sequence[str] = HEAD_AND_HANDS
+) -> list[str]:
+    """Those of the targets ``roles`` that are not set or not in the scene."""
+    found = {role: getattr(armature.dafnet, role) for role in roles}
     return [
         role
         for role, target in found.items()
@@ -59,18 +68,19 @@ def missing_targets(context: bpy.types.Context, armature: bpy.types.Object) -> l
     ]
 
 
-def add_targets(context: bpy.types.Context, armature: bpy.types.Object) -> list[bpy.types.Object]:
-    """Add the missing ones where head and hands are in the current frame, in the character's
-    collection.
+def add_targets(
+    context: bpy.types.Context, armature: bpy.types.Object, roles: Sequence[str] = HEAD_AND_HANDS
+) -> list[bpy.types.Object]:
+    """Add the missing ones of ``roles`` where head, hands and feet are in the current frame, in the
+    character's collection.
 
     ``InputError``: nothing is missing, or the armature is not a character or is linked; nothing is
     changed then.
     """
-    missing = missing_targets(context, armature)
+    missing = missing_targets(context, armature, roles)
     if not missing:
-        raise InputError(
-            f"'{armature.name}' already has targets for head and hands; animate those."
-        )
+        which = "feet" if roles == FEET else "head and hands"
+        raise InputError(f"'{armature.name}' already has targets for {which}; animate those.")
     if armature.library:
         raise InputError(
             f"The character '{armature.name}' is linked; make it local to add targets."

@@ -20,7 +20,7 @@ from ...core.generate import Draw, clean_again_steps, takes_steps
 from ...core.progress import run_to_end, stepwise, within
 from ...core.take import Controls, Take
 from ..character.armature import metres_per_unit
-from ..character.settings import CLEAN_UP, Settings, settings_of
+from ..character.settings import CLEAN_UP, HELD, Settings, settings_of
 from ..character.takes import add_take, draw_of, play_take, stored_take
 from ..preferences import device_of, weights_path
 from ..scene.lookup import find_action, find_object, find_scene, names_in_use
@@ -69,11 +69,17 @@ class Result:
 
 def draws_of(settings: Settings) -> list[Draw]:
     """The seeds and temperatures of the takes: each further one has the next seed."""
+    held = settings.noise == HELD
     first = Draw(
-        settings.seed, settings.lower_seed, settings.temperature, settings.lower_temperature
+        seed=settings.seed,
+        lower_seed=settings.lower_seed,
+        temperature=settings.temperature,
+        lower_temperature=settings.lower_temperature,
+        held=held,
     )
     further = settings.temperature or _FURTHER_TAKES
-    return [first, *(Draw(settings.seed + k, None, further) for k in range(1, settings.take_count))]
+    seeds = range(settings.seed + 1, settings.seed + settings.take_count)
+    return [first, *(Draw(seed=seed, temperature=further, held=held) for seed in seeds)]
 
 
 def _clean_up(settings: Settings) -> CleanUp:

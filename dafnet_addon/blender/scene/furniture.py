@@ -14,6 +14,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.errors import InputError
+from ...core.skeleton import TARGETS
 from ...core.solids import Mesh
 from ..character.armature import metres_per_unit
 from ..character.settings import Settings
@@ -35,7 +36,7 @@ class _Piece:
     frame.
 
     ``key`` finds it again. ``vertices`` (V, 3), ``triangles`` (F, 3): in its own space, Blender
-    units.
+    units. ``softness``: metres, None where nobody says.
     """
 
     key: tuple
@@ -43,6 +44,7 @@ class _Piece:
     source: bpy.types.Object | None
     vertices: np.ndarray
     triangles: np.ndarray
+    softness: float | None = None
     matrices: list[np.ndarray] = field(default_factory=list)
 
 
@@ -55,7 +57,7 @@ def furniture_of(settings: Settings, dependencies: Dependencies) -> "Furniture |
 
     scene = find_scene(settings)
     armature = find_object(settings, settings.armature, "character")
-    named = (settings.root, settings.head, settings.hand_left, settings.hand_right)
+    named = (settings.root, *(getattr(settings, role) for role in TARGETS))
     own = {
         armature,
         *armature.children_recursive,
@@ -168,6 +170,7 @@ class Furniture:
                     source=source,
                     vertices=vertices,
                     triangles=triangles,
+                    softness=_softness(instance),
                 )
                 piece.matrices.append(array(instance.matrix_world))
                 self._pieces.append(piece)
@@ -343,6 +346,16 @@ def _key(instance: bpy.types.DepsgraphObjectInstance) -> tuple:
     return (_owner(instance).name_full, instance.object.original.name_full, place)
 
 
+def _softness(instance: bpy.types.DepsgraphObjectInstance) -> float | None:
+    """Metres by which the instance gives way, as its object or its owner says; None where neither
+    does.
+    """
+    for each in (instance.object.original, _owner(instance)):
+        if not each.dafnet.guess_softness:
+            return float(each.dafnet.softness) / 100.0
+    return None
+
+
 def _geometry(evaluated: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (V, 3) and triangles (F, 3) in the object's own space."""
     mesh = evaluated.to_mesh()
@@ -362,4 +375,10 @@ def _solid(piece: _Piece, unit: float) -> Mesh:
     matrices = np.array(piece.matrices)
     matrices[:, :3] *= unit
     still = np.allclose(matrices, matrices[0], atol=1e-6)
-    return Mesh(piece.vertices, piece.triangles, matrices[0] if still else matrices, piece.name)
+    return Mesh(
+        vertices=piece.vertices,
+        triangles=piece.triangles,
+        matrix=matrices[0] if still else matrices,
+        name=piece.name,
+        softness=piece.softness,
+    )

@@ -5,6 +5,7 @@ or replaced by an undo, while it runs.
 import bpy
 
 from ...core.errors import InputError
+from ...core.skeleton import TARGETS
 from ..character.settings import Settings
 
 __all__ = ["find_action", "find_collection", "find_object", "find_scene", "names_in_use"]
@@ -63,9 +64,7 @@ def names_in_use(settings: Settings) -> set[str]:
     named = {
         settings.armature,
         settings.root,
-        settings.head,
-        settings.hand_left,
-        settings.hand_right,
+        *(getattr(settings, role) for role in TARGETS),
     }
     named.add(settings.upper_body_source)
     used = {o.name_full for o in find_scene(settings).objects if o.name_full in named}

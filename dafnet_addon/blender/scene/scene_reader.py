@@ -53,6 +53,8 @@ _TARGETS = {
     "head": "head target",
     "hand_left": "left hand target",
     "hand_right": "right hand target",
+    "foot_left": "left foot target",
+    "foot_right": "right foot target",
 }
 
 
@@ -81,8 +83,8 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     never furniture, nor are helpers: see ``furniture``.
 
     Targets: the empties' places. Their rotations count where they are keyed, or where a target was
-    ever turned in its parent's space; a target that was only moved leaves head and hands free to
-    turn.
+    ever turned in its parent's space; a target that was only moved leaves head, hands and
+    feet free to turn.
 
     Upper body: the source's bones, carried from the source's root onto this character's and to its
     size. The source is another character or any rig whose bones are known
