@@ -27,6 +27,7 @@ _FRAMES_AT_ONCE = 32
 _LOWEST = 0.15
 _HIGHEST = 0.925
 _APART = 0.025
+_NEAR = 0.03
 
 # What carries the hips: spots to the right and forward of the root, metres.
 _SPOTS = np.array([(x, y, 0.0) for x in (-0.09, 0.0, 0.09) for y in (-0.07, 0.0, 0.07)])
@@ -132,15 +133,11 @@ def tops_under(scene: Scene, path: RootPath) -> np.ndarray:
     found = distance(scene, columns.reshape(len(path), -1, 3), path.position[:, 2]).reshape(
         len(path), len(_SPOTS), -1
     )
-    touches = found[..., :-1] < _APART / 2
-    highest = touches.shape[-1] - 1 - touches[..., ::-1].argmax(-1)
-    # Of a point over a level surface the distance is its height over it; of one inside a thin slab
-    # it may be another side's.
-    at, above = (
-        np.take_along_axis(found, k[..., None], -1)[..., 0] for k in (highest, highest + 1)
-    )
-    top = np.where(at > 0, heights[highest] - at, heights[highest + 1] - above)
-    top[~touches.any(-1)] = np.nan
+    # Seen from above, the first place that is near a surface is over it by its distance.
+    near = found < _NEAR
+    highest = near.shape[-1] - 1 - near[..., ::-1].argmax(-1)
+    top = heights[highest] - np.take_along_axis(found, highest[..., None], -1)[..., 0]
+    top[~near.any(-1)] = np.nan
     carried = np.isfinite(top).sum(-1) >= _CARRYING
     out = np.full(len(path), np.nan)
     out[carried] = np.nanmedian(top[carried], axis=-1) + path.position[carried, 2]
