@@ -65,6 +65,9 @@ _LEANS = np.radians(25.0)  # at most, for a back
 _LEAST_LEVER = 0.1  # metres over the pelvis, of what tells how far to lean
 _STEADY = 4.0  # frames; deviation of the Gaussian over what brings a body out of furniture
 _SOFT = 0.06  # share of a leg in which it stops being pulled straight
+# of a trunk that has a back behind it up to the one, and a bed under it from the other on
+_RECLINES = np.radians((30.0, 45.0))
+_ON_TOP = 0.04  # metres over a top, of an ankle that lies on it: feet hardly sink in
 _LIES = np.radians((45.0, 75.0))  # of a trunk out of the vertical: sitting up to, lying from
 
 
@@ -77,7 +80,7 @@ def rested(
     A rest is what is slow, and neither as deep in the furniture as what is under it nor as high
     over it as what stands. The way to it and from it is moved softly, less and less.
     """
-    lying = _lying(joints)
+    lying = smoothstep(_between(_tilt(joints), *_LIES))
     carried = support.top + OVER_HARD - support.softness - LIES_LOWER * lying
     rests = resting(joints, carried)
     if not rests:
@@ -87,17 +90,23 @@ def rested(
     if lift.any():
         joints = _lifted(joints, lift, support.top)
     if distance is not None:
-        sits = strength * _during(rests, len(joints)) * (1.0 - lying)
-        joints = _off_the_back(joints, distance, support.softness, sits)
+        rest = strength * _during(rests, len(joints))
+        sits = rest * (1.0 - lying)
+        upright = rest * (1.0 - smoothstep(_between(_tilt(joints), *_RECLINES)))
+        joints = _off_the_back(joints, distance, support.softness, upright)
         joints = _on_the_seat(joints, distance, support.softness, sits)
     return joints
 
 
-def _lying(joints: np.ndarray) -> np.ndarray:
-    """From 0, where the trunk is upright, to 1 where it lies (T,)."""
+def _tilt(joints: np.ndarray) -> np.ndarray:
+    """Angle (T,) of the trunk to the vertical, radians."""
     trunk = joints[:, NECK] - joints[:, PELVIS]
-    tilt = np.arctan2(np.linalg.norm(trunk[:, :2], axis=-1), trunk[:, 2])
-    return smoothstep((tilt - _LIES[0]) / (_LIES[1] - _LIES[0]))
+    return np.arctan2(np.linalg.norm(trunk[:, :2], axis=-1), trunk[:, 2])
+
+
+def _between(values: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Which part of the way from ``low`` to ``high`` values are on."""
+    return (values - low) / (high - low)
 
 
 def resting(joints: np.ndarray, carried: np.ndarray) -> list[tuple[int, int]]:
@@ -157,11 +166,12 @@ def _lifted(joints: np.ndarray, lift: np.ndarray, top: np.ndarray) -> np.ndarray
     """Joints with all but the legs lifted (T,); feet stay, or go with the body where they lie on
     the same ``top`` (T,), and knees bend forward.
     """
-    begins, until = _ON_IT
     over = joints[:, ANKLES, 2] - top[:, None]
-    on_it = smoothstep((np.where(np.isfinite(over), over, -1.0) - begins) / (until - begins))
+    on_it = smoothstep(_between(np.where(np.isfinite(over), over, -1.0), *_ON_IT))
     ankles = joints[:, ANKLES].copy()
     ankles[..., 2] += lift[:, None] * gaussian(on_it, _STIRS / 2)
+    surface = np.where(np.isfinite(top), top, -np.inf)[:, None] + _ON_TOP
+    ankles[..., 2] = np.maximum(ankles[..., 2], np.minimum(joints[:, ANKLES, 2], surface))
 
     # Legs that are nearly straight stop softly where they are pulled off the floor.
     hips = joints[:, HIPS] + lift[:, None, None] * (0.0, 0.0, 1.0)

@@ -14,6 +14,7 @@ from ...core.paths import Rest, Route, Stop, facing, route
 from ...core.root import RootPath
 from ...core.rotations import rotate, yaw_matrix
 from ...core.series import smoothstep
+from ...core.softness import LIES_LOWER, OVER_HARD, SOFTNESS
 from ...demo import Place
 from ..character.armature import create_character, metres_per_unit
 from ..directing.root_keys import write_keys
@@ -173,12 +174,12 @@ def _bed(fps: float) -> Plan:
     back = 0.6 * eased(0.15, 1.65) + 0.4 * eased(1.4, 2.0)
     angle = np.radians(88.0) * back
 
-    over = _BED_TOP + 0.12
+    over = _BED_TOP + OVER_HARD - SOFTNESS["bed"] - LIES_LOWER * back
     head = np.stack(
         [
             np.zeros(frames),
             0.06 * (1.0 - back) - 0.60 * np.sin(angle),
-            over + 0.60 * np.cos(angle) + (_PILLOW - 0.02) * back,
+            over + 0.60 * np.cos(angle) + (_PILLOW + 0.06) * back,
         ],
         axis=1,
     )
