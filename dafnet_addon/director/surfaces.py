@@ -14,9 +14,12 @@ from ..core.solids import Box, Mesh
 
 __all__ = ["HeightField", "boxes_of", "height_field", "parts_of_surfaces", "surface_points"]
 
-_MAX_POINTS = 4_000_000  # points; larger furniture is sampled more coarsely
-_AT_ONCE = 100_000  # points between two steps of a job
-_SOLIDS_AT_ONCE = 100  # solids between two steps of a job
+_MAX_POINTS = 4_000_000
+"""Larger furniture is sampled more coarsely."""
+_AT_ONCE = 100_000
+"""Points that are made between two steps of a job."""
+_SOLIDS_AT_ONCE = 100
+"""Solids that are looked at between two steps of a job."""
 _CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _FACES = np.array(
     [

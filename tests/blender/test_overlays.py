@@ -13,6 +13,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay import (
     contents,
     display,
     faults,
+    painting,
     watched,
 )
 from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.cache import cache
@@ -126,12 +127,13 @@ def test_nothing_is_touched_before_a_switch_goes_on(shot: Shot) -> None:
     assert hooks() == [1, len(display._LISTENERS)]
     display.hide_faults()
     assert hooks() == [0, 0]
-    body = ast.parse(Path(display.__file__).read_text(encoding="utf-8")).body
-    top = [node for node in body if isinstance(node, ast.Import | ast.ImportFrom)]
-    named = {alias.name for node in top for alias in node.names} | {
-        getattr(node, "module", "") for node in top
-    }
-    assert not named & {"gpu", "gpu_extras.batch", "blf"}
+    for file in (display.__file__, painting.__file__):
+        body = ast.parse(Path(file).read_text(encoding="utf-8")).body
+        top = [node for node in body if isinstance(node, ast.Import | ast.ImportFrom)]
+        named = {alias.name for node in top for alias in node.names} | {
+            getattr(node, "module", "") for node in top
+        }
+        assert not named & {"gpu", "gpu_extras.batch", "blf"}
 
 
 def test_switches_live_in_no_file_and_outlast_another(shot: Shot, tmp_path) -> None:
@@ -439,7 +441,7 @@ def test_faulty_frames_are_marked_and_unmarked(shot: Shot) -> None:
 
 def test_beads_are_closed_and_lit(shot: Shot) -> None:
     drawn = compose(beads=[(np.array([[1.0, 2.0, 3.0]]), (1.0, 1.0, 1.0, 1.0), 0.5)])
-    corners, colours = display.beads_of(drawn)
+    corners, colours = painting.beads_of(drawn)
     faces = corners.reshape(8, 3, 3)
     normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     assert ((normals * (faces.mean(axis=1) - (1.0, 2.0, 3.0))).sum(-1) > 0).all(), (
@@ -460,9 +462,9 @@ def test_the_corner_avoids_the_sidebar(shot: Shot) -> None:
     area = type(
         "Area", (), {"regions": [window, Region("TOOLS", 100, 50), Region("UI", 700, 200)]}
     )()
-    assert display.corner_of(area, window, 50.0) == (550.0, 50.0)
+    assert painting.corner_of(area, window, 50.0) == (550.0, 50.0)
     area.regions[2].width, area.regions[2].x = 1, 899
-    assert display.corner_of(area, window, 50.0) == (750.0, 50.0)
+    assert painting.corner_of(area, window, 50.0) == (750.0, 50.0)
 
 
 def test_the_panel_draws_all_switches(shot: Shot) -> None:

@@ -281,7 +281,7 @@ def _catmull_rom(rows: np.ndarray, at: np.ndarray) -> np.ndarray:
     padded = np.concatenate([2 * rows[:1] - rows[1:2], rows, 2 * rows[-1:] - rows[-2:-1]])
     k = np.minimum(at.astype(int), len(rows) - 2)
     t = (at - k)[:, None]
-    a, b, c, d = (padded[k + i] for i in range(4))
+    a, b, c, d = (padded[k + i] for i in range(4))  # the curve runs from b to c
     return b + 0.5 * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a)))
 
 
@@ -292,8 +292,8 @@ def _part(
     thick; a sole is flat on the floor.
     """
     rows = np.asarray(sections, float) * (1.0, 1.0, 1.0, build, build)
-    u = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, _RINGS + 2)[1:-1])
-    rings = _catmull_rom(rows, u * (len(rows) - 1))
+    along = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, _RINGS + 2)[1:-1])
+    rings = _catmull_rom(rows, along * (len(rows) - 1))
     cap = np.array([rows[1, 0] - rows[0, 0], rows[-1, 0] - rows[-2, 0]])
     near = np.minimum(
         (rings[:, 0] - rows[0, 0]) / cap[0], (rows[-1, 0] - rings[:, 0]) / cap[1]
@@ -306,25 +306,35 @@ def _part(
     local[..., 1] = rings[:, 1:2] + rings[:, 3:4] * np.cos(angle)
     local[..., 2] = rings[:, 2:3] + rings[:, 4:5] * np.sin(angle)
     poles = rows[[0, -1], :3]
-    points = np.concatenate([local.reshape(-1, 3), poles])
+
     order = {"x": (0, 1, 2), "y": (1, 0, 2), "z": (1, 2, 0)}[axis]
-    points = points[:, order]
+    points = np.concatenate([local.reshape(-1, 3), poles])[:, order]
     points[:, 2] = np.maximum(points[:, 2], 0.0)
 
-    faces: list[tuple[int, ...]] = []
-    last = (_RINGS - 1) * _SEGMENTS
-    for s in range(_SEGMENTS):
-        n = (s + 1) % _SEGMENTS
-        for r in range(0, last, _SEGMENTS):
-            faces.append((r + s, r + n, r + _SEGMENTS + n, r + _SEGMENTS + s))
-
-        faces.append((_RINGS * _SEGMENTS, n, s))
-        faces.append((_RINGS * _SEGMENTS + 1, last + s, last + n))
-
+    faces = _tube_faces()
     if axis == "y":  # its two other axes are exchanged, which turns faces inside out
         faces = [face[::-1] for face in faces]
 
     return points, faces
+
+
+def _tube_faces() -> list[tuple[int, ...]]:
+    """Faces between the rings' vertices, and from the first and the last ring to its pole: the two
+    vertices after the rings'.
+    """
+    faces: list[tuple[int, ...]] = []
+    first_pole, last_pole = _RINGS * _SEGMENTS, _RINGS * _SEGMENTS + 1
+    last_ring = (_RINGS - 1) * _SEGMENTS
+    for side in range(_SEGMENTS):
+        following = (side + 1) % _SEGMENTS
+        for ring in range(0, last_ring, _SEGMENTS):
+            above = ring + _SEGMENTS
+            faces.append((ring + side, ring + following, above + following, above + side))
+
+        faces.append((first_pole, following, side))
+        faces.append((last_pole, last_ring + side, last_ring + following))
+
+    return faces
 
 
 def add_body(

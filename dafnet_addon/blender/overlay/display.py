@@ -1,12 +1,12 @@
-"""Overlays in the viewport and the timeline: switches, what draws them, and when.
+"""Overlays in the viewport and the timeline: their switches, and when Blender draws them.
 
 All are off at first. Blender is asked to draw only while a switch is on or a job shows its live
-pose, and ``gpu`` is imported only when something is drawn. The switches live here and not in the
+pose. The switches live here and not in the
 file, so opening another file or undoing leaves them as they are. Nothing here holds on to objects
 of the file: ``contents`` looks them up at each redraw.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -20,12 +20,11 @@ from .cache import cache
 from .contents import CIRCLE, KINDS
 from .drawing import Drawing
 from .faults import Faults, fault_bars
+from .painting import forget_batches, paint, paint_bars, paint_circle, paint_labels
 from .watched import forget, watched_character
 
 __all__ = [
     "Overlays",
-    "beads_of",
-    "corner_of",
     "hide_faults",
     "hide_live_pose",
     "register",
@@ -37,26 +36,10 @@ __all__ = [
     "unregister",
 ]
 
-_CIRCLE_RADIUS = 52.0
-"""Pixels."""
-_CIRCLE_MARGIN = 26.0
-"""Pixels from the circle's labels to the view's edges."""
-_DISC = (0.10, 0.11, 0.12, 0.72)
-"""Colour behind the circle, red, green, blue and opacity."""
-_BAR_HEIGHT = 4.5
-"""Pixels; of a bar in the timeline."""
-_BAR_MARGIN = 7.0
-"""Pixels from the timeline's lower edge to the first bar."""
-_FONT_SIZE = 12.0
-"""Points."""
-_LIGHT = np.array((0.3, -0.45, 0.84))
-"""The direction from which beads look lit."""
-
 _on: set[str] = set()
 _live_pose: list[Callable[[], np.ndarray | None]] = []
 _faults: dict[int, Faults] = {}
 _drawers: dict[str, tuple[Any, Any]] = {}
-_batches: dict[tuple[str, int], tuple[Drawing, list[tuple[str, Any]]]] = {}
 
 
 class Overlays(bpy.types.PropertyGroup):
@@ -187,7 +170,7 @@ def _arrange() -> None:
             handlers.remove(function)
 
     if not view:
-        _batches.clear()
+        forget_batches()
     if not listening:
         forget()
 
@@ -215,7 +198,7 @@ def _other_frame(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None 
 @persistent
 def _undone(*_: object) -> None:
     forget()
-    _batches.clear()
+    forget_batches()
 
 
 @persistent
@@ -237,77 +220,6 @@ _LISTENERS: dict[str, Callable[..., None]] = {
 # Drawing.
 
 
-def beads_of(drawing: Drawing) -> tuple[np.ndarray, np.ndarray]:
-    """The beads as octahedra: corners of their triangles (24 B, 3), and their colours (24 B, 4),
-    lighter on the lit side.
-    """
-    axes = np.eye(3)
-    corners = np.array(
-        [
-            (x * axes[0], y * axes[1], z * axes[2])
-            if x * y * z > 0
-            else (y * axes[1], x * axes[0], z * axes[2])
-            for x in (-1, 1)
-            for y in (-1, 1)
-            for z in (-1, 1)
-        ]
-    )
-
-    lit = 0.68 + 0.32 * np.clip(corners.sum(axis=1) @ _LIGHT / np.sqrt(3.0), -1.0, 1.0)
-    places = drawing.beads[:, None, None] + drawing.radii[:, None, None, None] * corners
-    colours = np.repeat(drawing.bead_colours[:, None], 8, axis=1)
-    colours[..., :3] *= lit[:, None]
-    return places.reshape(-1, 3), np.repeat(colours[:, :, None], 3, axis=2).reshape(-1, 4)
-
-
-def _batches_of(kind: str, number: int, drawing: Drawing) -> list[tuple[str, Any]]:
-    """Shader and batch of the drawing's beads and lines, made once for each drawing."""
-    import gpu
-    from gpu_extras.batch import batch_for_shader
-
-    known = _batches.get((kind, number))
-    if known is not None and known[0] is drawing:
-        return known[1]
-
-    batches = []
-
-    def add(shader: str, primitive: str, places: np.ndarray, colours: np.ndarray) -> None:
-        content = {"pos": places.astype(np.float32), "color": colours.astype(np.float32)}
-        builtin = gpu.shader.from_builtin(shader)
-        batches.append((shader, batch_for_shader(builtin, primitive, content)))
-
-    if len(drawing.beads):
-        add("SMOOTH_COLOR", "TRIS", *beads_of(drawing))
-    if len(drawing.lines):
-        ends = drawing.lines.reshape(-1, 3)
-        add("POLYLINE_SMOOTH_COLOR", "LINES", ends, np.repeat(drawing.line_colours, 2, axis=0))
-
-    _batches[kind, number] = drawing, batches
-    return batches
-
-
-def _draw(kind: str, drawn: Iterable[Drawing]) -> None:
-    """Draw beads and lines with the matrices as they are, in front of everything."""
-    import gpu
-
-    depth = gpu.state.depth_test_get()
-    gpu.state.blend_set("ALPHA")
-    gpu.state.depth_test_set("NONE")
-
-    scale = bpy.context.preferences.system.ui_scale
-    for number, drawing in enumerate(drawn):
-        for name, batch in _batches_of(kind, number, drawing):
-            shader = gpu.shader.from_builtin(name)
-            shader.bind()
-            if name.startswith("POLYLINE"):
-                shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
-                shader.uniform_float("lineWidth", drawing.width * scale)
-            batch.draw(shader)
-
-    gpu.state.blend_set("NONE")
-    gpu.state.depth_test_set(depth)
-
-
 def _wanted(context: bpy.types.Context) -> dict[str, tuple[Drawing, ...]]:
     """What there is to draw in the context's view: nothing where its overlays are off."""
     if context.space_data is None or not context.space_data.overlay.show_overlays:
@@ -322,98 +234,25 @@ def _draw_scene() -> None:
     """Draw what lies in the scene."""
     for kind, drawn in _wanted(bpy.context).items():
         if kind != CIRCLE:
-            _draw(kind, drawn)
+            paint(kind, drawn)
 
 
 def _draw_flat() -> None:
     """Draw the labels over the scene, and the circle in its corner."""
-    import gpu
-    from bpy_extras.view3d_utils import location_3d_to_region_2d
-
     context = bpy.context
     wanted = _wanted(context)
     for kind, drawn in wanted.items():
-        if kind == CIRCLE:
-            continue
-        for drawing in drawn:
-            for place, text, colour in drawing.labels:
-                at = location_3d_to_region_2d(context.region, context.region_data, place)
-                if at is not None:
-                    _write(text, at[0], at[1] + 10.0, colour)
+        if kind != CIRCLE:
+            paint_labels(context, drawn)
 
-    if not wanted.get(CIRCLE):
-        return
-
-    scale = context.preferences.system.ui_scale
-    inset = (1.4 * _CIRCLE_RADIUS + _CIRCLE_MARGIN) * scale
-    middle = corner_of(context.area, context.region, inset)
-    radius = _CIRCLE_RADIUS * scale
-    with gpu.matrix.push_pop():
-        gpu.matrix.translate((*middle, 0.0))
-        gpu.matrix.scale((radius, radius, 1.0))
-        _fill_disc(1.4)
-        _draw(CIRCLE, wanted[CIRCLE])
-
-    for drawing in wanted[CIRCLE]:
-        for place, text, colour in drawing.labels:
-            _write(
-                text,
-                middle[0] + radius * place[0],
-                middle[1] + radius * place[1],
-                colour,
-                centred=True,
-            )
-
-
-def corner_of(area: bpy.types.Area, region: bpy.types.Region, inset: float) -> tuple[float, float]:
-    """The place ``inset`` pixels from the region's lower right corner, or from the sidebar where it
-    covers that; in the region.
-    """
-    covered = (r for r in area.regions if r.type == "UI" and r.width > 1 and r.x > region.x)
-    right = min([region.x + region.width, *(r.x for r in covered)]) - region.x
-    return right - inset, inset
-
-
-def _fill_disc(radius: float) -> None:
-    import gpu
-    from gpu_extras.batch import batch_for_shader
-
-    angle = np.linspace(0.0, 2.0 * np.pi, 49)
-    rim = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    corners = (
-        np.stack([np.zeros_like(rim[1:]), rim[:-1], rim[1:]], axis=1)
-        .reshape(-1, 2)
-        .astype(np.float32)
-    )
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    gpu.state.blend_set("ALPHA")
-    shader.bind()
-    shader.uniform_float("color", _DISC)
-    batch_for_shader(shader, "TRIS", {"pos": corners}).draw(shader)
-
-
-def _write(
-    text: str, x: float, y: float, colour: tuple[float, float, float, float], centred: bool = False
-) -> None:
-    """Write with the middle of the text's lower edge at (x, y) of the region, or its very middle if
-    ``centred``.
-    """
-    import blf
-
-    blf.size(0, _FONT_SIZE * bpy.context.preferences.system.ui_scale)
-    width, height = blf.dimensions(0, text)
-    blf.color(0, *colour)
-    blf.position(0, x - width / 2, y - (height / 2 if centred else 0.0), 0.0)
-    blf.draw(0, text)
+    if wanted.get(CIRCLE):
+        paint_circle(context, CIRCLE, wanted[CIRCLE])
 
 
 def _draw_timeline() -> None:
-    """Bars at the frames of the playing take in which feet slide (upper row) and joints touch
+    """Draw bars at the frames of the playing take in which feet slide (upper row) and joints touch
     furniture.
     """
-    import gpu
-    from gpu_extras.batch import batch_for_shader
-
     context = bpy.context
     armature = watched_character(context) if context.scene else None
     action = played_take(armature) if armature else None
@@ -422,30 +261,8 @@ def _draw_timeline() -> None:
         return
 
     bars = fault_bars(faults, action.dafnet.frame_start)
-    if not len(bars.row):
-        return
-
-    view, scale = context.region.view2d, context.preferences.system.ui_scale
-    origin, step = (view.view_to_region(frame, 0.0, clip=False)[0] for frame in (0.0, 1000.0))
-    left, right = (
-        origin + (step - origin) * (edge / 1000.0) for edge in (bars.first - 0.5, bars.last + 0.5)
-    )
-    low = (_BAR_MARGIN + (1.0 - bars.row) * (_BAR_HEIGHT + 1.0)) * scale
-    high = low + _BAR_HEIGHT * scale
-    right = np.maximum(right, left + 1.0)
-
-    corners = np.stack(
-        [left, low, right, low, right, high, left, low, right, high, left, high], axis=1
-    ).reshape(-1, 2)
-    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
-    content = {
-        "pos": np.c_[corners, np.zeros(len(corners))].astype(np.float32),
-        "color": np.repeat(bars.colours, 6, axis=0).astype(np.float32),
-    }
-    gpu.state.blend_set("ALPHA")
-    shader.bind()
-    batch_for_shader(shader, "TRIS", content).draw(shader)
-    gpu.state.blend_set("NONE")
+    if len(bars.row):
+        paint_bars(context, bars)
 
 
 def register() -> None:
