@@ -117,38 +117,37 @@ def parts_of_surfaces(
         return []
 
     longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(1)
-
-    parts = np.maximum(1, np.ceil(longest / spacing)).astype(int)
-
-    coarser = np.sqrt(max(1.0, float((parts.astype(float) ** 2 / 2).sum()) / _MAX_POINTS))
-    parts = np.maximum(1, np.ceil(parts / coarser)).astype(int)
+    cuts = np.maximum(1, np.ceil(longest / spacing)).astype(int)
+    coarser = np.sqrt(max(1.0, float((cuts.astype(float) ** 2 / 2).sum()) / _MAX_POINTS))
+    cuts = np.maximum(1, np.ceil(cuts / coarser)).astype(int)
 
     found, done = [], 0
-    for n in np.unique(parts):
-        alike = triangles[parts == n]
-        each = max(1, _AT_ONCE // ((n + 1) * (n + 2) // 2))  # triangles at once
-        for first in range(0, len(alike), each):
-            some = alike[first : first + each]
-            for weights in _weights(int(n)):
+    for cut in np.unique(cuts):
+        alike = triangles[cuts == cut]
+        at_once = max(1, _AT_ONCE // ((cut + 1) * (cut + 2) // 2))
+        for first in range(0, len(alike), at_once):
+            some = alike[first : first + at_once]
+            for weights in _weights(int(cut)):
                 found.append(np.einsum("pk,fkc->fpc", weights, some).reshape(-1, 3))
                 yield 0.4 + 0.6 * done / len(triangles)
+
             done += len(some)
 
     return found
 
 
-def _weights(n: int) -> Iterator[np.ndarray]:
-    """Barycentric weights (P, 3) of points all over a triangle whose sides are cut into ``n``
+def _weights(cut: int) -> Iterator[np.ndarray]:
+    """Barycentric weights (P, 3) of points all over a triangle whose sides are cut into so many
     parts, at most about a hundred thousand at a time.
     """
-    rows = max(1, _AT_ONCE // (n + 1))
-    for first in range(0, n + 1, rows):
+    rows = max(1, _AT_ONCE // (cut + 1))
+    for first in range(0, cut + 1, rows):
         i, j = np.meshgrid(
-            np.arange(first, min(first + rows, n + 1)), np.arange(n + 1), indexing="ij"
+            np.arange(first, min(first + rows, cut + 1)), np.arange(cut + 1), indexing="ij"
         )
-        inside = i + j <= n
-        u, v = i[inside] / n, j[inside] / n
-        yield np.stack([1.0 - u - v, u, v], axis=-1)
+        inside = i + j <= cut
+        second, third = i[inside] / cut, j[inside] / cut
+        yield np.stack([1.0 - second - third, second, third], axis=-1)
 
 
 @dataclass(frozen=True)
