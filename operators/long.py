@@ -59,7 +59,7 @@ class LongOperator(DafnetOperator):
         self.report_result(run_to_end(self.steps(context)))
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        """Start the job; ``modal`` goes on with it."""
+        """Start the job; ``modal`` continues it."""
         with reported(self):
             self._steps, self._started, self._share = self.steps(context), perf_counter(), 0.0
             if (result := self._advance(self.seconds_before_modal)) is not None:
@@ -70,9 +70,9 @@ class LongOperator(DafnetOperator):
         return {"CANCELLED"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Do a tick's work; Esc cancels.
+        """Work for one tick; Esc cancels.
 
-        Until the end only looking around is let through, so the scene stays as it was read.
+        Until the end only moving the view is let through, so that the scene stays as it was read.
         """
         if event.type == "ESC" or self._running.cancel_requested:
             self.cancel(context)
@@ -126,7 +126,7 @@ class LongOperator(DafnetOperator):
         """Work for some ``seconds``; the result once it is there, else None."""
         now = perf_counter()
         until, step = now + seconds, 0.0
-        # after a long step another one is likely, which had better have its own tick
+        # After a long step another one is likely, which had better have a tick of its own.
         while now < until and step < seconds / 2:
             try:
                 self._share = next(self._steps)

@@ -1,5 +1,5 @@
-"""What is done with the takes in a character's list; each of these is one line of
-``blender.character.takes`` or ``blender.pipeline.job``.
+"""What can be done with the takes in a character's list; the work is done in
+``blender.character.takes`` and ``blender.pipeline.job``.
 """
 
 from typing import Any

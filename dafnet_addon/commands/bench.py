@@ -12,7 +12,7 @@ from .command import Command, Progress, Result, add_weights
 __all__ = ["COMMAND", "benchmark"]
 
 _MEASURES = ("rest", "seats", "speed")
-"""What is measured of the weights."""
+"""Measurements of weights."""
 
 _RESEARCH = {"ablation": "ablation", "canonical": "canonical", "tables": "experiments"}
 """What docs/training.md and docs/experiments.md were made with, and the scripts that do it."""

@@ -1,4 +1,4 @@
-"""``dafnet cool``: a candidate of a run that goes on training."""
+"""``dafnet cool``: candidate weights from a run that keeps training."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Where, and which way round, one sits on a piece of furniture, found on its mesh."""
+"""Finds where to sit on a piece of furniture, and which way to face, by its mesh."""
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ _SMALLEST = 0.15
 _LARGEST = 15.0
 """Metres across, of the largest furniture."""
 
-# Which way one looks.
+# Which way to face.
 _ONE_SIDED = 0.10
 """Metres between the middles of the seat and of what stands up around it, where that is a back."""
 _SNAP = np.radians(30.0)
@@ -55,7 +55,7 @@ _SNAP = np.radians(30.0)
 _SQUARE = 1.3
 """Length over width up to which a seat counts as square, so that any side may be its front."""
 _DEEPEST = 1.1
-"""Metres from a back to the front edge; on what is deeper, such as a bed, one sits on an edge."""
+"""Metres from a back to the front edge; what is deeper, such as a bed, is sat on at an edge."""
 _LEGS = 0.3
 """Metres beyond an edge, and to each side, that legs need to hang there."""
 
@@ -122,8 +122,7 @@ def _hull(points: np.ndarray) -> np.ndarray:
 
 
 def _ends_of_rows(cells: np.ndarray) -> np.ndarray:
-    """The first and the last cell (N, 2) of each row, of cells in order: their hull is that of
-    all.
+    """The first and the last cell (N, 2) of each row, of sorted cells; they have the hull of all.
     """
     starts = np.flatnonzero(np.diff(cells[:, 0], prepend=-1))
     return cells[np.concatenate([starts, np.append(starts[1:], len(cells)) - 1])]
@@ -166,8 +165,8 @@ def _roomy(mask: np.ndarray, reach: int) -> np.ndarray:
 def _seat_level(
     field: HeightField, floor: float
 ) -> Generator[float, None, tuple[float, np.ndarray] | None]:
-    """Height over ``floor`` and cells (N, 2) of the level that one sits on: the lowest one that has
-    about as much room as any. None where there is none.
+    """Height over ``floor`` and cells (N, 2) of the level to sit on: the lowest one that has about
+    as much room as any. None where there is none.
 
     This is where the height of a seat is decided. Backs, arms and cushions are higher than the seat
     between them, and rims have no room for a body.
@@ -207,8 +206,8 @@ def _snapped(forward: np.ndarray, ways: np.ndarray) -> np.ndarray:
 
 
 def _spot(places: np.ndarray, forward: np.ndarray, near: np.ndarray | None) -> _Spot:
-    """Where one sits on ``places`` (N, 2) that looks ``forward`` (2,): in the middle or beside
-    ``near`` (2,); where a part of a sofa is as deep as a bed, on another part.
+    """Where to sit on ``places`` (N, 2), facing ``forward`` (2,): in the middle or beside ``near``
+    (2,); if a part of a sofa is as deep as a bed, on another part.
     """
     sideways = np.array([forward[1], -forward[0]])
     depth, width = places @ forward, places @ sideways
@@ -248,8 +247,7 @@ def _facing(
     towards: np.ndarray,
     near: np.ndarray | None,
 ) -> tuple[np.ndarray, bool]:
-    """The direction (2,) in which one looks who sits on ``places`` (N, 2), and whether one leans
-    against a back.
+    """The direction (2,) to face on ``places`` (N, 2), and whether there is a back to lean against.
 
     ``field`` holds the whole piece, whose seat is at ``level`` over ``floor``; ``axes`` (2, 2): the
     seat's longer and shorter side.
@@ -301,15 +299,13 @@ def seat_of(
     near: np.ndarray | None = None,
     size: float = 1.0,
 ) -> Generator[float, None, SeatPlace]:
-    """Where one sits on one piece of furniture, made of ``solids``; world, metres, people of 1.75
-    m.
+    """Where to sit on one piece of furniture, made of ``solids``; world, metres, people of 1.75 m.
 
-    One sits in front of a back and looks away from it. Without a back one looks along the seat's
-    shorter side, to where ``towards`` (2,) lies; on what is as deep as a bed one sits on an edge
-    towards there, at which nothing stands up. On a wide seat one sits in the middle, or beside
-    ``near`` (2,) where given. Raises InputError where there is nothing to sit on, which is a level
-    surface between 22 and 85 cm over ``floor``. ``size``: of the character, over 1.75 m, by which
-    messages give lengths.
+    In front of a back, facing away from it. Without a back, facing along the seat's shorter side,
+    to where ``towards`` (2,) lies; on what is as deep as a bed, on an edge towards there, at which
+    nothing stands up. On a wide seat in the middle, or beside ``near`` (2,) where given. Raises
+    InputError where there is nothing to sit on, which is a level surface between 22 and 85 cm over
+    ``floor``. ``size``: of the character, over 1.75 m, by which messages give lengths.
     """
     parts = yield from within(parts_of_surfaces.steps(solids, 0.6 * _CELL), 0.0, 0.5)
     field = yield from within(_field_of(parts, floor), 0.5, 0.6)

@@ -35,8 +35,8 @@ def _is_not_the_character(settings: "CharacterSettings", candidate: bpy.types.Ob
 
 
 class TakeSettings(bpy.types.PropertyGroup):
-    """What is known of an action that holds a take (``Action.dafnet``); the motion itself is packed
-    into it as well (``takes``).
+    """What is known about an action that holds a take (``Action.dafnet``); the motion itself is
+    packed into it as well (``takes``).
     """
 
     seed: IntProperty(name="Seed", options=set(), description="The seed that it was generated with")

@@ -1,4 +1,4 @@
-"""A plain copy of a character's settings, which a job keeps while the animator goes on."""
+"""A plain copy of a character's settings, which a job keeps while the animator works on."""
 
 from dataclasses import dataclass
 from typing import Any

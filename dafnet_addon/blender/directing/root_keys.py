@@ -27,9 +27,9 @@ __all__ = [
 ]
 
 MOVES = ("location", "rotation_euler")
-"""What is keyed of a root."""
+"""The channels of a root that are keyed."""
 _KEYS_A_SECOND = 10
-"""How densely a route is keyed."""
+"""How many keys a route gets for each second."""
 _CHECKED_FRAMES = 12
 """In how many frames it is checked that the root follows its keys."""
 _DISTANCE_TOLERANCE = 1e-3

@@ -45,8 +45,9 @@ class Walk:
 @dataclass(frozen=True)
 class Start:
     """Where a character is at frame ``first``: ``place`` (3,) and ``yaw`` of its root, and the
-    furniture then, in canonical metres, of which a Blender unit is ``unit``; the character's
-    ``size`` over the canonical one.
+    furniture then; canonical metres.
+
+    ``unit``: a Blender unit in canonical metres. ``size``: the character's over the canonical one.
     """
 
     first: int

@@ -157,7 +157,7 @@ def _path(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Drawi
 
 
 def _floor_of(context: bpy.types.Context, armature: bpy.types.Object, place: np.ndarray) -> float:
-    """The floor's height, world metres: that of the played take, else that of the root at ``place``
+    """The floor's height, world metres, under the take that plays, else under the root at ``place``
     (3,).
     """
     played = played_now(context, armature)

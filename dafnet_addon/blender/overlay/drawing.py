@@ -104,7 +104,7 @@ def floor_path(path: RootPath, unit: float, facing_every: int, now: int) -> Draw
     """A root's path, where it faces every so many frames, and where it is in its frame ``now`` if
     that is one of its frames.
 
-    ``path`` is in metres, of which a Blender unit is ``unit``.
+    ``path`` is in metres; ``unit``: a Blender unit in metres.
     """
     places = path.position + np.array((0.0, 0.0, ABOVE_FLOOR))
     ahead = places + _FACING_LENGTH * path.rotation[:, :, 1]

@@ -155,8 +155,8 @@ steps = run.steps
 
 
 def _kept_take(settings: Settings) -> tuple[Take | None, int]:
-    """The take of which a part is kept, and its first frame to generate anew; None and 0 where none
-    is kept.
+    """The take that is kept in part, and its first frame that is generated anew; None and 0 where
+    nothing is kept.
     """
     if settings.kept is None:
         return None, 0

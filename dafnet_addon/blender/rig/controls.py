@@ -269,7 +269,7 @@ def channels_for(
     object_turns, object_places = objects[:, :3, :3] / scale, objects[:, :3, 3]
     neutral, start = _rotations(attachments.neutral), attachments.neutral[:, :3, 3]
 
-    # Of each control in the armature's space: the rotation and the place that it is to have.
+    # The rotation and the place that each control is to have, in the armature's space.
     wanted, place = np.empty((frames, count, 3, 3)), np.empty((frames, count, 3))
     turns, moves = np.empty((frames, count, 3, 3)), np.zeros((frames, count, 3))
 
@@ -277,7 +277,7 @@ def channels_for(
         return rotate(transpose(object_turns), points - object_places) / scale
 
     for i, control in enumerate(controls):
-        # Where what it hangs on takes it, without channels of its own.
+        # Where the controls that it moves with take it, while its own channels are empty.
         turner, mover = attachments.turned_by[i], attachments.moved_by[i]
         free = neutral[i] if turner < 0 else wanted[:, turner] @ neutral[turner].T @ neutral[i]
         free = np.broadcast_to(free, (frames, 3, 3))

@@ -82,7 +82,7 @@ def user_folder(create: bool = False) -> Path:
 
 
 def map_files() -> dict[str, Path]:
-    """Files of all maps by a name of their own: those that ship, then the user's ("my_" before the
+    """Files of all maps by unique names: those that ship, then the user's ("my_" before the
     file's name).
     """
     shipped = {file.stem: file for file in sorted(_SHIPPED.glob("*.json"))}

@@ -224,7 +224,7 @@ class Furniture:
                 self._toggled[member.name] = None
 
     def solids(self, unit: float) -> tuple[Mesh, ...]:
-        """The furniture in metres, of which a Blender unit is ``unit``."""
+        """The furniture in metres; ``unit``: a Blender unit in metres."""
         return tuple(_solid(piece, unit) for piece in self._pieces)
 
     def warnings(self) -> Iterator[str]:

@@ -134,7 +134,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     simulations = dependencies.simulations([root, *targets.values(), *members], shaped=False)
     simulations += dependencies.simulations(sources)
 
-    # Furniture is read once, at the first frame, by when these have given it a shape.
+    # Furniture is read at the first frame; simulations that began earlier have shaped it by then.
     simulations += [each for each in dependencies.simulations(members) if each.since < frames[0]]
     tracks = _Tracks(armature, root=root, targets=targets, source=source, places=places)
 
@@ -214,8 +214,8 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
 
 
 class _Tracks:
-    """What is read of a character and of what leads it, frame by frame; matrices (4, 4) in Blender
-    units.
+    """What is read, frame by frame, about a character and about what leads it; matrices (4, 4) in
+    Blender units.
     """
 
     def __init__(
