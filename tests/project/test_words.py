@@ -94,6 +94,8 @@ def test_sentences_are_english(file: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_files_that_pages_name_are_there(page: Path) -> None:
-    named = re.findall(r"`([\w./-]+/[\w-]+\.(?:py|toml|json|md|sh))`", page.read_text("utf-8"))
+    named = re.findall(
+        r"`([\w./-]+/[\w-]+\.(?:py|toml|json|md|sh))`", page.read_text(encoding="utf-8")
+    )
     bases = (ROOT, ROOT / "dafnet_addon", page.parent)
     assert not [path for path in named if not any((base / path).exists() for base in bases)]
