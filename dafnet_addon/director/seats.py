@@ -122,7 +122,7 @@ def _hull(points: np.ndarray) -> np.ndarray:
 
 
 def _ends_of_rows(cells: np.ndarray) -> np.ndarray:
-    """The first and the last cell (N, 2) of each row, of sorted cells; they have the hull of all."""
+    """The first and last cell (N, 2) of each row of sorted cells; their hull is that of all."""
     starts = np.flatnonzero(np.diff(cells[:, 0], prepend=-1))
     return cells[np.concatenate([starts, np.append(starts[1:], len(cells)) - 1])]
 
