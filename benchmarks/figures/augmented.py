@@ -9,8 +9,8 @@ from dafnet_addon.blender.showcase.stage import Stage
 from dafnet_addon.core.root import root_from_joints
 from dafnet_addon.core.skeleton import END_EFFECTORS, PELVIS
 from dafnet_addon.core.weights import Weights
+from dafnet_addon.data.motion.interactions import working
 from dafnet_addon.data.motion.retarget import at_seat_height, at_top_height
-from dafnet_addon.data.motion.uses import working
 
 from . import furniture
 from .furniture import HERE

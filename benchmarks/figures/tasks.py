@@ -13,7 +13,7 @@ from dafnet_addon.core.root import RootPath, to_world
 from dafnet_addon.core.series import MODEL_FPS
 from dafnet_addon.core.skeleton import END_EFFECTORS, PELVIS
 from dafnet_addon.core.weights import Weights
-from dafnet_addon.data.synthesis.courses import AT_DESKS
+from dafnet_addon.data.synthesis.hand_paths import AT_DESKS
 from dafnet_addon.demo import Place
 
 from . import furniture

@@ -61,7 +61,7 @@ class Tally:
     used: int = 0
 
     def attempt(self, use: Callable[[], None], names: set[str]) -> None:
-        """Use a mutation; if it is refused, the sentence has to name one of ``names``."""
+        """Interaction a mutation; if it is refused, the sentence has to name one of ``names``."""
         self.tried += 1
         try:
             with bounded(), np.errstate(all="ignore"):

@@ -8,11 +8,11 @@ import pytest
 from dafnet_addon.core.rotations import yaw_matrix
 from dafnet_addon.core.skeleton import LOWER, OFFSETS, PARENTS, joint
 from dafnet_addon.data.motion.canonical import pose_legs
+from dafnet_addon.data.motion.interactions import stroking, working
 from dafnet_addon.data.motion.motion import Motion, motion_of
-from dafnet_addon.data.motion.uses import stroking, working
 from dafnet_addon.data.synthesis import compose
 from dafnet_addon.data.synthesis.compose import composed
-from dafnet_addon.data.synthesis.joins import handed, joined, lent
+from dafnet_addon.data.synthesis.joins import join, lead_hand, lend_upper_body
 from dafnet_addon.data.synthesis.pieces import entrance
 from kit.places import MOCAP
 from kit.sitting import sit_down, standing
@@ -37,7 +37,7 @@ def test_a_join_neither_jumps_nor_slides_a_standing_foot():
     turned = sit @ yaw_matrix(np.array(2.0)).T + (3.0, -1.0, 0.0)
     entry = entrance(turned, 100)
     assert entry is not None and 30 < entry < 60
-    whole = joined(stand, turned[entry:])
+    whole = join(stand, turned[entry:])
     assert len(whole) == len(stand) - 1 + len(turned) - entry
     assert np.abs(np.diff(whole[:, TOES, :2], axis=0)).max() < 1e-3
     assert _speed(whole).max() < _speed(sit).max() + 0.3
@@ -56,7 +56,7 @@ def test_a_foot_works_off_its_difference_while_it_swings():
     )
     step = pose_legs(step)
     stand[:, [joint("left_ankle"), joint("left_foot")], 0] -= 0.06
-    whole = joined(pose_legs(stand), step)
+    whole = join(pose_legs(stand), step)
     toe = whole[:, joint("left_foot"), :2]
     assert np.linalg.norm(np.diff(toe[59:98], axis=0), axis=-1).max() < 1e-3
     gap = whole[:, joint("right_foot"), 0] - whole[:, joint("left_foot"), 0]
@@ -68,7 +68,7 @@ def test_a_lent_upper_body_keeps_legs_and_moves_the_chest_and_arms_as_the_other_
     waving = standing(50)
     waving[:, joint("right_elbow")] = waving[:, joint("right_shoulder")] + (0.26, 0.0, 0.0)
     waving[:, joint("right_wrist")] = waving[:, joint("right_elbow")] + (0.0, 0.0, 0.25)
-    seated = lent(sit, waving @ yaw_matrix(np.array(1.0)).T, np.linspace(0, 1, 50))
+    seated = lend_upper_body(sit, waving @ yaw_matrix(np.array(1.0)).T, np.linspace(0, 1, 50))
     assert (
         np.abs(seated[:, LOWER] - sit[:, LOWER]).max() < 1e-6
         and np.abs(seated[0] - sit[0]).max() < 1e-6
@@ -80,7 +80,7 @@ def test_a_lent_upper_body_keeps_legs_and_moves_the_chest_and_arms_as_the_other_
 def test_a_led_hand_is_where_it_is_led_and_the_other_is_left_alone():
     body = standing(40)
     wrist = np.tile([0.2, 0.3, 1.2], (40, 1))
-    led = handed(body, "right_", wrist, np.linspace(0, 1, 40))
+    led = lead_hand(body, "right_", wrist, np.linspace(0, 1, 40))
     assert np.abs(led[-1, joint("right_wrist")] - wrist[-1]).max() < 1e-6
     assert np.abs(led[0] - body[0]).max() < 1e-6 and np.abs(_lengths(led) - BONES).max() < 1e-6
     moved = np.abs(led - body).max((0, 2)) > 1e-9
@@ -89,7 +89,7 @@ def test_a_led_hand_is_where_it_is_led_and_the_other_is_left_alone():
 
 
 def test_nothing_is_composed_of_nothing():
-    still = motion_of("stand", "made", "one", "standing", standing(100))
+    still = motion_of("stand", "composition", "one", "standing", standing(100))
     assert composed([]) == [] and composed([still]) == []
 
 

@@ -16,7 +16,7 @@ from dafnet_addon.core.skeleton import FEET, HIPS, NECK, OFFSETS, PARENTS, REST,
 from dafnet_addon.core.solids import Box, Scene
 from dafnet_addon.data.capture.mocap import Clip, read_clips
 from dafnet_addon.data.dataset.motions import read_motions, write_motions
-from dafnet_addon.data.dataset.windows import draw
+from dafnet_addon.data.dataset.windows import draw_window
 from dafnet_addon.data.furnish import boxes as b
 from dafnet_addon.data.motion.canonical import LEG, calibrate, canonical, pose_legs
 from dafnet_addon.data.motion.motion import mirrored, motion_of
@@ -81,7 +81,7 @@ def test_windows_hold_the_motion_they_were_drawn_from():
     motion = motion_of("made up", "test", "nobody", "sit_down", _sit_down())
     rng, drawn = np.random.default_rng(1), 0
     for _ in range(30):
-        window = draw(rng, motion, focus=100)
+        window = draw_window(rng, motion, focus=100)
         if window is None:
             continue
         drawn += 1
@@ -162,7 +162,9 @@ def test_real_windows_are_in_the_roots_frame(real_clips):
     motion = motion_of(clip.name, clip.source, clip.subject, clip.category, canonical(clip, body))
     rng = np.random.default_rng(0)
     windows = [
-        w for w in (draw(rng, motion, motion.rests[0].start) for _ in range(20)) if w is not None
+        w
+        for w in (draw_window(rng, motion, motion.rests[0].start) for _ in range(20))
+        if w is not None
     ]
     assert len(windows) > 8
     pelvis = np.stack([w.poses.reshape(80, 22, 3)[:, 0] for w in windows])
@@ -183,7 +185,7 @@ def test_a_seat_that_is_used_later_is_there_before():
     motion = motion_of("a", "b", "c", "sit-stand", joints)
     rng, seen, standing = np.random.default_rng(0), 0, 0
     for _ in range(40):
-        window = draw(rng, motion, 40)
+        window = draw_window(rng, motion, 40)
         if window is None:
             continue
         pelvis = window.poses.reshape(80, 22, 3)[:, 0, 2]

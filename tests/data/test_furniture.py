@@ -19,9 +19,9 @@ from dafnet_addon.data.furnish.shapes import PELVIS_OVER
 from dafnet_addon.data.furnish.strays import scattered
 from dafnet_addon.data.motion.canonical import pose_legs
 from dafnet_addon.data.motion.contacts import CONTACTS, contacts
+from dafnet_addon.data.motion.interactions import lying, reaching, stroking, working
 from dafnet_addon.data.motion.motion import motion_of
 from dafnet_addon.data.motion.rests import resting
-from dafnet_addon.data.motion.uses import lying, reaching, stroking, working
 
 FEET = [joint(side + part) for side in ("left_", "right_") for part in ("ankle", "foot")]
 TORSO = [

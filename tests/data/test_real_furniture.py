@@ -29,8 +29,8 @@ from dafnet_addon.data.furnish.shapes import (
     bank_of,
     shapes_of,
 )
+from dafnet_addon.data.motion.interactions import Interaction
 from dafnet_addon.data.motion.rests import Rest
-from dafnet_addon.data.motion.uses import Use
 from kit.places import LIBRARY
 
 trimesh = pytest.importorskip("trimesh")
@@ -359,14 +359,14 @@ def test_hands_work_on_a_real_desk() -> None:
     away = np.array([-np.sin(yaw), np.cos(yaw)])
     hands = origin + np.array([[0.0], [0.12]]) * away
     for wrists in (0.70, 0.78):
-        use = Use("desk", 0, 40, np.c_[hands, [wrists, wrists + 0.02]], yaw)
+        use = Interaction("desk", 0, 40, np.c_[hands, [wrists, wrists + 0.02]], yaw)
         room = desk_shape_for(np.random.default_rng(0), desks, use, _free(0.0))
         assert room is not None
         top = np.array([*hands.mean(0), wrists - 0.035])
         assert abs(float(desks.distances(room.shapes, top[None])[0])) < 0.03
         nearer = np.array([[*(hands[0] - 0.3 * away), wrists - 0.035]])
         assert float(desks.distances(room.shapes, nearer)[0]) > 0.05, "the body is before it"
-    too_high = Use("desk", 0, 40, np.c_[hands, [1.1, 1.1]], yaw)
+    too_high = Interaction("desk", 0, 40, np.c_[hands, [1.1, 1.1]], yaw)
     assert desk_shape_for(np.random.default_rng(0), desks, too_high, _free(0.0)) is None
 
 
@@ -378,7 +378,7 @@ def test_one_lies_in_a_real_bed() -> None:
     seat = beds.shapes[0].seats[0]
     line = np.array([[0.0, -0.2, seat.height + LIES_OVER], [0.0, 0.2, seat.height + LIES_OVER]])
     found = bed_shape_for(
-        np.random.default_rng(0), beds, Use("bed", 0, 30, line, 0.0), _free(0.0), []
+        np.random.default_rng(0), beds, Interaction("bed", 0, 30, line, 0.0), _free(0.0), []
     )
     assert found is not None
     along = np.array([[0.0, y, seat.height - 0.03] for y in (-0.9, -0.4, 0.0, 0.5)])

@@ -10,8 +10,8 @@ from dafnet_addon.core.metrics import foot_sliding, jerk
 from dafnet_addon.core.skeleton import MIRROR, OFFSETS, PARENTS, REST, TOE_HEIGHT, joint
 from dafnet_addon.data.capture.mocap import read_clips
 from dafnet_addon.data.motion.canonical import calibrate, canonical, pose_legs
+from dafnet_addon.data.motion.interactions import Interaction
 from dafnet_addon.data.motion.retarget import at_seat_height, at_top_height
-from dafnet_addon.data.motion.uses import Use
 from kit.places import MOCAP
 
 BONES = np.linalg.norm(OFFSETS[1:], axis=1)
@@ -185,7 +185,7 @@ def test_hands_go_with_the_top_that_they_work_on_and_come_to_it_smoothly(rise):
     joints[:, ELBOWS], joints[:, WRISTS] = two_bone(
         joints[:, SHOULDERS], wrists, joints[:, ELBOWS], 0.26, 0.25
     )
-    use = Use("desk", 145, 200, joints[145:, WRISTS[1]], 0.0)
+    use = Interaction("desk", 145, 200, joints[145:, WRISTS[1]], 0.0)
     moved = at_top_height(joints, use, rise)
     up = moved[:, WRISTS[1], 2] - joints[:, WRISTS[1], 2]
     assert np.abs(up[145:] - rise).max() < 1e-6 and np.abs(up[:115]).max() < 1e-6

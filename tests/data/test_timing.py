@@ -133,7 +133,7 @@ def test_windows_hold_whole_ways_of_all_these_times() -> None:
     motion, rng = _down_and_up(30), np.random.default_rng(3)
     found = []
     for _ in range(60):
-        window = windows.draw(rng, motion, 75)
+        window = windows.draw_window(rng, motion, 75)
         if window is not None:
             height = window.poses.reshape(80, 22, 3)[:, 0, 2]
             share = (height.max() - height) / np.ptp(height) if np.ptp(height) > 0.25 else height

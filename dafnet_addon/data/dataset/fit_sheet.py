@@ -18,10 +18,10 @@ from ..furnish.flesh import Furnishing, probes
 from ..furnish.real_pieces import bed_shape_for, desk_shape_for, seat_shape_for
 from ..furnish.seats import seat_for
 from ..furnish.shapes import ShapeBank
+from ..motion.interactions import Interaction, lying, working
 from ..motion.motion import Motion
 from ..motion.rests import Rest, resting
 from ..motion.retarget import at_seat_height
-from ..motion.uses import Use, lying, working
 from .motions import Draws
 from .picture import body_of, picture
 from .windows import HIGHEST, LOWEST, lowest_pelvis
@@ -89,7 +89,9 @@ def _sits(
     return None
 
 
-def _lies(joints: np.ndarray, fit: Callable[[Use, np.ndarray], Furnishing | None]) -> Cell | None:
+def _lies(
+    joints: np.ndarray, fit: Callable[[Interaction, np.ndarray], Furnishing | None]
+) -> Cell | None:
     for use in lying(joints)[:1]:
         room = fit(use, probes(joints))
         if room is not None:
@@ -99,7 +101,9 @@ def _lies(joints: np.ndarray, fit: Callable[[Use, np.ndarray], Furnishing | None
     return None
 
 
-def _works(joints: np.ndarray, fit: Callable[[Use, np.ndarray], Furnishing | None]) -> Cell | None:
+def _works(
+    joints: np.ndarray, fit: Callable[[Interaction, np.ndarray], Furnishing | None]
+) -> Cell | None:
     path = root_from_joints(joints)
     for use in working(joints, path)[:1]:
         room = fit(use, probes(joints))

@@ -12,12 +12,12 @@ from ...core.series import MODEL_FPS
 from ...core.skeleton import PELVIS
 from ..furnish.flesh import NO_BANK
 from ..furnish.shapes import ShapeBank
+from ..motion.interactions import stroking, working
 from ..motion.motion import Motion
-from ..motion.uses import stroking, working
 from ..synthesis.compose import composed
 from .motions import Draws
 from .usable import AT_BENCHES, AT_BOARDS, SITS, STANDS, WALKS
-from .windows import Window, draw
+from .windows import Window, draw_window
 
 __all__ = ["SHARES", "moments_of", "sample"]
 
@@ -153,7 +153,7 @@ def sample(
         kind = kinds[rng.choice(len(kinds), p=share / share.sum())]
         rows, weight = draws[kind]
         motion, frame = rows[rng.choice(len(rows), p=weight)]
-        window = draw(rng, motions[motion], int(frame), bank)
+        window = draw_window(rng, motions[motion], int(frame), bank)
         if window is not None:
             return kind, window
 

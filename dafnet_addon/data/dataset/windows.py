@@ -24,6 +24,7 @@ from ..furnish.boxes import near
 from ..furnish.flesh import NO_BANK
 from ..furnish.furniture import furnished
 from ..furnish.shapes import ABSENT_SHAPE, SHAPES, ShapeBank
+from ..motion.interactions import working
 from ..motion.motion import Motion, mirrored
 from ..motion.rests import resting
 from ..motion.retarget import at_seat_height, at_top_height
@@ -36,7 +37,6 @@ from ..motion.timing import (
     stretches_of,
     transitions,
 )
-from ..motion.uses import working
 
 __all__ = [
     "HIGHEST",
@@ -45,7 +45,7 @@ __all__ = [
     "LOWEST",
     "Window",
     "at_another_desk",
-    "draw",
+    "draw_window",
     "lowest_pelvis",
 ]
 
@@ -160,7 +160,7 @@ def _near_shapes(placed: np.ndarray, path: RootPath) -> np.ndarray:
     return np.concatenate([kept, np.tile(ABSENT_SHAPE, (SHAPES - len(kept), 1))])
 
 
-def draw(
+def draw_window(
     rng: np.random.Generator, motion: Motion, focus: int | None = None, bank: ShapeBank = NO_BANK
 ) -> Window | None:
     """One augmented, furnished window, around frame ``focus`` where given; None where this draw

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from ..motion.interactions import Interaction
 from ..motion.rests import Rest
-from ..motion.uses import Use
 from .boxes import NO_BOXES, box, placed
 from .carriers import carrier
 from .flesh import GIVES, LIES_SUNK, Furnishing, box_clearance
@@ -15,14 +15,14 @@ _TRIES = 16
 _NEAR_BY = 0.8  # metres from where one lies to where one sits on the same bed
 
 
-def beside(use: Use, rests: list[Rest]) -> list[Rest]:
+def beside(use: Interaction, rests: list[Rest]) -> list[Rest]:
     """The rests on the edge of where one lies."""
     middle = use.points.mean(0)
     return [rest for rest in rests if np.linalg.norm((rest.position - middle)[:2]) < _NEAR_BY]
 
 
 def bed_for(
-    rng: np.random.Generator, use: Use, points: np.ndarray, rests: list[Rest]
+    rng: np.random.Generator, use: Interaction, points: np.ndarray, rests: list[Rest]
 ) -> np.ndarray | None:
     """A bed, or a sofa with its back to one side, under a lying body, head end along +y; it carries
     the rests beside it too.

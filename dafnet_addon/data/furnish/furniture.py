@@ -11,8 +11,8 @@ import numpy as np
 from ...core.root import RootPath
 from ...core.series import MODEL_FPS
 from ...core.skeleton import ANKLES, PELVIS
+from ..motion.interactions import Interaction, lying, reaching, stroking, working
 from ..motion.rests import Rest, resting
-from ..motion.uses import Use, lying, reaching, stroking, working
 from .beds import bed_for, beside
 from .flesh import NO_BANK, Furnishing, probes
 from .real_pieces import bed_shape_for, carries, desk_shape_for, seat_shape_for, stray_shape
@@ -44,7 +44,7 @@ def _standing_place(path: RootPath) -> Rest | None:
     return Rest(slowest, slowest + 1, path.position[slowest], float(path.yaw[slowest]))
 
 
-def _cut_off(joints: np.ndarray, beds: list[Use], rests: list[Rest]) -> bool:
+def _cut_off(joints: np.ndarray, beds: list[Interaction], rests: list[Rest]) -> bool:
     """Whether the motion begins or ends half-way down to a seat: low, off its feet, and not near a
     place known from the motion.
 
@@ -135,7 +135,11 @@ def _seat_under(
 
 
 def _bed(
-    rng: np.random.Generator, bank: ShapeBank, use: Use, points: np.ndarray, rests: list[Rest]
+    rng: np.random.Generator,
+    bank: ShapeBank,
+    use: Interaction,
+    points: np.ndarray,
+    rests: list[Rest],
 ) -> Furnishing | None:
     """A real bed or sofa where there is one to be had, else one of boxes."""
     real = len(bank) > 0 and rng.random() < _REAL
@@ -144,7 +148,7 @@ def _bed(
 
 
 def _worked_at(
-    rng: np.random.Generator, bank: ShapeBank, use: Use, points: np.ndarray
+    rng: np.random.Generator, bank: ShapeBank, use: Interaction, points: np.ndarray
 ) -> Furnishing | None:
     """A desk, board or shelf at hands: a real desk where there is one to be had."""
     real = use.kind == "desk" and len(bank) > 0 and rng.random() < _REAL

@@ -10,11 +10,11 @@ import numpy as np
 
 from ...core.root import RootPath, forward_of
 from ...core.skeleton import SEAT_TO_PELVIS
+from ..motion.interactions import Interaction, across
 from ..motion.rests import Rest
-from ..motion.uses import Use, across
 from .flesh import GIVES, LIES_SUNK, Furnishing, clearance, nearest_box, pressed, sunk
 from .shapes import STRETCH, Seat, ShapeBank
-from .sitters import leans_back
+from .sitters import MET, leans_back, trunk_of
 
 __all__ = [
     "LIES_OVER",
@@ -51,6 +51,7 @@ _SHARES = {
 _LEANT_ON = ("chair", "armchair", "sofa")
 _PIECES, _PLACES = 5, 6  # tried for one rest, and on each of them
 _FROM_USUAL = (-0.08, 0.03)  # metres forward of where ``director.seats`` puts the pelvis, at first
+_FARTHEST_BACK, _CLOSER_BY, _CLOSER = -0.16, 0.03, 12  # metres; the same from there on; places
 _LEAST_BEFORE = 0.1  # metres of seat that are left before the pelvis, where one sits forward
 _TURNED = 0.08  # radians
 _WORKED_AT = ("desk", "table")
@@ -95,20 +96,27 @@ def seat_shape_for(
     (N, P, 3), free.
 
     A piece is drawn first, and then tried further and further forward on its seat: so what is easy
-    to sit on, as a plain chair, does not take the place of what is not.
+    to sit on, as a plain chair, does not take the place of what is not. Who may lean on a back
+    mostly sits as near to it as the body allows.
     """
     pelvis = float(rest.position[2])
     pieces = _pieces(bank, pelvis)
+    met = trunk_of(rest, points) is not None and rng.random() < MET
     if leans_back(rest, points):
         pieces = {kind: own for kind, own in pieces.items() if kind in _LEANT_ON}
     for _ in range(_PIECES if pieces else 0):
         seats = _drawn(rng, pieces)
-        for place in range(_PLACES):
+        for place in range(_CLOSER if met else _PLACES):
             number, seat = seats[rng.integers(len(seats))]
             forward = forward_of(seat.yaw)
             right = np.array([forward[1], -forward[0]])
             room = max(0.0, seat.edge - _LEAST_BEFORE)
-            ahead = min(rng.uniform(*_FROM_USUAL) + room * place / (_PLACES - 1), room)
+            ahead = min(
+                _FARTHEST_BACK + _CLOSER_BY * place
+                if met
+                else rng.uniform(*_FROM_USUAL) + room * place / (_PLACES - 1),
+                room,
+            )
             spot = seat.position + ahead * forward + rng.uniform(-seat.aside, seat.aside) * right
             row = np.array([[number, *(-spot), 0.0, _stretch(seat, pelvis)]])
             yaw = rest.yaw - seat.yaw + rng.normal(0.0, _TURNED)
@@ -120,7 +128,11 @@ def seat_shape_for(
 
 
 def bed_shape_for(
-    rng: np.random.Generator, bank: ShapeBank, use: Use, points: np.ndarray, rests: list[Rest]
+    rng: np.random.Generator,
+    bank: ShapeBank,
+    use: Interaction,
+    points: np.ndarray,
+    rests: list[Rest],
 ) -> Furnishing | None:
     """A real bed or sofa under a lying body; it carries the ``rests`` beside it too, as one sits
     down on its edge.
@@ -170,7 +182,7 @@ def bed_shape_for(
 
 
 def desk_shape_for(
-    rng: np.random.Generator, bank: ShapeBank, use: Use, points: np.ndarray
+    rng: np.random.Generator, bank: ShapeBank, use: Interaction, points: np.ndarray
 ) -> Furnishing | None:
     """A real desk or table, 2 to 5 cm under the lowest wrist that works on it, or None."""
     origin = use.points[:, :2].mean(0)

@@ -11,14 +11,13 @@ from .boxes import NO_BOXES, box, placed
 from .carriers import STYLES, carrier
 from .flesh import GIVES, box_clearance, sunk
 from .shapes import PELVIS_OVER
-from .sitters import Forearm, Trunk, forearm_of, leans_back, trunk_of
+from .sitters import MET, Forearm, Trunk, forearm_of, leans_back, trunk_of
 
 __all__ = ["SEATS", "SEAT_SHARES", "SeatKind", "seat", "seat_for"]
 
 _TRIES = 16
-_TOUCHES = (0.0, 0.018)  # metres that a back presses into the flesh it meets
+_TOUCHES = (0.0, 0.045)  # metres that a back presses into the flesh it meets
 _YIELDS = 0.13  # metres that a back is moved away for who does not leave it that room
-_MET = 0.75  # of the backs, that who leans on them meets
 _INWARD = (0.0, 0.04)  # metres from such an arm to the inner side of what carries it
 _ON_EDGES = 0.12  # of the other seats, on which one sits far before the back
 _EDGE_BEHIND, _EDGE_BEFORE = (0.26, 0.4), (0.05, 0.12)  # metres
@@ -315,8 +314,8 @@ def seat_for(
     """
     kind = wanted or SEATS[rng.choice(len(SEATS), p=SEAT_SHARES)]
     error = 0.0 if wanted else float(np.clip(rng.normal(0.0, 0.008), -0.02, 0.02))
-    trunk = None if wanted or rng.random() > _MET else trunk_of(rest, points)
-    forearm = None if wanted or rng.random() > _MET else forearm_of(rest, points)
+    trunk = None if wanted or rng.random() > MET else trunk_of(rest, points)
+    forearm = None if wanted or rng.random() > MET else forearm_of(rest, points)
     if forearm is not None and not kind.armed:
         kind = SEATS[rng.choice(_ARMED)]
     leans = not wanted and leans_back(rest, points)
@@ -340,7 +339,8 @@ def seat_for(
             continue
 
         # Backs and arms that the body would cut are tried anew for a while, then left out.
-        free = [part for part in extras if box_clearance(part, points, 0.02) >= 0]
+        give = 0.02 if meets is None and lies is None else GIVES
+        free = [part for part in extras if box_clearance(part, points, give) >= 0]
         if len(free) < len(extras) and (leans or attempt < _TRIES // 4):
             continue
         return np.concatenate([carrying, *free])

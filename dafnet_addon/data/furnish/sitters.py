@@ -8,12 +8,16 @@ from ...core.root import forward_of
 from ..motion.rests import Rest
 from .flesh import FOREARMS, RADIUS, STEP, TRUNK
 
-__all__ = ["Forearm", "Trunk", "forearm_of", "leans_back", "trunk_of"]
+__all__ = ["MET", "Forearm", "Trunk", "forearm_of", "leans_back", "trunk_of"]
+
+MET = 0.75
+"""Of the backs and arms, that are met by who leans on them."""
 
 _LEVEL = 0.07  # metres that an arm's elbow and wrist differ in height, of one that lies
 _ASIDE = (0.19, 0.40)  # metres from the middle of the body to an arm that lies
 _ARM_STILL = 0.06  # metres that its wrist moves
 _LEANS = (-0.05, 0.75)  # tangents of trunks that a back may meet
+_MOSTLY = 0.75  # of the time that a trunk is no farther back
 _NEEDS_A_BACK = 0.3  # tangent of a lean that nobody holds for long without one
 
 
@@ -43,7 +47,7 @@ def trunk_of(rest: Rest, points: np.ndarray) -> Trunk | None:
         return None
 
     away = (own[..., :2] - rest.position[:2]) @ -forward_of(rest.yaw)
-    back = np.quantile(away, 0.9, axis=0) + RADIUS[TRUNK]
+    back = np.quantile(away, _MOSTLY, axis=0) + RADIUS[TRUNK]
     height = np.median(own[..., 2], axis=0) - rest.position[2]
     lean = float((back[1] - back[0]) / max(height[1] - height[0], 0.1))
     if not _LEANS[0] < lean < _LEANS[1]:

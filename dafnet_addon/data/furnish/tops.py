@@ -3,8 +3,8 @@
 import numpy as np
 
 from ...core.root import forward_of
+from ..motion.interactions import Interaction, across
 from ..motion.rests import Rest
-from ..motion.uses import Use, across
 from .boxes import box, placed
 from .carriers import STYLES, carrier
 from .flesh import box_clearance, pressed
@@ -18,7 +18,7 @@ _TRIES = 16
 _ON_BOARD = pressed(0.0, wrist=0.01, hand=0.12)
 
 
-def desk_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
+def desk_for(rng: np.random.Generator, use: Interaction, points: np.ndarray) -> np.ndarray | None:
     """A desk, table or counter whose top is 2 to 5 cm under the lowest wrist that works there."""
     origin = use.points[:, :2].mean(0)
     right, ahead = across(use, origin)
@@ -47,7 +47,7 @@ def desk_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarr
     return None
 
 
-def board_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
+def board_for(rng: np.random.Generator, use: Interaction, points: np.ndarray) -> np.ndarray | None:
     """A board or wall 5 to 9 cm beyond the furthest wrist that strokes it."""
     origin = use.points[:, :2].mean(0)
     right, ahead = across(use, origin)
@@ -73,7 +73,7 @@ def board_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndar
     return None
 
 
-def shelf_for(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
+def shelf_for(rng: np.random.Generator, use: Interaction, points: np.ndarray) -> np.ndarray | None:
     """A shelf, bookcase or counter a little under a hand that reached for it."""
     origin = use.points[:, :2].mean(0)
     _, ahead = across(use, origin)

@@ -23,7 +23,7 @@ from ..furnish.flesh import Furnishing
 from ..motion.canonical import calibrate, canonical
 from ..motion.motion import Motion, mirrored, motion_of
 from ..motion.rests import Rest, rest_of
-from ..synthesis.joins import joined
+from ..synthesis.joins import join
 
 __all__ = [
     "ACTIVITIES",
@@ -140,7 +140,7 @@ def _composed(recipe: dict[str, Any], motions: dict[str, Motion]) -> Motion:
     joints = sit.joints[::-1] if recipe["reversed"] else sit.joints
     joints = mirrored(joints) if recipe["mirrored"] else joints
     walk = motions[recipe["walk"]].joints[: recipe["at"] + 1]
-    return replace(sit, joints=joined(walk, joints[recipe["entry"] :]))
+    return replace(sit, joints=join(walk, joints[recipe["entry"] :]))
 
 
 def _clip(frozen: dict[str, Any], motion: Motion) -> HeldClip:

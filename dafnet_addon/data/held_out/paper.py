@@ -44,20 +44,20 @@ from ..furnish.flesh import probes
 from ..furnish.seats import SeatKind, seat_for
 from ..furnish.tops import board_for, desk_for
 from ..motion.contacts import contacts
+from ..motion.interactions import Interaction, stroking
 from ..motion.motion import Motion, mirrored
 from ..motion.rests import Rest, rest_of, resting
 from ..motion.retarget import at_seat_height
-from ..motion.uses import Use, stroking
 from ..synthesis.compose import LEANS, at_board, at_top, seated_work
-from ..synthesis.joins import joined
+from ..synthesis.joins import join
 from ..synthesis.pieces import (
     DIRECTIONS,
     TOELESS,
-    Pool,
+    WalkIndex,
     features_of,
+    find_matches,
     fluent,
-    matches_of,
-    pool_of,
+    index_walks,
     sit_downs,
     upper_bodies,
 )
@@ -226,9 +226,9 @@ def _arrival(recipe: Recipe, motions: dict[str, Motion]) -> np.ndarray:
     """The walk (T, 22, 3) joined to the sit-down, its seat moved, or to standing."""
     walk = _picked(recipe, "walk", motions)
     if "stand" in recipe:
-        return joined(walk, _picked(recipe, "stand", motions))
+        return join(walk, _picked(recipe, "stand", motions))
     sit = _picked(recipe, "sit", motions)
-    return joined(walk, at_seat_height(sit, sit[-1, 0, 2], recipe["seat"] + SEAT_TO_PELVIS))
+    return join(walk, at_seat_height(sit, sit[-1, 0, 2], recipe["seat"] + SEAT_TO_PELVIS))
 
 
 def _replayed(recipe: Recipe, motions: dict[str, Motion]) -> np.ndarray:
@@ -305,7 +305,7 @@ def paper_test(folder: Path) -> list[HeldClip]:
 
 
 def _candidates(
-    rng: np.random.Generator, kind: str, motions: dict[str, Motion], pool: Pool
+    rng: np.random.Generator, kind: str, motions: dict[str, Motion], pool: WalkIndex
 ) -> Iterator[Recipe]:
     """Recipes of a kind, without furniture: every sit-down or stand after the walk that matches
     best from each direction.
@@ -330,7 +330,7 @@ def _candidates(
                     rotate(path.rotation[0].T, joints[-1, PELVIS] - path.position[0])[:2],
                     range(DIRECTIONS),
                 )
-            for clip, at in matches_of(pool, features_of(joints)[0], place, _EACH, directions):
+            for clip, at in find_matches(pool, features_of(joints)[0], place, _EACH, directions):
                 walk, mirror = pool.names[clip]
                 if not _comes(pool.clips[clip][at - _COMES : at + 1]):
                     continue
@@ -404,7 +404,7 @@ def _desk_of(
     if not hands or ((mostly >= _OVER) & (mostly < _HOVERS)).any():
         return None
 
-    use = Use("desk", works, len(joints), np.concatenate(hands), rest.yaw)
+    use = Interaction("desk", works, len(joints), np.concatenate(hands), rest.yaw)
     for _ in range(_TRIES):
         desk = desk_for(rng, use, points)
         if (
@@ -419,7 +419,7 @@ def _desk_of(
     return None
 
 
-def _board_of(rng: np.random.Generator, use: Use, points: np.ndarray) -> np.ndarray | None:
+def _board_of(rng: np.random.Generator, use: Interaction, points: np.ndarray) -> np.ndarray | None:
     """A board at a hand that writes, as large as whiteboards are and off the floor; None where none
     can be had.
     """
@@ -512,7 +512,7 @@ def freeze_paper_test(folder: Path, seed: int = SEED) -> dict[str, Any]:
     walk's clip. Raises InputError where the folder's motion does not give every kind.
     """
     motions = _unseen(folder)
-    pool = pool_of(list(motions.values()), arriving=True, kept=_KEPT)
+    pool = index_walks(list(motions.values()), arriving=True, kept=_KEPT)
     rng = np.random.default_rng(seed)
     used: Counter[tuple[object, ...]] = Counter()
     clips: list[Recipe] = []

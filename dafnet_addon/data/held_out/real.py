@@ -28,10 +28,10 @@ from ..furnish.flesh import Furnishing, probes
 from ..furnish.library import Piece, read_library
 from ..furnish.real_pieces import LIES_OVER, bed_shape_for, seat_shape_for, stray_shape
 from ..furnish.shapes import ShapeBank, bank_of
+from ..motion.interactions import lying
 from ..motion.motion import Motion
 from ..motion.rests import Rest, rest_of
 from ..motion.retarget import at_seat_height
-from ..motion.uses import lying
 from .captured import HeldClip, fingerprint, held_out, held_out_motions, is_frozen
 from .freezing import freeze
 

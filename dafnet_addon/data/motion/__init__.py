@@ -1,1 +1,1 @@
-"""Motion on the canonical body, and what is read off it: contacts, rests, uses of furniture."""
+"""Motion on the canonical body, and what it shows: contacts, rests, interactions, times."""

@@ -15,7 +15,7 @@ from ...core.rotations import normalised
 from ...core.skeleton import OFFSETS, PELVIS, REST, SEAT_TO_PELVIS, joint
 from ..synthesis.joins import presence
 from .canonical import FOOT, LEG, SHIN, THIGH
-from .uses import Use
+from .interactions import Interaction
 
 __all__ = ["at_seat_height", "at_top_height"]
 
@@ -232,9 +232,9 @@ def at_seat_height(joints: np.ndarray, resting_pelvis: float, wanted: float) -> 
     return out
 
 
-def at_top_height(joints: np.ndarray, use: Use, rise: float) -> np.ndarray:
-    """The motion (T, 22, 3) of the canonical body with the top that its hands work on (``uses``)
-    ``rise`` metres higher.
+def at_top_height(joints: np.ndarray, use: Interaction, rise: float) -> np.ndarray:
+    """The motion (T, 22, 3) of the canonical body with the top that its hands work on
+    (``interactions``) ``rise`` metres higher.
 
     The points of the top are where wrists were. A hand that works there keeps its place to them
     while it is within 12 cm, is its own again from 30 cm on or a second before and after, and goes

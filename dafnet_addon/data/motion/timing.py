@@ -14,7 +14,7 @@ import numpy as np
 from ...core.root import RootPath, gaussian, root_from_joints, to_root
 from ...core.series import MODEL_FPS, smoothstep
 from ...core.skeleton import NECK, PELVIS
-from ..synthesis.joins import swayed
+from ..synthesis.joins import lean_and_turn
 from .rests import Rest
 
 __all__ = [
@@ -141,7 +141,7 @@ def braced(
         first, last = sorted((way.begins, way.stop if way.down else way.start))
         half = max(middle - first, last - middle) + _ROUND
         further += lacks * smoothstep(1.5 * (1.0 - np.abs(frames - middle) / half))
-    return swayed(joints, -further, np.zeros(len(joints))) if further.any() else joints
+    return lean_and_turn(joints, -further, np.zeros(len(joints))) if further.any() else joints
 
 
 def clock_of(

@@ -3,7 +3,7 @@ what training needs often.
 
 Walking up to a seat and sitting down, getting up and walking off, working while seated, writing on
 a desk or a board, lying down on a bed. All is made of captured motion on the canonical body; what
-is added are joins, lent upper bodies and courses of hands.
+is added are joins, upper bodies of others and paths of hands.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,21 +16,21 @@ from ...core.root import root_from_joints, to_root
 from ...core.rotations import normalised, rotate, yaw_matrix
 from ...core.series import runs
 from ...core.skeleton import PELVIS, SEAT_TO_PELVIS, joint
+from ..motion.interactions import miming
 from ..motion.motion import Motion, mirrored
 from ..motion.retarget import at_top_height
-from ..motion.uses import miming
-from .courses import AT_DESKS, course_through, drawing, lettering, wandering
+from .hand_paths import AT_DESKS, drawing, lettering, min_jerk_path, wandering
 from .joins import (
     FEET,
     LENGTHS,
     ease,
+    fit_to_bones,
     frames_of,
-    handed,
-    joined,
-    lent,
-    on_the_body,
+    join,
+    lead_hand,
+    lean_and_turn,
+    lend_upper_body,
     presence,
-    swayed,
 )
 from .pieces import (
     BEFORE,
@@ -40,13 +40,13 @@ from .pieces import (
     WORKS,
     Composed,
     Piece,
-    Pool,
+    WalkIndex,
+    composition,
     features_of,
-    made,
-    pool_of,
+    find_walks,
+    index_walks,
     sit_downs,
     upper_bodies,
-    ways_of,
 )
 from .postures import POSTURES, posture_of, sitting_in
 
@@ -79,7 +79,7 @@ _AT_DESK_LEANS = (-0.2, -0.1, 0.0, 0.0, 0.06)
 
 
 def _to_and_from_seats(
-    motions: list[Motion], sits: list[Piece], to: Pool, away: Pool
+    motions: list[Motion], sits: list[Piece], to: WalkIndex, away: WalkIndex
 ) -> Iterator[Composed]:
     """Walks that end in a sit-down ("approach"), and stand-ups that go on as a walk ("leave"), all
     around the seat.
@@ -89,14 +89,14 @@ def _to_and_from_seats(
         path = root_from_joints(sit.joints)
         seat = rotate(path.rotation[0].T, sit.joints[-1, PELVIS] - path.position[0])[:2]
         down, up = sit.joints, sit.joints[::-1]
-        for walk in ways_of(to, features_of(down)[0], seat, each):
-            whole = joined(walk, down)
+        for walk in find_walks(to, features_of(down)[0], seat, each):
+            whole = join(walk, down)
             focus = np.arange(60, max(BEFORE + len(down) - STAYS, 90) + 20, 5)
-            yield from made("approach", sit.name, sit.subject, "sit-stand", whole, focus)
-        for walk in ways_of(away, features_of(up)[-1], seat, each):
-            whole = joined(up, walk)
+            yield from composition("approach", sit.name, sit.subject, "sit-stand", whole, focus)
+        for walk in find_walks(away, features_of(up)[-1], seat, each):
+            whole = join(up, walk)
             focus = np.arange(max(0, len(up) - 60), len(whole) - 40, 5)
-            yield from made("leave", sit.name, sit.subject, "sit-stand", whole, focus)
+            yield from composition("leave", sit.name, sit.subject, "sit-stand", whole, focus)
 
 
 def _waiting(sits: list[Piece]) -> Iterator[Composed]:
@@ -107,8 +107,8 @@ def _waiting(sits: list[Piece]) -> Iterator[Composed]:
         stands = np.repeat(sit.joints[:1], _WAITS, axis=0)
         whole = np.concatenate([stands, sit.joints])
         focus = np.arange(0, _WAITS, 5)
-        yield from made("wait", sit.name, sit.subject, "sit-stand", whole, focus)
-        yield from made(
+        yield from composition("wait", sit.name, sit.subject, "sit-stand", whole, focus)
+        yield from composition(
             "wait",
             sit.name + " reversed",
             sit.subject,
@@ -138,7 +138,7 @@ def at_top(
         if course is not None:
             local = course(rng, len(joints), sign) + np.array([0.0, farther, height])
             first = start + int(rng.integers(0, 12))
-            out = handed(
+            out = lead_hand(
                 out,
                 side,
                 origin + rotate(turn, local),
@@ -155,7 +155,7 @@ def _leaning(
     ``leans`` to another.
     """
     stops = np.concatenate([[0.0, 0.0], rng.choice(leans, 5) * rng.uniform(0.6, 1.0, 5)])
-    lean = course_through(stops, [rest, *rng.integers(30, 60, 5)])
+    lean = min_jerk_path(stops, [rest, *rng.integers(30, 60, 5)])
     lean = np.pad(lean, (0, frames), mode="edge")[:frames]
     begun = 1 - ease((np.arange(frames) - rest) / 40)
     wander = wandering(rng, frames, 2, 30) * (0.02, 0.10) * begun[:, None]
@@ -174,8 +174,8 @@ def seated_work(
     body = np.concatenate([sit, np.repeat(sit[-1:], WORKS, axis=0)])
     rest, frames = len(sit) - 20, len(body)
     upper = np.pad(upper, ((rest, frames), (0, 0), (0, 0)), mode="edge")[:frames]
-    body = lent(body, upper, presence(frames, rest, 2 * frames, 30))
-    return swayed(body, *_leaning(rng, frames, rest, leans)), rest
+    body = lend_upper_body(body, upper, presence(frames, rest, 2 * frames, 30))
+    return lean_and_turn(body, *_leaning(rng, frames, rest, leans)), rest
 
 
 def at_board(rng: np.random.Generator, joints: np.ndarray, start: int, end: int) -> np.ndarray:
@@ -185,7 +185,7 @@ def at_board(rng: np.random.Generator, joints: np.ndarray, start: int, end: int)
     path, middle = root_from_joints(joints), (start + end) // 2
     course = (lettering, lettering, drawing)[rng.integers(3)](rng, len(joints))
     wrist = path.position[middle] + rotate(path.rotation[middle], course)
-    return handed(joints, "right_", wrist, presence(len(joints), start, end))
+    return lead_hand(joints, "right_", wrist, presence(len(joints), start, end))
 
 
 def let_down(joints: np.ndarray, start: int, end: int, top: float) -> np.ndarray:
@@ -232,7 +232,7 @@ def _while_seated(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed
                     else at_top(rng, body, rest + 5, frames + 60, top)
                 )
 
-            yield from made(
+            yield from composition(
                 kind, sit.name, sit.subject, "seated", body, np.arange(rest, frames - 20, 5)
             )
 
@@ -250,12 +250,12 @@ def _in_postures(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed]
         postures = [posture_of(rng, name) for name in drawn]
         whole = sitting_in(rng, body, rest + 20, postures)
         name = f"{drawn[0]}, then {drawn[1]}: {sit.name}"
-        yield from made(
+        yield from composition(
             "posture", name, sit.subject, "seated", whole, np.arange(rest + 20, len(whole) - 20, 5)
         )
 
 
-def _while_standing(motions: list[Motion], to: Pool, away: Pool) -> Iterator[Composed]:
+def _while_standing(motions: list[Motion], to: WalkIndex, away: WalkIndex) -> Iterator[Composed]:
     """A walk up to a board ("write") or a counter ("counter"), work there on captured standing, and
     a walk away; at some counters the work is what somebody mimed in a kitchen.
     """
@@ -268,14 +268,12 @@ def _while_standing(motions: list[Motion], to: Pool, away: Pool) -> Iterator[Com
             features = features_of(stands)
             for kind in ("write", "counter"):
                 come, go = (
-                    list(ways_of(p, f, _BOARD, 1, behind))
+                    list(find_walks(p, f, _BOARD, 1, behind))
                     for p, f in ((to, features[0]), (away, features[-1]))
                 )
                 if not come or not go:
                     continue
-                whole = joined(
-                    joined(come[rng.integers(len(come))], stands), go[rng.integers(len(go))]
-                )
+                whole = join(join(come[rng.integers(len(come))], stands), go[rng.integers(len(go))])
                 start, end = BEFORE + 8, BEFORE + WORKS - 4
                 if kind == "counter" and mimed and rng.random() < 0.5:
                     whole = _in_a_kitchen(rng, whole, start, end, mimed)
@@ -285,7 +283,7 @@ def _while_standing(motions: list[Motion], to: Pool, away: Pool) -> Iterator[Com
                     whole = at_board(rng, whole, start, end)
                 if rng.random() < 0.5:
                     whole = mirrored(whole)
-                yield from made(
+                yield from composition(
                     kind,
                     "standing",
                     "composed",
@@ -305,7 +303,7 @@ def _in_a_kitchen(
     upper = upper if rng.random() < 0.5 else mirrored(upper)
     after = len(joints) - BEFORE - len(upper)
     upper = np.pad(upper, ((BEFORE, max(0, after)), (0, 0), (0, 0)), mode="edge")[: len(joints)]
-    body = lent(joints, upper, presence(len(joints), start, end, 30))
+    body = lend_upper_body(joints, upper, presence(len(joints), start, end, 30))
     return let_down(body, start + 30, end - 30, float(rng.uniform(*_COUNTERS)))
 
 
@@ -364,7 +362,7 @@ def _onto_the_bed(seated: np.ndarray, lying: np.ndarray, turn: float, inward: fl
         seated[0] * (1, 1, 0)
         + rotate(yaw_matrix(np.array(yaw)), np.array([0.0, -inward, 0.0])) * turned[:, 0]
     )
-    return on_the_body(
+    return fit_to_bones(
         rotate(yaw_matrix(yaw + turn * turned[:, 0, 0])[:, None], local) + origin[:, None]
     )
 
@@ -384,10 +382,12 @@ def _lying(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed]:
         lies = _lifted(piece if rng.random() < 0.5 else mirrored(piece), top)
         turn, inward = rng.choice([-1.0, 1.0]) * rng.uniform(1.3, 1.7), rng.uniform(0.1, 0.25)
         turning = _onto_the_bed(sit.joints[-1], lies[0], turn, inward)
-        whole = joined(np.concatenate([sit.joints, turning[1:]]), lies)
+        whole = join(np.concatenate([sit.joints, turning[1:]]), lies)
         start, frames = len(sit.joints) - 20, len(whole)
-        yield from made("lie", sit.name, sit.subject, "lying", whole, np.arange(start, frames, 5))
-        yield from made(
+        yield from composition(
+            "lie", sit.name, sit.subject, "lying", whole, np.arange(start, frames, 5)
+        )
+        yield from composition(
             "lie",
             sit.name + " reversed",
             sit.subject,
@@ -415,7 +415,7 @@ def composed(motions: list[Motion]) -> list[Composed]:
     """All composed motions of captured ones on the canonical body; the same for the same
     motions.
     """
-    to, away = pool_of(motions, arriving=True), pool_of(motions, arriving=False)
+    to, away = index_walks(motions, arriving=True), index_walks(motions, arriving=False)
     # Windows are seen in a mirror as often as not, whatever they are composed of.
     sits = [sit for sit in sit_downs(motions) if not sit.in_mirror]
     # Many of those with borrowed arms, and all of them begin in front of the seat.

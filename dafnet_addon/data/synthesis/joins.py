@@ -18,12 +18,12 @@ __all__ = [
     "LENGTHS",
     "ease",
     "frames_of",
-    "handed",
-    "joined",
-    "lent",
-    "on_the_body",
+    "lead_hand",
+    "join",
+    "lend_upper_body",
+    "fit_to_bones",
     "presence",
-    "swayed",
+    "lean_and_turn",
 ]
 
 _ALIGNED = [
@@ -51,7 +51,7 @@ def frames_of(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 _REST_PELVIS, _REST_CHEST = (f[0].T for f in frames_of(REST[None]))
 
 
-def on_the_body(joints: np.ndarray) -> np.ndarray:
+def fit_to_bones(joints: np.ndarray) -> np.ndarray:
     """The motion nearest to ``joints`` (T, 22, 3) with the canonical bones, a rigid pelvis and
     chest; the feet stay.
     """
@@ -102,7 +102,7 @@ def _aligned(joints: np.ndarray, pose: np.ndarray, target: np.ndarray) -> np.nda
     return np.asarray(turned + np.append(b.mean(0), 0.0))
 
 
-def joined(first: np.ndarray, then: np.ndarray) -> np.ndarray:
+def join(first: np.ndarray, then: np.ndarray) -> np.ndarray:
     """``first`` (T, 22, 3), and ``then`` turned and moved to go on from its last pose, which is
     left out.
 
@@ -126,7 +126,7 @@ def joined(first: np.ndarray, then: np.ndarray) -> np.ndarray:
             out[:, j, :2] = after[:, j, :2] + offset[j, :2] * left
             out[:, j, 2] = after[:, j, 2] + offset[j, 2] * fade[:, 0, 0]
 
-    return np.concatenate([first[:-1], on_the_body(out)])
+    return np.concatenate([first[:-1], fit_to_bones(out)])
 
 
 def _about_x(angle: np.ndarray) -> np.ndarray:
@@ -137,7 +137,7 @@ def _about_x(angle: np.ndarray) -> np.ndarray:
     return m
 
 
-def swayed(joints: np.ndarray, lean: np.ndarray, turn: np.ndarray) -> np.ndarray:
+def lean_and_turn(joints: np.ndarray, lean: np.ndarray, turn: np.ndarray) -> np.ndarray:
     """A seated body that leans back (``lean`` (T,), radians; forward where negative) and turns on
     its seat; its feet stay.
     """
@@ -153,10 +153,10 @@ def swayed(joints: np.ndarray, lean: np.ndarray, turn: np.ndarray) -> np.ndarray
     out[:, knees] = middle[:, None] + np.einsum(
         "tij,tbj->tbi", yaw_matrix(turn / 2), joints[:, knees] - middle[:, None]
     )
-    return on_the_body(out)
+    return fit_to_bones(out)
 
 
-def lent(joints: np.ndarray, upper: np.ndarray, share: np.ndarray) -> np.ndarray:
+def lend_upper_body(joints: np.ndarray, upper: np.ndarray, share: np.ndarray) -> np.ndarray:
     """The motion (T, 22, 3) with the chest's attitude, head and arms of another, as it has them in
     its root's frame.
 
@@ -178,10 +178,10 @@ def lent(joints: np.ndarray, upper: np.ndarray, share: np.ndarray) -> np.ndarray
             out[:, PARENTS[j]] + normalised(ours + (theirs - ours) * share[:, None]) * LENGTHS[j]
         )
 
-    return on_the_body(out)
+    return fit_to_bones(out)
 
 
-def handed(joints: np.ndarray, side: str, wrist: np.ndarray, share: np.ndarray) -> np.ndarray:
+def lead_hand(joints: np.ndarray, side: str, wrist: np.ndarray, share: np.ndarray) -> np.ndarray:
     """The motion with one hand (``side`` "left_" or "right_") led along ``wrist`` (T, 3), world,
     where ``share`` (T,) is 1.
     """

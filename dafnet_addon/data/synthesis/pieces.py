@@ -21,16 +21,16 @@ __all__ = [
     "WORKS",
     "Composed",
     "Piece",
-    "Pool",
+    "WalkIndex",
     "entrance",
     "features_of",
     "fluent",
-    "made",
-    "matches_of",
-    "pool_of",
+    "composition",
+    "find_matches",
+    "index_walks",
     "sit_downs",
     "upper_bodies",
-    "ways_of",
+    "find_walks",
 ]
 
 _WALK = {
@@ -96,7 +96,7 @@ def fluent(joints: np.ndarray) -> np.ndarray:
     )
 
 
-def made(
+def composition(
     kind: str, name: str, subject: str, category: str, joints: np.ndarray, focus: np.ndarray
 ) -> Iterator[Composed]:
     """The composed motion, where it is fluent; nothing where it is not. ``focus`` counts frames of
@@ -193,7 +193,7 @@ def features_of(joints: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Pool:
+class WalkIndex:
     """Frames (N, 2: clip, frame) in which a body is slow that comes from, or goes, elsewhere.
 
     ``features`` (N, 48) must match; ``tracks`` (N, T, 2): where it was before, or will be, as seen
@@ -209,9 +209,9 @@ class Pool:
     tracks: np.ndarray
 
 
-def pool_of(
+def index_walks(
     motions: list[Motion], arriving: bool, kept: tuple[int, int] = (BEFORE, BEFORE)
-) -> Pool:
+) -> WalkIndex:
     """All places where a walk may end, or begin, with ``kept`` frames of its clip before and after
     them.
     """
@@ -243,7 +243,7 @@ def pool_of(
                 names.append((f"{m.source}/{m.name}", mirror))
 
     if not clips:
-        return Pool(
+        return WalkIndex(
             arriving,
             [],
             [],
@@ -252,7 +252,7 @@ def pool_of(
             np.zeros((0, len(offsets), 2)),
         )
 
-    return Pool(
+    return WalkIndex(
         arriving,
         clips,
         names,
@@ -262,15 +262,15 @@ def pool_of(
     )
 
 
-def matches_of(
-    pool: Pool,
+def find_matches(
+    pool: WalkIndex,
     pose: np.ndarray,
     place: np.ndarray,
     each: int,
     directions: Sequence[int] = range(DIRECTIONS),
 ) -> Iterator[tuple[int, int]]:
     """Clip and frame in the pool where a walk ends, or begins, that matches ``pose``: as
-    ``ways_of`` finds them.
+    ``find_walks`` finds them.
     """
     cost = np.abs(pool.features - pose.astype(np.float32)).mean(1)
     like = np.flatnonzero(cost < _ALIKE)
@@ -287,8 +287,8 @@ def matches_of(
                 yield int(clip), int(at)
 
 
-def ways_of(
-    pool: Pool,
+def find_walks(
+    pool: WalkIndex,
     pose: np.ndarray,
     place: np.ndarray,
     each: int,
@@ -300,7 +300,7 @@ def ways_of(
     ``place`` (2,): a seat's middle, say, in the root's frame at the join; a way that leads through
     it is none. Direction 0 is the one that the body faces, the others follow counter-clockwise.
     """
-    for clip, at in matches_of(pool, pose, place, each, directions):
+    for clip, at in find_matches(pool, pose, place, each, directions):
         yield (
             pool.clips[clip][at - BEFORE : at + 1]
             if pool.arriving

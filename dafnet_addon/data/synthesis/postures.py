@@ -30,8 +30,8 @@ from ...core.skeleton import (
     WRISTS,
 )
 from ..motion.canonical import LEG
-from .courses import course_through, wandering
-from .joins import LENGTHS, on_the_body
+from .hand_paths import min_jerk_path, wandering
+from .joins import LENGTHS, fit_to_bones
 
 __all__ = ["POSTURES", "Hand", "Posture", "posture_of", "sitting_in"]
 
@@ -171,7 +171,7 @@ def sitting_in(
     def course(values: np.ndarray) -> np.ndarray:
         """Values (P, …) of the postures over time (T, …), from nothing at first."""
         rows = np.concatenate([np.zeros_like(values[:1]), np.repeat(values, 2, axis=0)])
-        along = course_through(rows, legs)
+        along = min_jerk_path(rows, legs)
         frames = np.clip(np.arange(len(joints)) - start, 0, len(along) - 1)
         return np.asarray(along[frames])
 
@@ -230,7 +230,7 @@ def _trunk_led(joints: np.ndarray, start: int, trunk: np.ndarray) -> np.ndarray:
     out[:, lower], out[:, upper] = turned(lower, pelvis), turned(upper, chest)
     out[:, HEAD] = out[:, NECK] + rotate(gaze, joints[:, HEAD] - joints[:, NECK])
     out[:, KNEES] += 0.5 * ahead[:, None]
-    return on_the_body(out)
+    return fit_to_bones(out)
 
 
 def _near_enough(place: np.ndarray, offset: Sequence[float]) -> np.ndarray:
@@ -260,7 +260,7 @@ def _feet_led(
         moved = offset @ to_world.T
         out[:, [ANKLES[side], FEET[side]]] += moved[:, None]
         out[:, KNEES[side]] += 0.5 * moved
-    return on_the_body(out)
+    return fit_to_bones(out)
 
 
 def _hand_led(

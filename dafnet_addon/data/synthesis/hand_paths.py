@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-__all__ = ["AT_DESKS", "course_through", "drawing", "lettering", "wandering"]
+__all__ = ["AT_DESKS", "min_jerk_path", "drawing", "lettering", "wandering"]
 
 
-def course_through(stops: np.ndarray, frames: Sequence[int]) -> np.ndarray:
+def min_jerk_path(stops: np.ndarray, frames: Sequence[int]) -> np.ndarray:
     """A course (sum of ``frames`` + 1, …) through ``stops`` (N, …) with the least jerk, at rest in
     each of them.
     """
@@ -56,7 +56,7 @@ def _handwriting(rng: np.random.Generator, frames: int, side: float) -> np.ndarr
         times += [int(rng.integers(80, 150)), int(rng.integers(18, 30))]
 
     letters = wandering(rng, frames, 2, 2.5) * (0.004, 0.005)
-    return course_through(np.array(stops), times)[:frames] + np.pad(letters, ((0, 0), (0, 1)))
+    return min_jerk_path(np.array(stops), times)[:frames] + np.pad(letters, ((0, 0), (0, 1)))
 
 
 def _handling(rng: np.random.Generator, frames: int, side: float) -> np.ndarray:
@@ -67,7 +67,7 @@ def _handling(rng: np.random.Generator, frames: int, side: float) -> np.ndarray:
         stops += [(side * rng.uniform(0.02, 0.34), rng.uniform(0.24, 0.40), 0.05)] * 2
         times += [int(rng.integers(8, 75)), int(rng.integers(16, 36))]
 
-    course = course_through(np.array(stops), times[:-1])
+    course = min_jerk_path(np.array(stops), times[:-1])
     speed = np.linalg.norm(np.gradient(course[:, :2], axis=0), axis=-1)
     course[:, 2] += rng.uniform(0.02, 0.08) * speed / speed.max()
     return np.concatenate([course, np.repeat(course[-1:], max(0, frames - len(course)), axis=0)])[
@@ -114,7 +114,7 @@ def lettering(rng: np.random.Generator, frames: int) -> np.ndarray:
         ]
         times += [int(rng.integers(50, 110)), int(rng.integers(20, 32))]
 
-    course = course_through(np.array(stops), times)[:frames]
+    course = min_jerk_path(np.array(stops), times)[:frames]
     off = np.maximum(0.0, np.gradient(-course[:, 0]))  # on its way back the hand is off the board
     letters = wandering(rng, frames, 2, 4) * (0.010, 0.018)
     return course + np.stack(

@@ -13,7 +13,7 @@ from ...core.rotations import normalised
 from ...core.series import MODEL_FPS, runs
 from ...core.skeleton import ANKLES, ELBOWS, KNEES, SHOULDERS, WRISTS, joint
 
-__all__ = ["Use", "across", "lying", "miming", "working", "stroking", "reaching"]
+__all__ = ["Interaction", "across", "lying", "miming", "working", "stroking", "reaching"]
 
 _PELVIS, _CHEST, _NECK = joint("pelvis"), joint("spine3"), joint("neck")
 _KNEES, _ANKLES = KNEES, ANKLES
@@ -27,7 +27,7 @@ _MIMES = 0.35  # of the time that a hand is there, so that it counts as working
 
 
 @dataclass(frozen=True)
-class Use:
+class Interaction:
     """In frames ``start`` to ``end`` (exclusive) the body uses a ``kind`` of furniture: bed, desk,
     board or shelf.
 
@@ -43,7 +43,7 @@ class Use:
     yaw: float
 
 
-def across(use: Use, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def across(use: Interaction, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where the use's points lie to the right of ``origin`` (2,) and away from the body."""
     offset = use.points[:, :2] - origin
     c, s = np.cos(use.yaw), np.sin(use.yaw)
@@ -80,7 +80,7 @@ def _away(rows: np.ndarray) -> float:
     return float(np.arctan2(-x, y))
 
 
-def lying(joints: np.ndarray) -> list[Use]:
+def lying(joints: np.ndarray) -> list[Interaction]:
     """Where the body lies off the floor, or is about to: the trunk within 30 degrees of level, the
     pelvis still, for 0.25 s.
 
@@ -95,7 +95,7 @@ def lying(joints: np.ndarray) -> list[Use]:
     knees, feet = (joints[:, rows].mean(1) - joints[:, _PELVIS] for rows in (_KNEES, _ANKLES))
     back = (trunk * knees)[:, :2].sum(-1) < 0
     stands = (np.linalg.norm(feet[:, :2], axis=-1) < 0.3) & (feet[:, 2] < -0.2)
-    found: list[Use] = []
+    found: list[Interaction] = []
     for a, b in runs(level & off_floor & back & (knees[:, 2] > -0.2) & ~stands, _SHORT):
         lowest = a + np.argsort(np.abs(trunk[a:b, 2]))[: max(_SHORT, (b - a) // 2)]
         line = np.median(joints[lowest][:, [_PELVIS, _CHEST]], axis=0)
@@ -106,12 +106,12 @@ def lying(joints: np.ndarray) -> list[Use]:
             for u in found
         )
         if not known:
-            found.append(Use("bed", a, b, line, _away(normalised(trunk[a:b, :2]))))
+            found.append(Interaction("bed", a, b, line, _away(normalised(trunk[a:b, :2]))))
 
     return found
 
 
-def working(joints: np.ndarray, path: RootPath) -> list[Use]:
+def working(joints: np.ndarray, path: RootPath) -> list[Interaction]:
     """Hands that rest or work in a horizontal plane before a body that stays, for a second or more:
     on a desk or table.
     """
@@ -150,7 +150,7 @@ def working(joints: np.ndarray, path: RootPath) -> list[Use]:
         # A table stands square to the body, not to the hand that reaches across it.
         heading = np.concatenate([forward_of(path.yaw[a:b]) for a, b, _ in top])
         found.append(
-            Use(
+            Interaction(
                 "desk",
                 min(a for a, _, _ in top),
                 max(b for _, b, _ in top),
@@ -162,7 +162,7 @@ def working(joints: np.ndarray, path: RootPath) -> list[Use]:
     return found
 
 
-def miming(joints: np.ndarray, path: RootPath) -> Use | None:
+def miming(joints: np.ndarray, path: RootPath) -> Interaction | None:
     """Hands of a body that stays, which work in the air before it and mostly come back to one
     level: where a top would have been. None where no hand does.
 
@@ -185,10 +185,10 @@ def miming(joints: np.ndarray, path: RootPath) -> Use | None:
     if not low:
         return None
     away = _away(forward_of(path.yaw))
-    return Use("desk", 0, len(joints), np.concatenate(low), away)
+    return Interaction("desk", 0, len(joints), np.concatenate(low), away)
 
 
-def stroking(joints: np.ndarray, path: RootPath) -> list[Use]:
+def stroking(joints: np.ndarray, path: RootPath) -> list[Interaction]:
     """A hand that moves over a vertical plane before the body, between waist and reach, for a
     second or more: on a board.
     """
@@ -221,7 +221,7 @@ def stroking(joints: np.ndarray, path: RootPath) -> list[Use]:
                 and normal @ forward > 0.7
                 and reach > 0.22
             ):
-                found.append(Use("board", a, b, points, _away(normal[None])))
+                found.append(Interaction("board", a, b, points, _away(normal[None])))
 
     return found
 
@@ -236,7 +236,7 @@ def _vertical_plane(points: np.ndarray) -> tuple[np.ndarray, float, float]:
     return vectors[:, 0], float(np.sqrt(max(values[0], 0.0))), extent
 
 
-def reaching(joints: np.ndarray, path: RootPath) -> list[Use]:
+def reaching(joints: np.ndarray, path: RootPath) -> list[Interaction]:
     """Hands that come, stop on a stretched arm for a quarter of a second or more, and were or will
     be moved: at a shelf.
     """
@@ -267,7 +267,9 @@ def reaching(joints: np.ndarray, path: RootPath) -> list[Use]:
             points = wrists[a:b, hand]
             heading = forward_of(path.yaw[a:b])
             found.append(
-                Use("shelf", a, b, points, _away(heading + 0.5 * normalised(arm[a:b, hand, :2])))
+                Interaction(
+                    "shelf", a, b, points, _away(heading + 0.5 * normalised(arm[a:b, hand, :2]))
+                )
             )
 
     return found
