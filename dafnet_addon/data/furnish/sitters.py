@@ -17,7 +17,7 @@ _LEVEL = 0.07  # metres that an arm's elbow and wrist differ in height, of one t
 _ASIDE = (0.19, 0.40)  # metres from the middle of the body to an arm that lies
 _ARM_STILL = 0.06  # metres that its wrist moves
 _LEANS = (-0.05, 0.75)  # tangents of trunks that a back may meet
-_MOSTLY = 0.75  # of the time that a trunk is no farther back
+_MOSTLY = 0.75  # of the time, that a trunk is so far back or less
 _NEEDS_A_BACK = 0.3  # tangent of a lean that nobody holds for long without one
 
 
