@@ -15,40 +15,29 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.progress import stepwise
-from ...core.root import (
-    POSITION_SIGMA,
-    YAW_SIGMA,
-    root_from_joints,
-    root_from_matrices,
-    smoothed,
-    to_root,
-    to_world,
-)
-from ...core.rotations import normalised
-from ...core.series import MODEL_FPS
-from ...core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
+from ...core.skeleton import JOINTS
 from ...core.solids import Scene
 from ...core.take import Controls
-from ..character.armature import is_character, metres_per_unit
-from ..character.mannequin import FACING
+from ..character.armature import metres_per_unit
 from ..character.settings import Settings
-from ..character.takes import stored_take
 from ..compat import action_curves
 from ..pipeline.baker import has_bone_overrides, require_bakeable
-from ..rig.maps import RigMap, require_usable
-from ..rig.properties import map_of
-from ..rig.reading import joints_of, pose_matrices
+from ..rig.reading import pose_matrices
 from .dependencies import Dependencies, Simulation
 from .furniture import Furniture, array, furniture_of
-from .lookup import find_action, find_object, find_scene
+from .lookup import find_object, find_scene
 from .playback import play_steps
+from .upper_body import (
+    rigid_matrices,
+    upper_body_of_source,
+    upper_body_of_take,
+    upper_body_source,
+)
 
 __all__ = ["ReadScene", "read_scene"]
 
 _UNTURNED = np.radians(0.1)
 """Radians of rotation up to which a target counts as not turned."""
-_LIMB_TOLERANCE = 8.0
-"""Degrees in the mean that limbs of a copied upper body may be off before the user is warned."""
 _TARGETS = {
     "head": "head target",
     "hand_left": "left hand target",
@@ -120,7 +109,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     names = {role: name for role in _TARGETS if (name := getattr(settings, role))}
     targets = {role: find_object(settings, name, _TARGETS[role]) for role, name in names.items()}
 
-    source, source_map = _upper_body_source(settings, armature)
+    source, source_map = upper_body_source(settings, armature)
     places = [source_map.place(name) if source_map else name for name in JOINTS]
 
     dependencies = Dependencies(scene)
@@ -152,11 +141,13 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     modes = [settings.mode] * len(frames) if settings.mode else tracks.modes
     warnings = tuple(_warnings(armature, furniture, dependencies, simulations))
     fps = scene.render.fps / scene.render.fps_base
-    root_matrices = _rigid(np.array(tracks.root), unit, f"root '{root.name}'")
+    root_matrices = rigid_matrices(np.array(tracks.root), unit, f"root '{root.name}'")
 
     given: dict[str, Any] = {}
     for role, target in targets.items():
-        matrices = _rigid(np.array(tracks.targets[role]), unit, f"{_TARGETS[role]} '{target.name}'")
+        matrices = rigid_matrices(
+            np.array(tracks.targets[role]), unit, f"{_TARGETS[role]} '{target.name}'"
+        )
         given[role] = matrices[:, :3, 3]
         if _is_turned(target, np.array(tracks.local[role])):
             given[f"{role}_rotation"] = matrices[:, :3, :3]
@@ -169,7 +160,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
             )
 
         bones, bodies = np.array(tracks.bones), np.array(tracks.bodies)
-        given["upper_body"], off = _upper_body_of_source(
+        given["upper_body"], off = upper_body_of_source(
             source,
             source_map,
             bones=bones,
@@ -182,7 +173,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
         if off:
             warnings += (f"'{source.name}' is copied, but {off}; check its bones in Your Rig.",)
     elif settings.upper_body_take and "FULL" in modes:
-        given["upper_body"] = _upper_body_of_take(
+        given["upper_body"] = upper_body_of_take(
             settings,
             full=np.array([mode == "FULL" for mode in modes]),
             root=root_matrices,
@@ -331,29 +322,6 @@ def _warnings(
         )
 
 
-def _rigid(matrices: np.ndarray, unit: float, what: str) -> np.ndarray:
-    """Matrices (T, 4, 4) in metres, without scale and shear: the y axis stays as it is, z and then
-    x are made orthogonal to it.
-    """
-    if not np.isfinite(matrices).all():
-        raise InputError(
-            f"The {what} has a transform that is not a number; clear its transform or fix what "
-            "drives it."
-        )
-
-    length = np.linalg.norm(matrices[:, :3, :3], axis=1, keepdims=True)
-    if (length < 1e-9).any():
-        raise InputError(f"The {what} is scaled to zero; give it a scale.")
-
-    out = matrices.copy()
-    out[:, :3, :3] /= length
-    y, z = out[:, :3, 1], out[:, :3, 2]
-    out[:, :3, 2] = normalised(z - (y * z).sum(axis=1, keepdims=True) * y)
-    out[:, :3, 0] = np.cross(out[:, :3, 1], out[:, :3, 2])
-    out[:, :3, 3] *= unit
-    return out
-
-
 def _is_turned(target: bpy.types.Object, local: np.ndarray) -> bool:
     """Whether a target's rotation is meant to count: it is keyed, or differs from its parent's."""
     if any("rotation" in curve.data_path for curve in action_curves(target)):
@@ -362,122 +330,3 @@ def _is_turned(target: bpy.types.Object, local: np.ndarray) -> bool:
         np.linalg.norm(local[:, :3, :3], axis=1, keepdims=True), 1e-9
     )
     return bool(np.abs(axes - np.eye(3)).max() > _UNTURNED)
-
-
-def _upper_body_source(
-    settings: Settings,
-    armature: bpy.types.Object,
-) -> tuple[bpy.types.Object | None, RigMap | None]:
-    """The upper body's source, and which of its bones are which joints if it is not one of our
-    characters.
-    """
-    if settings.upper_body_source is None:
-        return None, None
-
-    source = find_object(settings, settings.upper_body_source, "upper body's source")
-    if source.type != "ARMATURE" or source == armature:
-        raise InputError(
-            f"'{source.name}' cannot be the upper body's source; choose another armature."
-        )
-    if is_character(source):
-        return source, None
-
-    rig_map = map_of(source)
-    require_usable(source, rig_map)
-    return source, rig_map
-
-
-def _upper_body_of_take(
-    settings: Settings, *, full: np.ndarray, root: np.ndarray, size: float, fps: float
-) -> np.ndarray:
-    """Upper body (T, 14, 3) of the chosen take, frame by frame of the scene, on this character's
-    root and of its ``size``.
-
-    ``InputError``: it is of another frame rate, or does not cover the frames that are ``full``
-    (T,).
-    """
-    action = find_action(settings.upper_body_take or "")
-    take, _ = stored_take(action)
-    if abs(take.fps - fps) > 1e-3:
-        raise InputError(
-            f"The take '{action.name}' has {take.fps:g} frames per second, the scene {fps:g}; "
-            "generate it again."
-        )
-
-    at = np.arange(len(full)) + settings.frame_start - action.dafnet.frame_start
-    if ((at < 0) | (at >= len(take)))[full].any():
-        raise InputError(
-            f"The take '{action.name}' does not cover all frames whose mode is FULL; choose a "
-            "longer take."
-        )
-
-    at = np.clip(at, 0, len(take) - 1)
-    path, _ = root_from_matrices(take.root[at])
-    local = size / take.scale * to_root(path, take.joints[at][:, list(UPPER)])
-    return _on_own_root(root, fps, local)
-
-
-def _on_own_root(root: np.ndarray, fps: float, local: np.ndarray) -> np.ndarray:
-    """Points (T, N, 3), ``local`` to another root, in the world as if that were this character's
-    ``root`` (T, 4, 4).
-    """
-    return to_world(
-        smoothed(
-            root_from_matrices(root)[0],
-            POSITION_SIGMA * fps / MODEL_FPS,
-            YAW_SIGMA * fps / MODEL_FPS,
-        ),
-        local,
-    )
-
-
-def _upper_body_of_source(
-    source: bpy.types.Object,
-    rig_map: RigMap | None,
-    *,
-    bones: np.ndarray,
-    bodies: np.ndarray,
-    unit: float,
-    root: np.ndarray,
-    size: float,
-    fps: float,
-) -> tuple[np.ndarray, str]:
-    """Upper body (T, 14, 3), world metres, on this character's ``root`` (T, 4, 4) and of its
-    ``size``; and in words which limbs are off by how much, empty where none is.
-
-    ``bones`` (T, 22, 4, 4): the source's bones in its own space; ``bodies`` (T, 4, 4): its object's
-    matrices; both in Blender units.
-    """
-    what = f"upper body's source '{source.name}'"
-    there = np.array([rig_map is None or rig_map.place(name) is not None for name in JOINTS])
-    if not np.isfinite(bones[:, there]).all() or not np.isfinite(bodies).all():
-        raise InputError(
-            f"The {what} has a transform that is not a number; clear its transform or fix what "
-            "drives it."
-        )
-
-    off: dict[str, float] = {}
-    if rig_map is None:
-        joints = unit * (bodies[:, None] @ bones)[..., :3, 3]
-    else:
-        joints, off = joints_of(source, rig_map, bodies=bodies, poses=bones, size=size / unit)
-        joints = unit * joints
-
-    if rig_map is None and source.dafnet.root:
-        frames = _rigid(bodies, unit, what)
-        frames[:, :3, :3] = frames[:, :3, :3] @ FACING
-        path, _ = root_from_matrices(frames)
-    else:
-        path = root_from_joints(joints, floor=float(unit * bodies[0, 2, 3]))
-
-    offsets = joints[:, 1:] - joints[:, list(PARENTS[1:])]
-    upper = [j - 1 for j in UPPER[1:]]
-    lengths = np.linalg.norm(offsets[:, upper], axis=-1).mean(axis=0).sum()
-    ratio = size * np.linalg.norm(OFFSETS[1:][upper], axis=-1).sum() / lengths
-    far = ", ".join(
-        f"the {limb} by {degrees:.0f} degrees"
-        for limb, degrees in off.items()
-        if degrees > _LIMB_TOLERANCE
-    )
-    local = ratio * to_root(path, joints[:, list(UPPER)])
-    return _on_own_root(root, fps, local), f"{far} off" if far else ""

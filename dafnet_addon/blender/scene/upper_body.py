@@ -1,0 +1,175 @@
+"""The upper body that mode FULL copies: from another character, from any mapped rig, or from a
+take.
+"""
+
+import bpy
+import numpy as np
+
+from ...core.errors import InputError
+from ...core.root import (
+    POSITION_SIGMA,
+    YAW_SIGMA,
+    root_from_joints,
+    root_from_matrices,
+    smoothed,
+    to_root,
+    to_world,
+)
+from ...core.rotations import normalised
+from ...core.series import MODEL_FPS
+from ...core.skeleton import JOINTS, OFFSETS, PARENTS, UPPER
+from ..character.armature import is_character
+from ..character.mannequin import FACING
+from ..character.settings import Settings
+from ..character.takes import stored_take
+from ..rig.maps import RigMap, require_usable
+from ..rig.properties import map_of
+from ..rig.reading import joints_of
+from .lookup import find_action, find_object
+
+__all__ = ["rigid_matrices", "upper_body_of_source", "upper_body_of_take", "upper_body_source"]
+
+_LIMB_TOLERANCE = 8.0
+"""Degrees in the mean that limbs of a copied upper body may be off before the user is warned."""
+
+
+def upper_body_source(
+    settings: Settings,
+    armature: bpy.types.Object,
+) -> tuple[bpy.types.Object | None, RigMap | None]:
+    """The upper body's source, and which of its bones are which joints if it is not one of our
+    characters.
+    """
+    if settings.upper_body_source is None:
+        return None, None
+
+    source = find_object(settings, settings.upper_body_source, "upper body's source")
+    if source.type != "ARMATURE" or source == armature:
+        raise InputError(
+            f"'{source.name}' cannot be the upper body's source; choose another armature."
+        )
+    if is_character(source):
+        return source, None
+
+    rig_map = map_of(source)
+    require_usable(source, rig_map)
+    return source, rig_map
+
+
+def upper_body_of_take(
+    settings: Settings, *, full: np.ndarray, root: np.ndarray, size: float, fps: float
+) -> np.ndarray:
+    """Upper body (T, 14, 3) of the chosen take, frame by frame of the scene, on this character's
+    root and of its ``size``.
+
+    ``InputError``: it is of another frame rate, or does not cover the frames that are ``full``
+    (T,).
+    """
+    action = find_action(settings.upper_body_take or "")
+    take, _ = stored_take(action)
+    if abs(take.fps - fps) > 1e-3:
+        raise InputError(
+            f"The take '{action.name}' has {take.fps:g} frames per second, the scene {fps:g}; "
+            "generate it again."
+        )
+
+    at = np.arange(len(full)) + settings.frame_start - action.dafnet.frame_start
+    if ((at < 0) | (at >= len(take)))[full].any():
+        raise InputError(
+            f"The take '{action.name}' does not cover all frames whose mode is FULL; choose a "
+            "longer take."
+        )
+
+    at = np.clip(at, 0, len(take) - 1)
+    path, _ = root_from_matrices(take.root[at])
+    local = size / take.scale * to_root(path, take.joints[at][:, list(UPPER)])
+    return _on_own_root(root, fps, local)
+
+
+def upper_body_of_source(
+    source: bpy.types.Object,
+    rig_map: RigMap | None,
+    *,
+    bones: np.ndarray,
+    bodies: np.ndarray,
+    unit: float,
+    root: np.ndarray,
+    size: float,
+    fps: float,
+) -> tuple[np.ndarray, str]:
+    """Upper body (T, 14, 3), world metres, on this character's ``root`` (T, 4, 4) and of its
+    ``size``; and in words which limbs are off by how much, empty where none is.
+
+    ``bones`` (T, 22, 4, 4): the source's bones in its own space; ``bodies`` (T, 4, 4): its object's
+    matrices; both in Blender units.
+    """
+    what = f"upper body's source '{source.name}'"
+    there = np.array([rig_map is None or rig_map.place(name) is not None for name in JOINTS])
+    if not np.isfinite(bones[:, there]).all() or not np.isfinite(bodies).all():
+        raise InputError(
+            f"The {what} has a transform that is not a number; clear its transform or fix what "
+            "drives it."
+        )
+
+    off: dict[str, float] = {}
+    if rig_map is None:
+        joints = unit * (bodies[:, None] @ bones)[..., :3, 3]
+    else:
+        joints, off = joints_of(source, rig_map, bodies=bodies, poses=bones, size=size / unit)
+        joints = unit * joints
+
+    if rig_map is None and source.dafnet.root:
+        frames = rigid_matrices(bodies, unit, what)
+        frames[:, :3, :3] = frames[:, :3, :3] @ FACING
+        path, _ = root_from_matrices(frames)
+    else:
+        path = root_from_joints(joints, floor=float(unit * bodies[0, 2, 3]))
+
+    offsets = joints[:, 1:] - joints[:, list(PARENTS[1:])]
+    upper = [j - 1 for j in UPPER[1:]]
+    lengths = np.linalg.norm(offsets[:, upper], axis=-1).mean(axis=0).sum()
+    ratio = size * np.linalg.norm(OFFSETS[1:][upper], axis=-1).sum() / lengths
+    far = ", ".join(
+        f"the {limb} by {degrees:.0f} degrees"
+        for limb, degrees in off.items()
+        if degrees > _LIMB_TOLERANCE
+    )
+    local = ratio * to_root(path, joints[:, list(UPPER)])
+    return _on_own_root(root, fps, local), f"{far} off" if far else ""
+
+
+def _on_own_root(root: np.ndarray, fps: float, local: np.ndarray) -> np.ndarray:
+    """Points (T, N, 3), ``local`` to another root, in the world as if that were this character's
+    ``root`` (T, 4, 4).
+    """
+    return to_world(
+        smoothed(
+            root_from_matrices(root)[0],
+            POSITION_SIGMA * fps / MODEL_FPS,
+            YAW_SIGMA * fps / MODEL_FPS,
+        ),
+        local,
+    )
+
+
+def rigid_matrices(matrices: np.ndarray, unit: float, what: str) -> np.ndarray:
+    """Matrices (T, 4, 4) in metres, without scale and shear: the y axis stays as it is, z and then
+    x are made orthogonal to it.
+    """
+    if not np.isfinite(matrices).all():
+        raise InputError(
+            f"The {what} has a transform that is not a number; clear its transform or fix what "
+            "drives it."
+        )
+
+    length = np.linalg.norm(matrices[:, :3, :3], axis=1, keepdims=True)
+    if (length < 1e-9).any():
+        raise InputError(f"The {what} is scaled to zero; give it a scale.")
+
+    out = matrices.copy()
+    out[:, :3, :3] /= length
+    y, z = out[:, :3, 1], out[:, :3, 2]
+    out[:, :3, 2] = normalised(z - (y * z).sum(axis=1, keepdims=True) * y)
+    out[:, :3, 0] = np.cross(out[:, :3, 1], out[:, :3, 2])
+    out[:, :3, 3] *= unit
+    return out
