@@ -46,6 +46,7 @@ from dafnet_addon.training.batches import (  # noqa: E402
     occupancy_of,
     past_of,
 )
+from dafnet_addon.training.candidates import provenance  # noqa: E402
 from dafnet_addon.training.config import TrainingConfig, read_config  # noqa: E402
 from dafnet_addon.training.export import (  # noqa: E402
     adopt_predictor,
@@ -288,6 +289,23 @@ def test_a_loss_that_is_no_number_stops_with_the_last_good_state(dataset, tmp_pa
     with pytest.raises(InputError, match="not a number"):
         train_part("predictor", dataset, folder, TINY, _config(2))
     assert (folder / "predictor.checkpoint").read_bytes() == before
+
+
+def test_a_run_may_be_told_of_legs_from_some_step_on_and_its_weights_say_so(dataset, tmp_path):
+    folder = tmp_path / "run"
+    for part in ("predictor", "upper", "lower"):
+        _until(part, dataset, folder, steps=2)
+    (dataset / "dataset.json").write_text("{}", encoding="utf-8")
+    assert "legs" not in provenance(folder, dataset)["told"].split()
+
+    more = replace(_config(2), steps_flow=6, legs_given=1.0, free_run=1.0)
+    for part in ("upper", "lower"):
+        assert train_part(part, dataset, folder, TINY, more).step == 6
+
+    words = provenance(folder, dataset)
+    flow, predictor, statistics = trained_networks(folder)
+    export(tmp_path / "w.safetensors", flow, predictor, statistics, words)
+    assert load_weights(tmp_path / "w.safetensors").heeds_legs
 
 
 def test_what_is_exported_is_what_was_trained(dataset, tmp_path):
