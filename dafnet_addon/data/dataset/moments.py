@@ -28,15 +28,15 @@ SHARES = {
     "descend": 0.11,
     "sit": 0.05,
     "work": 0.05,
-    "posture": 0.12,
-    "desk": 0.06,
+    "posture": 0.14,
+    "desk": 0.05,
     "counter": 0.03,
     "bench": 0.03,
     "write": 0.03,
     "board": 0.03,
     "lie": 0.05,
     "walk": 0.13,
-    "stand": 0.07,
+    "stand": 0.06,
 }
 """Shares of windows. Composed: walking up to a seat and sitting down, standing up and walking off,
 standing before a seat, hands at work over seated legs, postures of sitting, work at a desk, a

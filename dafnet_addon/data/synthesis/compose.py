@@ -238,7 +238,9 @@ def _while_seated(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed
 
 
 def _in_postures(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed]:
-    """Who has sat down goes from one posture to another, hands and head as of somebody who sits."""
+    """Who has sat down takes a posture and stays in it, or goes on to another; hands and head are
+    as of somebody who sits.
+    """
     rng = np.random.default_rng(15)
     seated = upper_bodies(motions, {"seated_chair", "seated_table"})
     names, about = list(POSTURES), list(POSTURES.values())
@@ -246,10 +248,11 @@ def _in_postures(motions: list[Motion], sits: list[Piece]) -> Iterator[Composed]
     for sit in sits * 2 if seated else ():
         upper = seated[rng.integers(len(seated))]
         body, rest = seated_work(rng, sit.joints, upper, (0.0,))
-        drawn = [names[k] for k in rng.choice(len(names), 2, p=share / share.sum())]
+        count = int(rng.integers(1, 3))
+        drawn = [names[k] for k in rng.choice(len(names), count, p=share / share.sum())]
         postures = [posture_of(rng, name) for name in drawn]
         whole = sitting_in(rng, body, rest + 20, postures)
-        name = f"{drawn[0]}, then {drawn[1]}: {sit.name}"
+        name = f"{', then '.join(drawn)}, {sit.name}"
         yield from composition(
             "posture", name, sit.subject, "seated", whole, np.arange(rest + 20, len(whole) - 20, 5)
         )

@@ -76,7 +76,7 @@ def _upright(rng: np.random.Generator) -> Posture:
 
 
 def _leans_back(rng: np.random.Generator) -> Posture:
-    lean = rng.uniform(0.14, 0.61)  # radians, up to 35 degrees
+    lean = rng.uniform(0.17, 0.61)  # radians, from 10 to 35 degrees
     return Posture(slide=0.16 * lean + rng.uniform(0.0, 0.04), lean=lean, tilt=lean + 0.05)
 
 
@@ -133,16 +133,16 @@ def _turned(rng: np.random.Generator) -> Posture:
 
 _CROSSED = 0.13  # metres that each ankle goes to the other side
 POSTURES: dict[str, tuple[float, Callable[[np.random.Generator], Posture]]] = {
-    "upright": (0.14, _upright),
-    "leaning back": (0.26, _leans_back),
+    "upright": (0.10, _upright),
+    "leaning back": (0.36, _leans_back),
     "slouching": (0.10, _slouches),
-    "on the edge": (0.08, _on_the_edge),
+    "on the edge": (0.07, _on_the_edge),
     "forearms on arms": (0.12, _on_arms),
-    "hands on the seat": (0.07, _hands_on_seat),
+    "hands on the seat": (0.06, _hands_on_seat),
     "desk and seat": (0.05, _desk_and_seat),
-    "leg forward": (0.07, _leg_forward),
-    "ankles crossed": (0.06, _ankles_crossed),
-    "turned": (0.05, _turned),
+    "leg forward": (0.05, _leg_forward),
+    "ankles crossed": (0.05, _ankles_crossed),
+    "turned": (0.04, _turned),
 }
 """Shares of postures, and what draws one."""
 _LEGS_TOO = ("leaning back", "slouching", "forearms on arms")
