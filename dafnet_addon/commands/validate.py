@@ -30,7 +30,7 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
     import torch
 
     from ..data.held_out.real import real_test
-    from ..training.validation import BEST, recorded, said, validations
+    from ..training.validation import BEST, describe, recorded, validations
 
     torch.set_num_threads(options.processes)
     require_writable(options.training / BEST)
@@ -43,10 +43,10 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
         progress=progress,
     ):
         if options.every is not None:
-            complain(said(found))
+            complain(describe(found))
 
     rows = recorded(options.training)
-    return rows, "\n".join(said(each) for each in rows)
+    return rows, "\n".join(describe(each) for each in rows)
 
 
 COMMAND = Command(

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.files import save_text, whole_file
+from ..core.liveliness import BANDS
 from ..core.skeleton import STATURE
 from ..core.text import read_json
 from ..core.weights import Weights, load_weights
@@ -30,11 +31,21 @@ from .export import annotate
 from .parts import FlowRun, PredictorRun, saved_runs
 from .steps import held_out_pool
 
-__all__ = ["BEST", "CURVES", "RECORD", "likelihoods", "recorded", "said", "score", "validations"]
+__all__ = [
+    "BEST",
+    "CURVES",
+    "RECORD",
+    "describe",
+    "likelihoods",
+    "recorded",
+    "score",
+    "validations",
+]
 
 RECORD, BEST, CURVES = "validation.jsonl", "best.safetensors", "validation.png"
 SHIPPED = "the weights that ship"
-_RUNS = ("ground_truth", "free_t0", "free_t1", "ee_t0")
+_RUNS = ("ground_truth", "free_t0", "free_t1", "ee_t0", "ee_t1")
+_LIFE = tuple(f"speed_{band}" for band in BANDS)
 _FIGURES = (
     "sits_within_2cm",
     "sits_within_4cm",
@@ -47,6 +58,8 @@ _FIGURES = (
     "speed_wrists",
     "speed_head",
     "speed_chest",
+    *_LIFE,
+    "sway",
     "descent_seconds",
     "lean_degrees",
 )
@@ -176,8 +189,8 @@ def validations(
             time.sleep(max(0.0, 60.0 * every - (time.monotonic() - begin)))
 
 
-def said(found: Mapping[str, Any]) -> str:
-    """A row in one line."""
+def describe(found: Mapping[str, Any]) -> str:
+    """A row in one line: what calm takes do, then what lively ones do beside captured motion."""
     free, ee = (found["figures"][run] for run in ("free_t0", "ee_t0"))
     when = f" after {found['hours']:.2f} h a part" if "hours" in found else ""
     return (
@@ -185,7 +198,23 @@ def said(found: Mapping[str, Any]) -> str:
         f"{100 * free['sits_within_4cm']:.0f} / {100 * free['sits_within_8cm']:.0f} %, "
         f"skate {free['skate_cm']:.2f}; EE {100 * ee['sits_within_4cm']:.0f} / "
         f"{100 * ee['sits_within_8cm']:.0f} %, EED {ee['end_effector_error']:.4f}"
+        f"{_lively(found['figures'])}"
     )
+
+
+def _lively(figures: Mapping[str, Any]) -> str:
+    """At temperature 1: what feet skate, life in each band over the captured one, and head and
+    hands from their targets; of rows of earlier versions, what they have.
+    """
+    lively, real, led = figures["free_t1"], figures["ground_truth"], figures.get("ee_t1")
+    words = [f"skate {lively['skate_cm']:.2f}"]
+    if all(name in lively and real.get(name) for name in _LIFE):
+        shares = " / ".join(f"{lively[name] / real[name]:.2f}" for name in _LIFE)
+        words.append(f"life {' / '.join(BANDS)} {shares} of real")
+    if led is not None:
+        words.append(f"EED {led['end_effector_error']:.4f}")
+
+    return f"; temperature 1: {', '.join(words)}"
 
 
 def _figures(clips: Sequence[Measured]) -> dict[str, Any]:

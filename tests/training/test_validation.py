@@ -115,6 +115,8 @@ def test_a_run_is_measured_as_it_goes_on_and_its_best_weights_are_kept(
         "lower",
     }
     assert second["held_out"]["lower"] < first["held_out"]["lower"], "it has learnt"
+    assert {"speed_middle", "speed_quick"} <= second["figures"]["free_t1"].keys()
+    assert "temperature 1: skate" in validation.describe(second)
     best = load_weights(run / validation.BEST)
     kept = json.loads(best.metadata["validation"])
     assert kept == min(own, key=lambda each: each["score"])
@@ -178,6 +180,30 @@ def test_what_fails_leaves_all_as_it_was(described: Path, tmp_path: Path, monkey
     (run / validation.RECORD).write_text('{"weights": ', encoding="utf-8")
     with pytest.raises(InputError, match=r"validation\.jsonl' is not JSON; restore"):
         list(validations(run, described, CLIPS))
+
+
+def test_a_row_says_how_lively_takes_are_beside_captured_motion():
+    found = {"sits_within_4cm": 0.5, "sits_within_8cm": 0.75, "skate_cm": 0.02}
+    targets = {**found, "end_effector_error": 0.01}
+    real = {**found, "speed_slow": 0.04, "speed_middle": 0.10, "speed_quick": 0.05}
+    free = {**found, "speed_slow": 0.03, "speed_middle": 0.12, "speed_quick": 0.05, "skate_cm": 0.4}
+    row = {
+        "weights": "the run",
+        "score": 3.0,
+        "figures": {
+            "ground_truth": real,
+            "free_t0": found,
+            "free_t1": free,
+            "ee_t0": targets,
+            "ee_t1": {**targets, "end_effector_error": 0.02},
+        },
+    }
+    assert validation.describe(row).endswith(
+        "; temperature 1: skate 0.40, life slow / middle / quick 0.75 / 1.20 / 1.00 of real, "
+        "EED 0.0200"
+    )
+    del row["figures"]["ee_t1"], free["speed_slow"]
+    assert validation.describe(row).endswith("; temperature 1: skate 0.40"), "of an earlier version"
 
 
 def test_a_score_is_how_far_calm_takes_are_off():

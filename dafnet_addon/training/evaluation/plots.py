@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...core.files import whole_file
+from ...core.liveliness import BANDS
 
 __all__ = ["curves", "plot"]
 
@@ -28,6 +29,10 @@ _PANELS_OF_A_RUN = {
     "EED, EE": ("end_effector_error", ("ee_t0",)),
     "skate, cm a frame": ("skate_cm", ("free_t0", "ee_t0", "ground_truth")),
     "life: wrists, m/s": ("speed_wrists", ("free_t0", "free_t1", "ground_truth")),
+    **{
+        f"life, {band}, m/s": (f"speed_{band}", ("free_t0", "free_t1", "ground_truth"))
+        for band in BANDS
+    },
     "descent, s": ("descent_seconds", ("free_t0", "ee_t0", "ground_truth")),
 }
 """By title, the figure that is drawn, and of which runs."""
@@ -95,7 +100,7 @@ def curves(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
     own = sorted((each for each in rows if "hours" in each), key=lambda each: each["hours"])
     others = [each for each in rows if "hours" not in each]
     hours = [each["hours"] for each in own]
-    figure, axes = plt.subplots(3, 3, figsize=(15, 11), constrained_layout=True)
+    figure, axes = plt.subplots(4, 3, figsize=(15, 15), constrained_layout=True)
     for ax, (title, (name, shown)) in zip(axes.flat, _PANELS_OF_A_RUN.items(), strict=False):
         for which in shown:
             label, colour = _KINDS[which]
