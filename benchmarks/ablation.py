@@ -21,7 +21,7 @@ paired, clip by clip.
 import argparse
 import json
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -41,11 +41,19 @@ from dafnet_addon.model.config import SMALL, ModelConfig
 from dafnet_addon.training import precision
 from dafnet_addon.training.checkpoints import checkpoint_file
 from dafnet_addon.training.config import TrainingConfig
-from dafnet_addon.training.evaluation.clips import Measured, captured, measured, row, rows_of
+from dafnet_addon.training.evaluation.clips import (
+    MeasuredClip,
+    captured_clips,
+    grouped,
+    measure_clips,
+    pooled_row,
+    rows_by_run,
+)
+from dafnet_addon.training.evaluation.markdown import markdown_table
 from dafnet_addon.training.export import export
 from dafnet_addon.training.parts import load_run, trained_networks
 from dafnet_addon.training.train import train, train_part
-from dafnet_addon.training.validation import likelihoods
+from dafnet_addon.training.validation import held_out_losses
 
 MODEL = replace(SMALL, width=96, code=96, ahead=18)
 TRAINING = TrainingConfig(batch=32, free_run=1.0, mixed=True, dropout_windows=0.5)
@@ -64,6 +72,7 @@ VARIANTS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "six coupling layers a part": ({"steps_upper": 6, "steps_lower": 6}, {}),
     "batches of 50": ({}, {"batch": 50}),
     "Noam's schedule": ({}, {"noam": True, "cool_down": 0.0}),
+    "lively free runs": ({}, {"lively": 0.5}),
 }
 FIGURES = (
     "sits_within_6cm",
@@ -86,7 +95,7 @@ def _train(
     train_part(part, dataset, folder, model, training, threads=1, begin_with=begin_with)
 
 
-def variant(
+def measure_variant(
     name: str,
     dataset: Path,
     out: Path,
@@ -97,34 +106,35 @@ def variant(
 ) -> dict[str, Any]:
     """Train (or go on with) one variant, and measure it."""
     changed, trained_as = VARIANTS[name]
-    base = (
-        MODEL
-        if begin_with is None
-        else ModelConfig(**{**begin_with.config["model"], "ahead": MODEL.ahead})
-    )
-    model, training = (
-        replace(base, **changed),
-        replace(TRAINING, minutes_flow=minutes, **trained_as),
-    )
+    base = MODEL
+    if begin_with is not None:
+        base = ModelConfig(**{**begin_with.config["model"], "ahead": MODEL.ahead})
+    model = replace(base, **changed)
+    training = replace(TRAINING, minutes_flow=minutes, **trained_as)
+
     folder = out / name.replace(" ", "_").replace(":", "").replace(",", "")
     folder.mkdir(parents=True, exist_ok=True)
     if not checkpoint_file(folder, "predictor").exists():
         shutil.copy(predictor, folder)
 
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        for job in [
-            pool.submit(_train, p, dataset, folder, model, training, begin_with)
-            for p in ("upper", "lower")
-        ]:
+        jobs = [
+            pool.submit(_train, part, dataset, folder, model, training, begin_with)
+            for part in ("upper", "lower")
+        ]
+        for job in jobs:
             job.result()
 
     file = folder / "weights.safetensors"
     export(file, *trained_networks(folder), {})
-    found = rows_of(
-        measured(load_weights(file), clips, seeds=1), ["ground_truth", "free_t0", "ee_t0"]
-    )
+    measured = measure_clips(load_weights(file), clips, seeds=1)
+    found = rows_by_run(measured, ["ground_truth", "free_t0", "ee_t0"])
     steps = {part: load_run(part, folder).step for part in ("upper", "lower")}
-    return {"steps": steps, "nll": round(sum(likelihoods(folder, dataset).values()), 2), **found}
+    return {
+        "steps": steps,
+        "nll": round(sum(held_out_losses(folder, dataset).values()), 2),
+        **found,
+    }
 
 
 def table(results: dict[str, dict[str, Any]]) -> str:
@@ -136,20 +146,14 @@ def table(results: dict[str, dict[str, Any]]) -> str:
         *(f"{name.replace('_', ' ')}, FREE / EE" for name in FIGURES),
     ]
     truth = next(iter(results.values()))["ground_truth"]
-    lines = ["| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
-    lines.append(
-        "| **ground truth** | – | – | "
-        + " | ".join(f"{truth[name]:.3g}" for name in FIGURES)
-        + " |"
-    )
+    rows = [["**ground truth**", "–", "–", *(f"{truth[name]:.3g}" for name in FIGURES)]]
     for name, found in results.items():
-        cells = [
-            f"{found['free_t0'][figure]:.3g} / {found['ee_t0'][figure]:.3g}" for figure in FIGURES
-        ]
+        free, ee = found["free_t0"], found["ee_t0"]
         steps = f"{found['steps']['upper']} + {found['steps']['lower']}"
-        lines.append("| " + " | ".join([name, steps, f"{found['nll']:.1f}", *cells]) + " |")
+        cells = [f"{free[figure]:.3g} / {ee[figure]:.3g}" for figure in FIGURES]
+        rows.append([name, steps, f"{found['nll']:.1f}", *cells])
 
-    return "\n".join(lines)
+    return markdown_table(head, rows)
 
 
 BEGUN, BOXES, REAL = "the weights begun with", "boxes alone", "with real pieces"
@@ -162,7 +166,7 @@ GROUPS: dict[str, Callable[[HeldClip], str]] = {
 DRAWS = 2000
 
 
-def box_dataset(dataset: Path, folder: Path, out: Path) -> None:
+def prepare_without_pieces(dataset: Path, folder: Path, out: Path) -> None:
     """Make (or go on making) the dataset ``out``: as ``dataset``, of the same motion files, without
     its real pieces. Raises InputError where that has none.
     """
@@ -175,7 +179,7 @@ def box_dataset(dataset: Path, folder: Path, out: Path) -> None:
     prepare(folder, out, described["windows"], cores(), described["seed"])
 
 
-def trained_on(dataset: Path, folder: Path, minutes: float, begin_with: Weights) -> Path:
+def train_on(dataset: Path, folder: Path, minutes: float, begin_with: Weights) -> Path:
     """Train (or go on with) a run in ``folder`` as ``small.toml`` trains, predictor and flow, for
     ``minutes`` a part (the predictor for a fifth of that), from these weights on: its weights file.
     """
@@ -189,7 +193,9 @@ def trained_on(dataset: Path, folder: Path, minutes: float, begin_with: Weights)
     return file
 
 
-def paired(better: Sequence[float], worse: Sequence[float]) -> tuple[float, float, float]:
+def paired_difference(
+    better: Sequence[float], worse: Sequence[float]
+) -> tuple[float, float, float]:
     """The mean difference of two figures of the same clips, and 95 % of its bootstrap over
     clips.
     """
@@ -199,52 +205,63 @@ def paired(better: Sequence[float], worse: Sequence[float]) -> tuple[float, floa
     return float(difference.mean()), float(low), float(high)
 
 
-def off(clip: Measured, run: str) -> float:
+def pelvis_error(clip: MeasuredClip, run: str) -> float:
     """Centimetres by which a clip's pelvis misses its seats' heights in a run, the mean over
     episodes.
     """
     return 100.0 * float(np.abs(clip.runs[run].seats).mean())
 
 
-def furniture_table(found: dict[str, list[Measured]]) -> str:
+def furniture_table(found: dict[str, list[MeasuredClip]]) -> str:
     """In Markdown: per group of clips and weights, FREE within 4 and 8 cm and how far off; then how
     much closer real pieces bring the pelvis than boxes alone; and EE.
     """
-    lines = [
-        "| | clips | weights | FREE, within 4 cm | within 8 cm | pelvis off, cm "
-        "| real pieces less boxes alone, cm | EE, within 4 cm | EED in EE | skate, cm a frame |",
-        "|---" * 10 + "|",
-    ]
+    head = (
+        "",
+        "clips",
+        "weights",
+        "FREE, within 4 cm",
+        "within 8 cm",
+        "pelvis off, cm",
+        "real pieces less boxes alone, cm",
+        "EE, within 4 cm",
+        "EED in EE",
+        "skate, cm a frame",
+    )
+    rows: list[list[str]] = []
     for group, of in GROUPS.items():
-        names = sorted({of(each.clip) for each in found[BEGUN]})
-        for name in names:
-            chosen = {
-                weights: [each for each in clips if of(each.clip) == name]
-                for weights, clips in found.items()
-            }
-            errors = {w: [off(each, "free_t0") for each in c] for w, c in chosen.items()}
-            for weights, clips in chosen.items():
-                free, ee = (row([each.runs[run] for each in clips]) for run in ("free_t0", "ee_t0"))
-                difference = "–"
-                if weights == REAL:
-                    mean, low, high = paired(errors[REAL], errors[BOXES])
-                    difference = f"{mean:+.1f} ({low:+.1f} to {high:+.1f})"
-                low, high = free["intervals"]["sits_within_8cm"]
-                cells = [
-                    name if group == "all" else f"{group} {name}",
-                    str(len(clips)),
-                    weights,
-                    f"{100 * free['sits_within_4cm']:.0f} %",
-                    f"{100 * free['sits_within_8cm']:.0f} % ({100 * low:.0f} to {100 * high:.0f})",
-                    f"{np.mean(errors[weights]):.1f}",
-                    difference,
-                    f"{100 * ee['sits_within_4cm']:.0f} %",
-                    f"{ee['end_effector_error']:.4f}",
-                    f"{free['skate_cm']:.2f}",
-                ]
-                lines.append("| " + " | ".join(cells) + " |")
+        by_weights = {weights: grouped(clips, of) for weights, clips in found.items()}
+        for name in by_weights[BEGUN]:
+            chosen = {weights: clips[name] for weights, clips in by_weights.items()}
+            rows += _furniture_rows(name if group == "all" else f"{group} {name}", chosen)
 
-    return "\n".join(lines)
+    return markdown_table(head, rows)
+
+
+def _furniture_rows(label: str, chosen: dict[str, list[MeasuredClip]]) -> Iterator[list[str]]:
+    """The rows of a group's clips, one for each weights."""
+    errors = {w: [pelvis_error(each, "free_t0") for each in own] for w, own in chosen.items()}
+    for weights, clips in chosen.items():
+        free, ee = (pooled_row([each.runs[run] for each in clips]) for run in ("free_t0", "ee_t0"))
+
+        difference = "–"
+        if weights == REAL:
+            mean, low, high = paired_difference(errors[REAL], errors[BOXES])
+            difference = f"{mean:+.1f} ({low:+.1f} to {high:+.1f})"
+
+        low, high = free["intervals"]["sits_within_8cm"]
+        yield [
+            label,
+            str(len(clips)),
+            weights,
+            f"{100 * free['sits_within_4cm']:.0f} %",
+            f"{100 * free['sits_within_8cm']:.0f} % ({100 * low:.0f} to {100 * high:.0f})",
+            f"{np.mean(errors[weights]):.1f}",
+            difference,
+            f"{100 * ee['sits_within_4cm']:.0f} %",
+            f"{ee['end_effector_error']:.4f}",
+            f"{free['skate_cm']:.2f}",
+        ]
 
 
 def furniture(
@@ -253,17 +270,18 @@ def furniture(
     """What real pieces give in equal time, as a table (see ``furniture_table``)."""
     clips = [clip for clip in real_test(folder, library, "choose") if clip.room != "bed"]
     boxes = out / "dataset_of_boxes"
-    box_dataset(dataset, folder, boxes)
+    prepare_without_pieces(dataset, folder, boxes)
     files = {BEGUN: begin_with.path}
     for name, windows in ((BOXES, boxes), (REAL, dataset)):
-        files[name] = trained_on(windows, out / name.replace(" ", "_"), minutes, begin_with)
+        files[name] = train_on(windows, out / name.replace(" ", "_"), minutes, begin_with)
 
     found = {
-        name: measured(load_weights(file), clips, seeds=1, modes=("FREE", "EE"), clean=False)
+        name: measure_clips(load_weights(file), clips, seeds=1, modes=("FREE", "EE"), clean=False)
         for name, file in files.items()
     }
     rows = {
-        name: rows_of(each, ("ground_truth", "free_t0", "ee_t0")) for name, each in found.items()
+        name: rows_by_run(each, ("ground_truth", "free_t0", "ee_t0"))
+        for name, each in found.items()
     }
     for name, file in files.items():
         if name != BEGUN:
@@ -275,8 +293,7 @@ def furniture(
     return text
 
 
-def main(arguments: Sequence[str]) -> str:
-    """Run what the arguments ask for; the table as text."""
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         "dafnet bench ablation",
         description=__doc__,
@@ -296,9 +313,16 @@ def main(arguments: Sequence[str]) -> str:
     parser.add_argument(
         "--furniture", type=Path, metavar="LIBRARY", help="measure what its real pieces give"
     )
+    return parser
+
+
+def main(arguments: Sequence[str]) -> str:
+    """Run what the arguments ask for; the table as text."""
+    parser = _parser()
     options = parser.parse_args(arguments)
     begin_with = load_weights(options.begin_with) if options.begin_with else None
-    precision.announce(TRAINING.mixed)
+    precision.warn_if_missing(TRAINING.mixed)
+
     if options.furniture:
         if begin_with is None:
             parser.error("--furniture needs --from")
@@ -311,12 +335,12 @@ def main(arguments: Sequence[str]) -> str:
             begin_with=begin_with,
         )
 
-    clips = captured(held_out(options.folder))[:: options.every]
+    clips = captured_clips(held_out(options.folder))[:: options.every]
     first = options.output / "predictor"
-    if not checkpoint_file(first, "predictor").exists():
-        train_part(
-            "predictor", options.dataset, first, MODEL, replace(TRAINING, minutes_predictor=2.0)
-        )
+    predictor = checkpoint_file(first, "predictor")
+    if not predictor.exists():
+        training = replace(TRAINING, minutes_predictor=2.0)
+        train_part("predictor", options.dataset, first, MODEL, training)
 
     results: dict[str, dict[str, Any]] = {}
     for name, (changed, _) in VARIANTS.items():
@@ -324,9 +348,14 @@ def main(arguments: Sequence[str]) -> str:
         if name not in options.only or (begin_with is not None and resized):
             continue
 
-        predictor = checkpoint_file(first, "predictor")
-        results[name] = variant(
-            name, options.dataset, options.output, options.minutes, predictor, clips, begin_with
+        results[name] = measure_variant(
+            name=name,
+            dataset=options.dataset,
+            out=options.output,
+            minutes=options.minutes,
+            predictor=predictor,
+            clips=clips,
+            begin_with=begin_with,
         )
         (options.output / "ablation.json").write_text(
             json.dumps(results, indent=1), encoding="utf-8"

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from dafnet_addon.baselines.samp import SMALL_SAMP, SampConfig
-from dafnet_addon.baselines.samp_evaluate import measured_samp
+from dafnet_addon.baselines.samp_evaluate import measure_samp
 from dafnet_addon.baselines.train import train_samp
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.weights import load_weights
@@ -40,11 +40,17 @@ from dafnet_addon.model.systems import system_named
 from dafnet_addon.training import precision
 from dafnet_addon.training.checkpoints import Checkpoint, checkpoint_file
 from dafnet_addon.training.config import TrainingConfig
-from dafnet_addon.training.evaluation.clips import Measured, captured, measured, row
+from dafnet_addon.training.evaluation.clips import (
+    MeasuredClip,
+    captured_clips,
+    measure_clips,
+    pooled_row,
+)
+from dafnet_addon.training.evaluation.markdown import markdown_table
 from dafnet_addon.training.export import export
 from dafnet_addon.training.noise import take_noise
 from dafnet_addon.training.parts import load_run, trained_networks
-from dafnet_addon.training.processes import spread_out
+from dafnet_addon.training.processes import map_in_processes
 from dafnet_addon.training.steps import dataset_pool
 from dafnet_addon.training.train import train_part
 
@@ -104,7 +110,7 @@ class Job:
     training: TrainingConfig
 
 
-def _at(runs: Path, budget: str) -> Path:
+def _runs_of(runs: Path, budget: str) -> Path:
     """The folder of the runs of a budget."""
     return runs / budget.replace(" ", "_")
 
@@ -132,11 +138,11 @@ def _jobs(runs: Path, budget: str, model: ModelConfig, training: TrainingConfig)
         parts = system_named(of_it.system).partition
         for part in parts:
             shared = replace(training, minutes_flow=training.minutes_flow / len(parts))
-            yield Job(_at(runs, budget) / of_it.system, part, of_it, shared)
+            yield Job(_runs_of(runs, budget) / of_it.system, part, of_it, shared)
 
     if budget == BUDGETS[0]:
         for kind in NETWORKS:
-            yield Job(_at(runs, budget) / kind, kind, model, training)
+            yield Job(_runs_of(runs, budget) / kind, kind, model, training)
 
 
 def train(
@@ -159,7 +165,7 @@ def train(
         spent = replace(training, minutes_flow=minutes)
         if budget == "equal steps":
             spent = replace(
-                spent, steps_flow=load_run("whole", _at(runs, BUDGETS[0]) / "moglow").step
+                spent, steps_flow=load_run("whole", _runs_of(runs, BUDGETS[0]) / "moglow").step
             )
         elif budget == "triple time":
             spent = replace(spent, minutes_flow=3.0 * minutes)
@@ -170,7 +176,7 @@ def train(
             if job.model.predicts and not checkpoint_file(job.folder, "predictor").exists():
                 shutil.copy(checkpoint_file(first, "predictor"), job.folder)
 
-        list(spread_out(partial(_train, dataset, samp), jobs, processes))
+        list(map_in_processes(partial(_train, dataset, samp), jobs, processes))
         for folder in {job.folder for job in jobs if job.part not in NETWORKS}:
             flow, predictor, statistics = trained_networks(folder)
             noise = take_noise(flow, predictor, dataset_pool(dataset), statistics)
@@ -184,7 +190,7 @@ def steps_of(folder: Path) -> str:
     return " + ".join(str(Checkpoint.read(file).progress()[0]) for file in files) or "–"
 
 
-Measuring = Callable[[Sequence[HeldClip]], list[Measured]]
+Measuring = Callable[[Sequence[HeldClip]], list[MeasuredClip]]
 
 
 def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
@@ -195,17 +201,19 @@ def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
     def flow(file: Path | None) -> Measuring:
         if file is not None and not file.exists():
             raise InputError(
-                f"'{file}' is not there yet; run 'experiments.py train' to its end first."
+                f"'{file}' is not there yet; run 'dafnet bench tables train' to its end first."
             )
-        return lambda clips: measured(load_weights(file), clips, modes=("FREE", "EE"), clean=False)
+        return lambda clips: measure_clips(
+            load_weights(file), clips, modes=("FREE", "EE"), clean=False
+        )
 
     out: dict[str, tuple[str, Measuring]] = {}
     compared = {"DAFNet": FLOWS["DAFNet"]} if table == "table1" else FLOWS
     for budget in BUDGETS[:1] if table == "table1" else BUDGETS:
-        at = _at(runs, budget)
+        at = _runs_of(runs, budget)
         for name, (network, kind) in SAMP.items() if table == "table1" else ():
             file = checkpoint_file(at / network, network)
-            out[f"{name}, {budget}"] = steps_of(file.parent), partial(measured_samp, file, kind)
+            out[f"{name}, {budget}"] = steps_of(file.parent), partial(measure_samp, file, kind)
         for name, changed in compared.items():
             if budget != BUDGETS[0] and name not in (
                 *(("MoGlow",) if budget == BUDGETS[1] else ()),
@@ -213,7 +221,7 @@ def systems_of(table: str, runs: Path) -> dict[str, tuple[str, Measuring]]:
             ):
                 continue
             # MoGlow's run with equal time is that with equal steps too.
-            folder = (_at(runs, BUDGETS[0]) if name == "MoGlow" else at) / changed["system"]
+            folder = (_runs_of(runs, BUDGETS[0]) if name == "MoGlow" else at) / changed["system"]
             out[f"{name}, {budget}"] = steps_of(folder), flow(folder / "weights.safetensors")
 
     out[f"DAFNet, {SHIPPED}"] = "–", flow(None)
@@ -243,7 +251,7 @@ def measure(
             chosen, at = results[at : at + len(members)], at + len(members)
             settings = [key for key in results[0].runs if key != "legs"]
             known[name]["groups"][group] = {
-                key: row([each.runs[key] for each in chosen]) for key in settings
+                key: pooled_row([each.runs[key] for each in chosen]) for key in settings
             }
 
         output.mkdir(parents=True, exist_ok=True)
@@ -255,7 +263,7 @@ def measure(
     return found
 
 
-def _ratio(worse: np.ndarray, better: np.ndarray) -> float:
+def _ratio_of_sums(worse: np.ndarray, better: np.ndarray) -> float:
     """Ratio of two systems' figures over clips, (N, 2) totals and weights; NaN where the second has
     none.
     """
@@ -263,53 +271,67 @@ def _ratio(worse: np.ndarray, better: np.ndarray) -> float:
     return float((a / m) / (b / n)) if b else float("nan")
 
 
-def paired(
+def compare_pairs(
     clips: Mapping[str, Sequence[HeldClip]], runs: Path, output: Path, draws: int = 4000
 ) -> str:
     """AP-P's figures over DAFNet's in EE on the same clips, for each budget, with the 95 % interval
     of the ratio over pairs drawn anew, and in how many clips AP-P is the worse; writes
     ``output``/paired.md. What is measured is kept in paired.json.
     """
-    file = output / "paired.json"
-    known: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-    every = [clip for group in clips.values() for clip in group]
-    rows = [
-        "| budget | clips | EED, z = 0 | EED, temperature 1 | FS, z = 0 | FS, temperature 1 |",
-        "|---" * 6 + "|",
-    ]
+    known = _measured_pairs([clip for group in clips.values() for clip in group], runs, output)
     rng = np.random.default_rng(0)
+    rows = []
     for budget in BUDGETS:
-        for name in STEPPED:
-            if f"{name}, {budget}" not in known:
-                weights = load_weights(
-                    _at(runs, budget) / FLOWS[name]["system"] / "weights.safetensors"
-                )
-                results = measured(weights, every, modes=("EE",), clean=False)
-                known[f"{name}, {budget}"] = [
-                    {key: each.runs[key].sums for key in ("ee_t0", "ee_t1")} for each in results
-                ]
-                file.write_text(json.dumps(known), encoding="utf-8")
+        systems = [known[f"{name}, {budget}"] for name in STEPPED]
         at = 0
         for group, members in clips.items():
             chosen, at = slice(at, at + len(members)), at + len(members)
             cells = []
             for figure, heat in product(("eed", "fs"), ("ee_t0", "ee_t1")):
-                sums = [known[f"{name}, {budget}"][chosen] for name in STEPPED]
-                pair = [
-                    np.array([clip[heat][_FIGURES[figure]] for clip in system]) for system in sums
-                ]
-                drawn = rng.integers(len(members), size=(draws, len(members)))
-                low, high = np.percentile(
-                    [_ratio(*(each[k] for each in pair)) for k in drawn], [2.5, 97.5]
+                worse, better = (
+                    np.array([clip[heat][_FIGURES[figure]] for clip in system[chosen]])
+                    for system in systems
                 )
-                worse, better = (each[:, 0] / each[:, 1] for each in pair)
-                count = f"{int((worse > better).sum())} of {len(members)}"
-                cells.append(f"×{_ratio(*pair):.2f} ({low:.2f} to {high:.2f}), {count}")
-            rows.append(f"| {budget} | {group} | " + " | ".join(cells) + " |")
+                cells.append(_pair_cell(worse, better, rng, draws))
 
-    text = "\n".join(rows) + "\n"
+            rows.append([budget, group, *cells])
+
+    head = ("budget", "clips", "EED, z = 0", "EED, temperature 1", "FS, z = 0", "FS, temperature 1")
+    text = markdown_table(head, rows) + "\n"
     (output / "paired.md").write_text(text, encoding="utf-8")
     return text
+
+
+def _measured_pairs(clips: Sequence[HeldClip], runs: Path, output: Path) -> dict[str, Any]:
+    """Sums of each clip by run, of every compared system and budget; kept in
+    ``output``/paired.json.
+    """
+    file = output / "paired.json"
+    known: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    for budget, name in product(BUDGETS, STEPPED):
+        if f"{name}, {budget}" not in known:
+            folder = _runs_of(runs, budget) / FLOWS[name]["system"]
+            weights = load_weights(folder / "weights.safetensors")
+            measured = measure_clips(weights, clips, modes=("EE",), clean=False)
+            known[f"{name}, {budget}"] = [
+                {run: each.runs[run].sums for run in ("ee_t0", "ee_t1")} for each in measured
+            ]
+            file.write_text(json.dumps(known), encoding="utf-8")
+
+    return known
+
+
+def _pair_cell(worse: np.ndarray, better: np.ndarray, rng: np.random.Generator, draws: int) -> str:
+    """The ratio of two systems' figures on the same clips (N, 2), its interval, and in how many
+    clips the first is the worse.
+    """
+    drawn = rng.integers(len(worse), size=(draws, len(worse)))
+    ratios = [_ratio_of_sums(worse[chosen], better[chosen]) for chosen in drawn]
+    low, high = np.percentile(ratios, [2.5, 97.5])
+
+    larger = worse[:, 0] / worse[:, 1] > better[:, 0] / better[:, 1]
+    ratio = _ratio_of_sums(worse, better)
+    return f"×{ratio:.2f} ({low:.2f} to {high:.2f}), {int(larger.sum())} of {len(worse)}"
 
 
 def _cell(
@@ -327,7 +349,7 @@ def _cell(
 
 def _row(
     table: str, system: str, found: Mapping[str, Any], group: str, heat: str, columns: Sequence[str]
-) -> str:
+) -> list[str]:
     name, budget = system.split(", ", 1)
     printed, paper = TABLES[table]
     cells = []
@@ -345,7 +367,7 @@ def _row(
 
         cells.append(_cell(values, figure, ours.get(figure) if compared else None, theirs))
 
-    return f"| {system} | {found[system]['steps']} | " + " | ".join(cells) + " |"
+    return [system, found[system]["steps"], *cells]
 
 
 def markdown(table: str, found: Mapping[str, Any]) -> str:
@@ -359,20 +381,13 @@ def markdown(table: str, found: Mapping[str, Any]) -> str:
     groups = next(iter(found.values()))["groups"]
     for group, heat in product(groups, ("t0", "t1")):
         truth = groups[group]["ground_truth"]
-        real = " | ".join(
-            _cell(truth, {**_FIGURES, **_SEATS}[column.split()[0]]) for column in columns
-        )
+        real = [_cell(truth, {**_FIGURES, **_SEATS}[column.split()[0]]) for column in columns]
+        head = f"({truth['clips']} clips, {truth['seat_episodes']} seat episodes)"
+        rows = [["**ground truth**", "–", *real]]
+        rows += [_row(table, system, found, group, heat, columns) for system in found]
         parts += [
-            f"### {group}, temperature {heat[1]} ({truth['clips']} clips, "
-            f"{truth['seat_episodes']} seat episodes)",
-            "\n".join(
-                [
-                    "| | steps | " + " | ".join(column.upper() for column in columns) + " |",
-                    "|---" * (len(columns) + 2) + "|",
-                    f"| **ground truth** | – | {real} |",
-                    *(_row(table, system, found, group, heat, columns) for system in found),
-                ]
-            ),
+            f"### {group}, temperature {heat[1]} {head}",
+            markdown_table(("", "steps", *(column.upper() for column in columns)), rows),
         ]
 
     return "\n\n".join(parts) + "\n"
@@ -400,16 +415,18 @@ def main(arguments: Sequence[str]) -> str:
     options = parser.parse_args(arguments)
 
     if options.command == "train":
-        precision.announce(TRAINING.mixed)
+        precision.warn_if_missing(TRAINING.mixed)
         train(options.dataset, options.output, options.minutes, options.processes)
         return f"Written to {options.output}"
 
     clips = {
         "The paper's kinds of furniture (composed)": paper_test(options.folder),
-        "Every second captured clip of unseen bodies": captured(held_out(options.folder))[::2],
+        "Every second captured clip of unseen bodies": captured_clips(held_out(options.folder))[
+            ::2
+        ],
     }
     if options.command == "paired":
-        return paired(clips, options.output, options.output)
+        return compare_pairs(clips, options.output, options.output)
 
     measure(options.command, clips, options.output, options.output)
     return (options.output / f"{options.command}.md").read_text(encoding="utf-8")

@@ -25,6 +25,7 @@ HEIGHTS: list[float] = np.linspace(0.35, 0.65, 10).tolist()
 NOISE: Noise = [(0.0, 0)] + [(1.0, seed) for seed in range(1, 6)]
 """Temperature and seed of every take of a situation."""
 TOLERANCE = 0.08
+"""Metres by which a pelvis may be off and still sits."""
 _SEAT = Stop((0.0, 0.0), 0.0, 3.0, seated=True, name="seat")
 
 
@@ -80,75 +81,83 @@ def measure(
         (height, back, way) for height in heights for back in (False, True) for way in ways
     ]
     count = len(situations) + len(ways)
+
     seated: list[dict[str, Any]] = []
     for done, (height, back, way) in enumerate(situations):
         progress(done / count)
+        named = {"height": round(height, 3), "back": back, "approach": way}
         for temperature, take in _takes(seat(height, back), ways[way], weights, noise):
-            path, _ = root_from_matrices(take.root)
-            error = seat_report(
-                take.joints, path, take.fps, [Seat("seat", np.array([0.0, 0.0, height]))]
-            )[0]["error"]
-            seated.append(
-                {
-                    "height": round(height, 3),
-                    "back": back,
-                    "approach": way,
-                    "temperature": temperature,
-                    "error": None if error is None else round(float(error), 4),
-                }
-            )
+            seated.append({**named, "temperature": temperature, "error": _error(take, height)})
 
     empty: list[dict[str, Any]] = []
-    for done, way in enumerate(ways):
-        progress((len(situations) + done) / count)
-        rest = ways[way].rests[-1]
-        for temperature, take in _takes(Scene(), ways[way], weights, noise):
-            path, _ = root_from_matrices(take.root)
-            drop = (
-                standing_pelvis_height(take.joints, path, take.fps)
-                - take.joints[rest.start : rest.stop - 1, PELVIS, 2].min()
-            )
-            empty.append(
-                {"approach": way, "temperature": temperature, "drop": round(float(drop), 4)}
-            )
+    for done, (way, walked) in enumerate(ways.items(), len(situations)):
+        progress(done / count)
+        for temperature, take in _takes(Scene(), walked, weights, noise):
+            drop = _drop(take, walked)
+            empty.append({"approach": way, "temperature": temperature, "drop": drop})
 
     progress(1.0)
+    report = _report(seated, empty)
+    return report, _summary(report)
+
+
+def _error(take: Take, height: float) -> float | None:
+    """Metres by which a take's pelvis is over the right height; None where it never rests."""
+    path, _ = root_from_matrices(take.root)
+    there = Seat("seat", np.array([0.0, 0.0, height]))
+    error = seat_report(take.joints, path, take.fps, [there])[0]["error"]
+    return None if error is None else round(float(error), 4)
+
+
+def _drop(take: Take, walked: Route) -> float:
+    """Metres by which a take's pelvis comes down where the root rests and there is no seat."""
+    path, _ = root_from_matrices(take.root)
+    rest = walked.rests[-1]
+    lowest = take.joints[rest.start : rest.stop - 1, PELVIS, 2].min()
+    return round(float(standing_pelvis_height(take.joints, path, take.fps) - lowest), 4)
+
+
+def _report(seated: list[dict[str, Any]], empty: list[dict[str, Any]]) -> dict[str, Any]:
+    """Shares of the takes that sit, in all and by what differs between them."""
 
     def share(**chosen: Any) -> float:
         errors = [
             each["error"]
             for each in seated
-            if all(each[key] == value for key, value in chosen.items())
+            if all(each[name] == value for name, value in chosen.items())
         ]
         return float(np.mean([error is not None and abs(error) <= TOLERANCE for error in errors]))
 
-    report = {
+    def values(name: str) -> list[Any]:
+        return list(dict.fromkeys(each[name] for each in seated))
+
+    return {
         "tolerance": TOLERANCE,
         "sits": share(),
         "sits_at_temperature": {
-            f"{t:g}": share(temperature=t) for t in sorted({t for t, _ in noise})
+            f"{heat:g}": share(temperature=heat) for heat in sorted(values("temperature"))
         },
-        "sits_by_approach": {way: share(approach=way) for way in ways},
+        "sits_by_approach": {way: share(approach=way) for way in values("approach")},
         "sits_by_back": {
             name: share(back=back) for name, back in (("with", True), ("without", False))
         },
-        "sits_by_height": {f"{h:.3f}": share(height=round(h, 3)) for h in heights},
+        "sits_by_height": {f"{height:.3f}": share(height=height) for height in values("height")},
         "largest_drop_without_seat": max(each["drop"] for each in empty),
         "takes": seated,
         "takes_without_seat": empty,
     }
-    lines = [
-        f"{100 * report['sits']:.0f} % of {len(seated)} takes sit within {100 * TOLERANCE:.0f} cm"
-    ]
-    for key in ("temperature", "approach", "back", "height"):
-        table = report["sits_at_temperature" if key == "temperature" else f"sits_by_{key}"]
-        lines.append(
-            f"  by {key}: "
-            + ", ".join(f"{name} {100 * value:.0f} %" for name, value in table.items())
-        )
 
-    lines.append(
-        f"Without a seat the pelvis drops by {100 * report['largest_drop_without_seat']:.0f} cm "
-        "at most"
-    )
-    return report, "\n".join(lines)
+
+def _summary(report: dict[str, Any]) -> str:
+    lines = [
+        f"{100 * report['sits']:.0f} % of {len(report['takes'])} takes sit within "
+        f"{100 * TOLERANCE:.0f} cm"
+    ]
+    for name in ("temperature", "approach", "back", "height"):
+        shares = report["sits_at_temperature" if name == "temperature" else f"sits_by_{name}"]
+        cells = ", ".join(f"{label} {100 * value:.0f} %" for label, value in shares.items())
+        lines.append(f"  by {name}: {cells}")
+
+    drop = 100 * report["largest_drop_without_seat"]
+    lines.append(f"Without a seat the pelvis drops by {drop:.0f} cm at most")
+    return "\n".join(lines)

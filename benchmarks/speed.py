@@ -30,11 +30,23 @@ from dafnet_addon.model.flow import BodyFlow
 from dafnet_addon.model.predictor import ActionPredictor
 from dafnet_addon.model.systems import sampler_of
 from dafnet_addon.training.batches import Statistics
+from dafnet_addon.training.evaluation.markdown import markdown_table
 from dafnet_addon.training.export import tensors_of
 
-# rows and columns of the matrix that bandwidth is measured with: 256 MB, more than any cache
 _LARGE = 8192
+"""Rows and columns of the matrix that bandwidth is measured with: 256 MB, more than any cache."""
 _REPEATS = 3
+"""Of which the fastest counts."""
+_COLUMNS = {
+    "system": "",
+    "library": "library",
+    "megabytes": "recurrent MB",
+    "floor_ms": "floor, ms",
+    "ms_1": "batch 1, ms a pose",
+    "over_floor": "over the floor",
+    "ms_64": "batch 64, ms a pose",
+}
+"""A row's values by name, and their titles."""
 
 
 def random_weights(config: ModelConfig) -> Weights:
@@ -81,7 +93,7 @@ def recurrent_bytes(sampler: Sampler) -> int:
     return sum(int(a.nbytes) for a in arrays)
 
 
-def per_pose(sampler: Sampler, batch: int, frames: int) -> float:
+def time_per_pose(sampler: Sampler, batch: int, frames: int) -> float:
     """Milliseconds a pose, frame by frame, what is known in advance not counted; the best of a
     few.
     """
@@ -100,19 +112,37 @@ def per_pose(sampler: Sampler, batch: int, frames: int) -> float:
     return 1000.0 * best / (frames * batch)
 
 
+def flow_row(sampler: Sampler, frames: int, speed: float) -> dict[str, Any]:
+    """A flow's size, times at batch 1 and 64, and the floor under them at a bandwidth."""
+    times = {
+        1: time_per_pose(sampler, 1, frames),
+        64: time_per_pose(sampler, 64, max(frames // 4, 2)),
+    }
+    return _row(recurrent_bytes(sampler), times, speed)
+
+
+def _row(size: int, times: dict[int, float], speed: float) -> dict[str, Any]:
+    """``size``: bytes that each frame reads; ``times``: milliseconds a pose by batch size."""
+    floor = round(1e3 * size / speed, 3)
+    shown = {f"ms_{batch}": round(time, 3) for batch, time in times.items()}
+    return {
+        "megabytes": round(size / 1e6, 2),
+        "floor_ms": floor,
+        **shown,
+        "over_floor": round(shown["ms_1"] / floor, 2),
+    }
+
+
 def samp_row(config: SampConfig, frames: int, speed: float) -> dict[str, Any]:
     """SAMP's next state from its last one, one a frame; the features between are not counted."""
     torch.manual_seed(0)
     network = network_of("samp", config)
     parts = (network.gating, network.interaction, network.first, network.second, network.third)
     size = sum(int(p.nbytes) for part in parts for p in part.parameters())
-    row: dict[str, Any] = {"system": "SAMP", "library": "torch", "megabytes": round(size / 1e6, 2)}
-    row["floor_ms"] = round(1e3 * size / speed, 3)
+    times = {}
     for batch in (1, 64):
-        state, sensor = (
-            torch.zeros(batch, len(network.in_mean)),
-            torch.zeros(batch, len(network.sensor_mean)),
-        )
+        state = torch.zeros(batch, len(network.in_mean))
+        sensor = torch.zeros(batch, len(network.sensor_mean))
         z, best = torch.zeros(batch, config.latent), np.inf
         with torch.no_grad():
             for _ in range(_REPEATS):
@@ -121,10 +151,9 @@ def samp_row(config: SampConfig, frames: int, speed: float) -> dict[str, Any]:
                     network.decode(z, state, sensor)
                 best = min(best, perf_counter() - begin)
 
-        row[f"ms_{batch}"] = round(1000.0 * best / (frames * batch), 3)
+        times[batch] = 1000.0 * best / (frames * batch)
 
-    row["over_floor"] = round(row["ms_1"] / row["floor_ms"], 2)
-    return row
+    return {"system": "SAMP", "library": "torch", **_row(size, times, speed)}
 
 
 def measure(
@@ -140,6 +169,36 @@ def measure(
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     speed = bandwidth()
+
+    timed = _timed(paper, load_weights(file))
+    rows = []
+    for done, (name, library, weights, device) in enumerate(timed):
+        progress(done / len(timed))
+        row = flow_row(sampler_of(weights, device), frames, speed)
+        rows.append({"system": name, "library": library, **row})
+
+    rows.insert(-1, samp_row(samp, frames, speed))
+    torch.set_num_threads(threads)
+    progress(1.0)
+
+    moglow = [row for row in rows if row["system"] == "MoGlow"]
+    report = {
+        "gigabytes_a_second": round(speed / 1e9, 2),
+        "rows": rows,
+        "moglow_over_dafnet": {
+            row["library"]: round(row["ms_1"] / rows[0]["ms_1"], 2) for row in moglow
+        },
+    }
+    head = (
+        f"One thread; matrix-vector products read {report['gigabytes_a_second']} GB a second from "
+        "memory."
+    )
+    body = [[str(row[name]) for name in _COLUMNS] for row in rows]
+    return report, "\n".join([head, "", markdown_table(list(_COLUMNS.values()), body)])
+
+
+def _timed(paper: ModelConfig, weights: Weights) -> list[tuple[str, str, Weights, str | None]]:
+    """What is timed: the system's name, the library, the weights, and torch's device."""
     models = {
         "DAFNet": paper,
         "AP-P": replace(paper, system="ap-p", steps_whole=6),
@@ -147,55 +206,7 @@ def measure(
     }
     timed: list[tuple[str, str, Weights, str | None]] = []
     for name, model in models.items():
-        weights = random_weights(model)
-        timed += [(name, "NumPy", weights, None), (name, "torch", weights, "cpu")]
+        untrained = random_weights(model)
+        timed += [(name, "NumPy", untrained, None), (name, "torch", untrained, "cpu")]
 
-    timed.append(("DAFNet, these weights", "NumPy", load_weights(file), None))
-    rows = []
-    for done, (name, library, weights, device) in enumerate(timed):
-        progress(done / len(timed))
-        sampler = sampler_of(weights, device)
-        size = recurrent_bytes(sampler)
-        row: dict[str, Any] = {
-            "system": name,
-            "library": library,
-            "megabytes": round(size / 1e6, 2),
-        }
-        row["floor_ms"] = round(1e3 * size / speed, 3)
-        for batch in (1, 64):
-            row[f"ms_{batch}"] = round(
-                per_pose(sampler, batch, frames if batch == 1 else max(frames // 4, 2)), 3
-            )
-
-        row["over_floor"] = round(row["ms_1"] / row["floor_ms"], 2)
-        rows.append(row)
-
-    rows.insert(-1, samp_row(samp, frames, speed))
-    torch.set_num_threads(threads)
-    progress(1.0)
-    ours = rows[0]["ms_1"]
-    report = {
-        "gigabytes_a_second": round(speed / 1e9, 2),
-        "rows": rows,
-        "moglow_over_dafnet": {
-            row["library"]: round(row["ms_1"] / ours, 2)
-            for row in rows
-            if row["system"] == "MoGlow"
-        },
-    }
-    columns = {
-        "system": "",
-        "library": "library",
-        "megabytes": "recurrent MB",
-        "floor_ms": "floor, ms",
-        "ms_1": "batch 1, ms a pose",
-        "over_floor": "over the floor",
-        "ms_64": "batch 64, ms a pose",
-    }
-    lines = ["| " + " | ".join(columns.values()) + " |", "|---" * len(columns) + "|"]
-    lines += ["| " + " | ".join(str(row[name]) for name in columns) + " |" for row in rows]
-    head = (
-        f"One thread; matrix-vector products read {report['gigabytes_a_second']} GB a second from "
-        "memory."
-    )
-    return report, "\n".join([head, "", *lines])
+    return [*timed, ("DAFNet, these weights", "NumPy", weights, None)]

@@ -56,8 +56,8 @@ def draw(
 
     ``weights``: a file, or None for those that ship. ``others``: files of other systems, by their
     names; without any, figures that compare are left out. ``progress`` is called with the part
-    done, in [0, 1]. ``scale``: 1 makes pictures about 1600 pixels wide. Raises InputError for a
-    figure that there is not, WeightsError for a file that cannot be used.
+    done, in [0, 1]. ``scale``: 1 makes pictures about 1600 pixels wide. Raises InputError for an
+    unknown figure, WeightsError for a file that cannot be used.
     """
     chosen = list(FIGURES) if only is None else list(only)
     for number in chosen:

@@ -86,28 +86,26 @@ def copied(studio: Studio) -> Image.Image:
 def led(studio: Studio) -> Image.Image:
     """Figure 13: head and hands that are led: on a walk to a chair, at a board, at a desk."""
     panels = []
-    pieces, controls, path = carrying(studio.weights)
+    tray_room, tray, path = carrying(studio.weights)
     rest = int(np.argmax(np.linalg.norm(path.position - path.position[-1], axis=1) < 1e-6))
     frames = [*frames_along(path, 10, rest - 30, 0.70), len(path) - 10]
-    for name, told, at, toward, (width, height) in (
-        ("carries something to a chair", (pieces, controls), frames, 118.0, (700, 430)),
+
+    for name, (pieces, controls), at, toward, (width, height) in (
+        ("carries something to a chair", (tray_room, tray), frames, 118.0, (700, 430)),
         ("draws on a whiteboard", drawing(), [100], -40.0, (440, 430)),
         ("sorts things on a desk", sorting(), [60], 60.0, (440, 430)),
     ):
-        motion = make(studio.weights, *told)
+        motion = make(studio.weights, pieces, controls)
         stage = Stage(toward)
-        furnish(stage, told[0])
+        furnish(stage, pieces)
         if len(at) > 3:
             draw_path(stage, path)
 
         put_poses(stage, motion, at, MODE_COLOURS["EE"])
-        draw_targets(stage, motion, told[1], at)
+        draw_targets(stage, motion, controls, at)
         picture = studio.photograph(stage, width, height, margin=0.03)
-        panels.append(
-            studio.captioned(
-                picture, name, f"head and hands {target_error(motion, told[1]):.1f} cm off"
-            )
-        )
+        off = target_error(motion, controls)
+        panels.append(studio.captioned(picture, name, f"head and hands {off:.1f} cm off"))
 
     gap = studio.pixels(GAP)
     out = Image.new("RGB", (sum(p.width for p in panels) + 2 * gap, panels[0].height), "white")

@@ -27,7 +27,7 @@ from ..data.held_out.captured import HeldClip
 from ..model.config import SENSOR_SIZE, ModelConfig
 from ..training import precision
 from ..training.batches import Pool, Statistics, observation_for
-from .samp_features import FIELDS, goals_seen, of_clip, of_windows, parts_of
+from .samp_features import FIELDS, clip_track, goals_seen, states_at, window_tracks
 from .samp_state import (
     LAST,
     NOW,
@@ -36,16 +36,16 @@ from .samp_state import (
     STATE,
     Parts,
     clean_place,
-    following,
     goal_place,
-    inputs_of,
-    led,
+    led_to_goal,
+    network_input,
+    next_input,
     placed_back,
     points_back,
-    read,
+    read_pose,
     seen_from,
     sensor_of,
-    split,
+    split_state,
     state_of,
 )
 
@@ -58,23 +58,31 @@ __all__ = [
     "SampConfig",
     "SampTraining",
     "network_of",
-    "run",
-    "takes",
+    "roll_out_poses",
+    "sample_takes",
 ]
 
 KINDS = ("samp", "samp-a", "samp-ob")
 # of samp-ob: the observation and its mask; then come past poses and velocities
-_TOLD = POSE_SIZE + 22
+_OBSERVED = POSE_SIZE + 22
 _LIKE = ModelConfig(mask=True)
 _PAST = _LIKE.history * POSE_SIZE
 _KL = 0.1
-_FORCED = 0.3  # share of the training until which the truth is fed
-_FREE = 0.6  # share of it from which on what was made is fed
-_LEAST = 2e-3  # smallest deviation of states (metres, metres a second, …)
-_LEAST_SEEN = 0.05  # smallest deviation of voxels
-_MEASURED = 256  # windows whose states are measured for their mean and deviation
-_WIDE = 20.0  # deviations; what is fed back and farther off than that would soon be no number
+"""Weight of z's divergence in the loss."""
+_FORCED = 0.3
+"""Share of the training until which the truth is fed."""
+_FREE = 0.6
+"""Share of it from which on what was made is fed."""
+_LEAST = 2e-3
+"""Smallest deviation of states (metres, metres a second, …)."""
+_LEAST_SEEN = 0.05
+"""Smallest deviation of voxels."""
+_MEASURED = 256
+"""Windows whose states are measured for their mean and deviation."""
+_WIDE = 20.0
+"""Deviations; what is fed back from farther off would soon not be a number."""
 _PHASES = 50
+"""Frames between way points, by which windows may be shifted."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +177,7 @@ class MotionNet(nn.Module):
         return torch.softmax(self.gating(torch.cat([z, before], dim=-1)), dim=-1)
 
     def decode(self, z: Tensor, before: Tensor, sensor: Tensor) -> Tensor:
-        """The next state, given z (N, latent), which every layer is told anew."""
+        """The next state, given z (N, latent), which every layer takes as an input."""
         shares = self.shares(z, before)
         hidden = F.elu(self.first(torch.cat([z, before, self.interaction(sensor)], dim=-1), shares))
         hidden = F.elu(self.second(torch.cat([z, hidden], dim=-1), shares))
@@ -194,7 +202,7 @@ class MotionNet(nn.Module):
 def network_of(kind: str, config: SampConfig) -> MotionNet:
     """A new network of one of ``KINDS``."""
     if kind == "samp-ob":
-        return MotionNet(_TOLD + _LIKE.scene_size, POSE_SIZE, SENSOR_SIZE, config)
+        return MotionNet(_OBSERVED + _LIKE.scene_size, POSE_SIZE, SENSOR_SIZE, config)
     return MotionNet(STATE, STATE, SENSOR, config)
 
 
@@ -212,7 +220,7 @@ class SampTraining:
         pool: Pool,
     ) -> None:
         self.kind, self.statistics, self.device = kind, statistics, torch.device(device)
-        self.config = replace(config, mixed=config.mixed and precision.mixes(str(device)))
+        self.config = replace(config, mixed=config.mixed and precision.is_available(str(device)))
         self.network: MotionNet = network_of(kind, config)
         if kind == "samp-ob":
             _take_statistics(self.network, statistics)
@@ -229,13 +237,13 @@ class SampTraining:
         windows.
         """
         phases = torch.randint(_PHASES, (len(rows),)).numpy()
-        track, at = of_windows(pool.windows(rows, FIELDS), phases)
+        track, at = window_tracks(pool.windows(rows, FIELDS), phases)
         first = int(torch.randint(max(1, len(at) - self.config.frames + 1), ()))
         at = at[first : first + self.config.frames]
-        now, then = parts_of(track, at, at), parts_of(track, at + 1, at)
+        now, then = states_at(track, at, at), states_at(track, at + 1, at)
         aim = now.goal[:, :, NOW]
         after = state_of(then, now.trajectory[:, :, LAST, :4], goal_place(aim))
-        return inputs_of(now), after, sensor_of(track.solid[track.which[:, at]], aim), now.goal
+        return network_input(now), after, sensor_of(track.solid[track.which[:, at]], aim), now.goal
 
     def loss(self, pool: Pool, rows: Tensor, share: float) -> Tensor:
         """Squared error, summed over a state, and 0.1 of z's KL divergence, means over the frames
@@ -251,13 +259,11 @@ class SampTraining:
             before = torch.cat([observation, given, batch.past], dim=-1)[:, frames]
             after = torch.cat([batch.upper, batch.lower], dim=-1)[:, frames]
             sensor = batch.occupancy[:, frames]
-            before = self._lived(
-                before,
-                after,
-                sensor,
-                share,
-                lambda t, last, made: _remembered(before[:, t], last, made),
-            )
+            known = before
+
+            def fed(t: int, last: Tensor, made: Tensor) -> Tensor:
+                return _with_own_past(known[:, t], last, made)
+
         else:
             before, after, sensor, goals = (a.to(self.device) for a in self._states(pool, rows))
             before = (before - net.in_mean) / net.in_std
@@ -265,11 +271,10 @@ class SampTraining:
             sensor = (sensor - net.sensor_mean) / net.sensor_std
 
             def fed(t: int, last: Tensor, made: Tensor) -> Tensor:
-                parts, _ = split(made * net.out_std + net.out_mean)
-                return (inputs_of(following(parts, goals[:, t])) - net.in_mean) / net.in_std
+                parts, _ = split_state(made * net.out_std + net.out_mean)
+                return (network_input(next_input(parts, goals[:, t])) - net.in_mean) / net.in_std
 
-            before = self._lived(before, after, sensor, share, fed)
-
+        before = self._scheduled(before, after, sensor, share, fed)
         before, after, sensor = (a.flatten(0, 1) for a in (before, after, sensor))
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.config.mixed):
             made, mean, log_variance = (a.float() for a in net(before, after, sensor))
@@ -278,7 +283,7 @@ class SampTraining:
         return (made - after).square().sum(-1).mean() + _KL * kl
 
     @torch.no_grad()
-    def _lived(
+    def _scheduled(
         self,
         before: Tensor,
         after: Tensor,
@@ -286,8 +291,8 @@ class SampTraining:
         share: float,
         fed: Callable[[int, Tensor, Tensor], Tensor],
     ) -> Tensor:
-        """``before`` (B, F, …), in which ever more frames are what the network itself makes of the
-        frames before.
+        """Scheduled sampling: ``before`` (B, F, …), in which ever more frames are what the network
+        itself makes of the frames before.
 
         ``fed``: a frame's number, what was fed before it and what was made of that, to what is fed.
         """
@@ -307,61 +312,58 @@ def _take_statistics(network: MotionNet, statistics: Statistics) -> None:
     """What standardises samp-ob's input and pose: the flow's own means and deviations."""
     for name, constant in (("mean", 0.0), ("std", 1.0)):
         pose, velocity = (getattr(statistics, f"{what}_{name}") for what in ("pose", "velocity"))
-        told = np.concatenate(
-            [
-                pose,
-                np.full(22, constant),
-                *[pose] * _LIKE.history,
-                *[velocity] * (_LIKE.history + 1),
-            ]
-        )
-        getattr(network, f"in_{name}").copy_(torch.from_numpy(told))
+        past = [pose] * _LIKE.history + [velocity] * (_LIKE.history + 1)
+        inputs = np.concatenate([pose, np.full(22, constant), *past])
+        getattr(network, f"in_{name}").copy_(torch.from_numpy(inputs))
         getattr(network, f"out_{name}").copy_(torch.from_numpy(pose))
 
 
-def _remembered(told: Tensor, last: Tensor, made: Tensor) -> Tensor:
-    """What samp-ob is fed (B, 781): what it is ``told`` but for past poses, which are its ``last``
+def _with_own_past(known: Tensor, last: Tensor, made: Tensor) -> Tensor:
+    """What samp-ob is fed (B, 781): what is ``known`` but for past poses, which are its ``last``
     ones and the one made.
     """
-    poses = torch.cat([last[:, _TOLD + POSE_SIZE : _TOLD + _PAST], made], dim=-1)
-    return torch.cat([told[:, :_TOLD], poses, told[:, _TOLD + _PAST :]], dim=-1)
+    poses = torch.cat([last[:, _OBSERVED + POSE_SIZE : _OBSERVED + _PAST], made], dim=-1)
+    return torch.cat([known[:, :_OBSERVED], poses, known[:, _OBSERVED + _PAST :]], dim=-1)
 
 
 @torch.no_grad()
-def _walked(
+def _roll_out(
     network: MotionNet, clip: HeldClip, path: RootPath, noise: Tensor, own_root: bool
 ) -> np.ndarray:
     """World joints (S, T, 22, 3) that follow from a clip's first pose, of ``noise`` (S, T, latent).
 
-    With its ``own_root``, the character goes where its trajectory leads, and is told the clip's
+    With its ``own_root``, the character goes where its trajectory leads, and is given the clip's
     goals one after another; else root, trajectory, contacts and goals are the clip's along
     ``path``, and its own pose alone is fed back.
     """
-    one, at = of_clip(clip, path)
+    one, at = clip_track(clip, path)
     track = one.repeated(len(noise))
-    truth, start = parts_of(track, at, at), int(at[0])
+    truth, start = states_at(track, at, at), int(at[0])
+
     parts = Parts(truth.pose[:, 0], truth.trajectory[:, 0], truth.contacts[:, 0], truth.goal[:, 0])
     past = [torch.cat([track.root[:, f], track.action[:, f]], dim=-1) for f in range(start + 1)]
     root = track.root[:, start]
     joints = [points_back(parts.pose[..., :3], root[:, None])]
+
     for t, frame in enumerate(at[1:].tolist(), 1):
         seen = sensor_of(track.solid[track.which[:, frame - 1]], parts.goal[:, NOW])
-        told = (inputs_of(parts) - network.in_mean) / network.in_std
-        state = network.decode(
-            noise[:, t], told, (seen - network.sensor_mean) / network.sensor_std
-        ).clamp(-_WIDE, _WIDE)
-        made, from_goal = split(state * network.out_std + network.out_mean)
-        made = read(made, parts.pose)
+        sensor = (seen - network.sensor_mean) / network.sensor_std
+        before = (network_input(parts) - network.in_mean) / network.in_std
+        state = network.decode(noise[:, t], before, sensor).clamp(-_WIDE, _WIDE)
+        made, from_goal = split_state(state * network.out_std + network.out_mean)
+        made = read_pose(made, parts.pose)
+
         if own_root:
-            made = led(made, from_goal, parts.goal)
+            made = led_to_goal(made, from_goal, parts.goal)
             root = placed_back(clean_place(made.trajectory[:, NOW, :4]), root)
-            parts = following(made, goals_seen(track, at[t : t + 1], root[:, None])[:, 0])
+            parts = next_input(made, goals_seen(track, at[t : t + 1], root[:, None])[:, 0])
             past.append(torch.cat([root, parts.trajectory[:, NOW, 4:]], dim=-1))
-            before = torch.stack([past[frame + k] for k in OFFSETS[:NOW].tolist()], dim=1)
-            before = torch.cat([seen_from(before[..., :4], root[:, None]), before[..., 4:]], dim=-1)
-            parts = replace(parts, trajectory=torch.cat([before, parts.trajectory[:, NOW:]], dim=1))
+
+            walked = torch.stack([past[frame + k] for k in OFFSETS[:NOW].tolist()], dim=1)
+            walked = torch.cat([seen_from(walked[..., :4], root[:, None]), walked[..., 4:]], dim=-1)
+            parts = replace(parts, trajectory=torch.cat([walked, parts.trajectory[:, NOW:]], dim=1))
         else:
-            pose = following(made, parts.goal, seen_from(track.root[:, frame], root)).pose
+            pose = next_input(made, parts.goal, seen_from(track.root[:, frame], root)).pose
             root = track.root[:, frame]
             parts = Parts(pose, truth.trajectory[:, t], truth.contacts[:, t], truth.goal[:, t])
 
@@ -371,7 +373,7 @@ def _walked(
 
 
 @torch.no_grad()
-def run(network: MotionNet, conditions: Conditions, z: np.ndarray) -> np.ndarray:
+def roll_out_poses(network: MotionNet, conditions: Conditions, z: np.ndarray) -> np.ndarray:
     """Poses (T, B, 66), SMPL order, metres, of samp-ob, each fed back: of ``z`` (B, latent) held,
     or (T, B, latent).
 
@@ -379,51 +381,47 @@ def run(network: MotionNet, conditions: Conditions, z: np.ndarray) -> np.ndarray
     """
     frames = len(conditions)
     noise = torch.from_numpy(np.broadcast_to(z, (frames, *z.shape[-2:])).copy()).float()
+
     given = np.repeat(conditions.given, 3, axis=-1)
     free = np.where(given > 0, conditions.observation, network.out_mean.numpy())
     velocity = velocities_up_to(conditions.velocity, _LIKE.history)
     poses = np.tile(network.out_mean.numpy(), (frames, _LIKE.history))
-    told = torch.from_numpy(
-        np.concatenate([free, conditions.given, poses, velocity], axis=1)
-    ).float()
-    told = (told - network.in_mean) / network.in_std
+    inputs = np.concatenate([free, conditions.given, poses, velocity], axis=1)
+    known = (torch.from_numpy(inputs).float() - network.in_mean) / network.in_std
     seen = torch.from_numpy(conditions.occupancy).float()
-    last = told[0].repeat(noise.shape[1], 1)
+
+    last = known[0].repeat(noise.shape[1], 1)
     out = []
     for t in range(frames):
         made = network.decode(noise[t], last, seen[t].expand(len(last), -1)).clamp(-_WIDE, _WIDE)
         out.append(made * network.out_std + network.out_mean)
-        last = _remembered(told[min(t + 1, frames - 1)].expand(len(last), -1), last, made)
+        last = _with_own_past(known[min(t + 1, frames - 1)].expand(len(last), -1), last, made)
 
     return smpl_order(torch.stack(out).double().numpy())
 
 
-def takes(
+def sample_takes(
     network: MotionNet, clip: HeldClip, shot: Shot, seeds: Sequence[int | None], kind: str
 ) -> np.ndarray:
     """Takes (S, T, 22, 3) of a clip, world joints on constant bones, one for each seed; None is z =
     0, its mean.
 
-    As in SAMP, z is drawn anew for each frame. ``shot`` is what DAFNet is told of the clip.
+    As in SAMP, z is drawn anew for each frame. ``shot`` is what DAFNet is given of the clip.
     """
     frames = len(shot.conditions)
     noise = np.zeros((len(seeds), frames, network.config.latent))
     for s, seed in enumerate(seeds):
         if seed is not None:
-            noise[s] = np.random.default_rng([abs(seed), int(seed < 0)]).standard_normal(
-                noise[s].shape
-            )
+            rng = np.random.default_rng([abs(seed), int(seed < 0)])
+            noise[s] = rng.standard_normal(noise[s].shape)
 
     if kind == "samp-ob":
-        poses = run(network, shot.conditions, noise.swapaxes(0, 1))
+        poses = roll_out_poses(network, shot.conditions, noise.swapaxes(0, 1))
         joints = [
             to_world(shot.path, poses[PREROLL:, s].reshape(-1, 22, 3)) for s in range(len(seeds))
         ]
     else:
-        joints = list(
-            _walked(
-                network, clip, shot.path, torch.from_numpy(noise).float(), own_root=kind == "samp"
-            )
-        )
+        drawn = torch.from_numpy(noise).float()
+        joints = list(_roll_out(network, clip, shot.path, drawn, own_root=kind == "samp"))
 
     return np.stack([on_bones(take) for take in joints])

@@ -1,8 +1,9 @@
-"""What SAMP is told of motions: their tracks, with contacts, actions and goals, from training
+"""What SAMP is given of motions: their tracks, with contacts, actions and goals, from training
 windows and held-out clips.
 
-The states of a track are made by ``parts_of``; see ``samp_state``. Our data have no labels: actions
-follow from the root's speed and the pelvis' height, goals from where the pelvis comes to rest.
+The states of a track are made by ``states_at``; see ``samp_state``. Our data have no labels:
+actions follow from the root's speed and the pelvis' height, goals from where the pelvis comes to
+rest.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,21 +24,28 @@ from ..data.held_out.captured import HeldClip
 from ..data.motion.contacts import CONTACTS, contacts
 from .samp_state import ACTIONS, CELL, OFFSETS, VOXELS, Parts, pose_seen, seen_from
 
-__all__ = ["FIELDS", "Track", "goals_seen", "of_clip", "of_windows", "parts_of"]
+__all__ = ["FIELDS", "Track", "goals_seen", "clip_track", "window_tracks", "states_at"]
 
 FIELDS = ("poses", "velocity", "ahead", "root", "boxes")
 """What is needed of training windows."""
 
 _SECOND = round(MODEL_FPS)
-# frames between two way points, so that a goal is 1 to 2.7 seconds ahead, as in a training window
 _SEGMENT = 50
-_HORIZON = 80  # frames before a rest in which it is the goal
-_SITS_UNDER = 0.80  # metres over the floor, of the pelvis
-_STILL = 0.25  # metres a second of the root
-_SLOW = 0.3  # metres a second of the root, under which it idles
-_FAST = 2.2  # metres a second of the root, above which it runs
-_SEAT = 0.25, 0.78  # heights of tops that one sits on, metres
-_BLEND = 11  # frames over which one action becomes another
+"""Frames between two way points: a goal is 1 to 2.7 seconds ahead, as in a training window."""
+_HORIZON = 80
+"""Frames before a rest in which it is the goal."""
+_SITS_UNDER = 0.80
+"""Metres over the floor, of the pelvis."""
+_STILL = 0.25
+"""Metres a second of the root."""
+_SLOW = 0.3
+"""Metres a second of the root, under which it idles."""
+_FAST = 2.2
+"""Metres a second of the root, above which it runs."""
+_SEAT = 0.25, 0.78
+"""Heights of tops that one sits on, metres."""
+_BLEND = 11
+"""Frames over which one action becomes another."""
 _PELVIS, _NECK, _TOUCHES = joint("pelvis"), joint("neck"), CONTACTS.index("pelvis")
 
 
@@ -71,7 +79,7 @@ class Track:
         return replace(self, **{name: a.expand(count, *a.shape[1:]) for name, a in many.items()})
 
 
-def parts_of(track: Track, at: Tensor, seen: Tensor) -> Parts:
+def states_at(track: Track, at: Tensor, seen: Tensor) -> Parts:
     """The states of frames ``at`` (F,) as the roots of frames ``seen`` (F,) see them, (B, F, …)."""
     frame, k = track.root[:, seen], at - track.first
     pose = torch.cat([track.joints[:, k], track.axes[:, k], track.velocity[:, k]], dim=-1)
@@ -182,11 +190,17 @@ def _track(
     known of all frames (B, N).
     """
     action = _actions(root, low, level)
+
     goals, does, seats, solids = [], [], [], [np.zeros(len(VOXELS))]
     for b in range(len(root)):
         still = touches[b, :, _TOUCHES] > 0
         goal, act, which, found = _goals(
-            root[b], height[b], action[b], still, boxes[b], int(phases[b])
+            root=root[b],
+            height=height[b],
+            action=action[b],
+            still=still,
+            boxes=boxes[b],
+            phase=int(phases[b]),
         )
         seats.append(np.where(which > 0, which + len(solids) - 1, 0))
         goals.append(goal)
@@ -221,7 +235,7 @@ def _posture(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return joints[..., _PELVIS, 2], np.abs(trunk[..., 2]) < 0.5 * np.linalg.norm(trunk, axis=-1)
 
 
-def of_windows(windows: Mapping[str, np.ndarray], phases: np.ndarray) -> tuple[Track, Tensor]:
+def window_tracks(windows: Mapping[str, np.ndarray], phases: np.ndarray) -> tuple[Track, Tensor]:
     """Tracks of B training windows (``data.windows.Window``), and the frames (50,) after which the
     next is known, too.
 
@@ -233,10 +247,12 @@ def of_windows(windows: Mapping[str, np.ndarray], phases: np.ndarray) -> tuple[T
     poses = windows["poses"].reshape(len(root), 80, 22, 3) * POSE_UNIT
     joints = rotate(yaw_matrix(root[:, 1:81, None, 2]), poses)
     joints[..., :2] += root[:, 1:81, None, :2]
+
     height, level = _posture(joints)
     touched = np.stack([contacts(j) for j in joints]).astype(float)
     low = (height < _SITS_UNDER) | (touched[..., _TOUCHES] > 0)
     seat = np.where(low, height - SEAT_TO_PELVIS, 0.0)
+
     # Nobody knows the pose after the last: it sits where a seat is under a root that stays, or goes
     # on sitting.
     top = np.stack(
@@ -254,15 +270,15 @@ def of_windows(windows: Mapping[str, np.ndarray], phases: np.ndarray) -> tuple[T
     level_later = np.repeat(level[:, -1:] & low[:, -1:], _SECOND, axis=1)
     heights = np.where(later, np.where(goes_on, seat[:, -1:], top), 0.0)
     track = _track(
-        root,
-        joints[:, 28:],
-        29,
-        whole(low, later),
-        whole(level, level_later),
-        whole(seat, heights),
-        whole(touched, on),
-        list(windows["boxes"]),
-        phases,
+        root=root,
+        joints=joints[:, 28:],
+        first=29,
+        low=whole(low, later),
+        level=whole(level, level_later),
+        height=whole(seat, heights),
+        touches=whole(touched, on),
+        boxes=list(windows["boxes"]),
+        phases=phases,
     )
     return track, torch.arange(30, 80)
 
@@ -296,7 +312,7 @@ def _seat_under(boxes: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.where(over, seats[:, 2] + seats[:, 5], 0.0).max(1, initial=0.0)
 
 
-def of_clip(clip: HeldClip, path: RootPath) -> tuple[Track, Tensor]:
+def clip_track(clip: HeldClip, path: RootPath) -> tuple[Track, Tensor]:
     """The track (B = 1) of a held-out clip along its root ``path`` (T), and the frames (T,) of its
     poses.
 
@@ -310,6 +326,7 @@ def of_clip(clip: HeldClip, path: RootPath) -> tuple[Track, Tensor]:
         root[-1:] + (root[-1] - root[-1 - one]) * steps[:-1],
     )
     root = np.concatenate([before, root, after])[None]
+
     height, level = _posture(clip.joints)
     touched = contacts(clip.joints).astype(float)
     for rest in clip.rests:
@@ -322,14 +339,14 @@ def of_clip(clip: HeldClip, path: RootPath) -> tuple[Track, Tensor]:
         return np.concatenate([known[:1]] * len(steps) + [known] + [known[-1:]] * _SECOND)[None]
 
     track = _track(
-        root,
-        clip.joints[None],
-        len(steps),
-        whole(low),
-        whole(level),
-        whole(seat),
-        whole(touched),
-        [clip.boxes],
-        np.zeros(1),
+        root=root,
+        joints=clip.joints[None],
+        first=len(steps),
+        low=whole(low),
+        level=whole(level),
+        height=whole(seat),
+        touches=whole(touched),
+        boxes=[clip.boxes],
+        phases=np.zeros(1),
     )
     return track, torch.arange(len(steps), len(steps) + len(path))

@@ -35,18 +35,18 @@ __all__ = [
     "VOXELS",
     "Parts",
     "clean_place",
-    "following",
+    "next_input",
     "goal_place",
-    "inputs_of",
-    "led",
+    "network_input",
+    "led_to_goal",
     "placed_back",
     "points_back",
     "points_seen",
     "pose_seen",
-    "read",
+    "read_pose",
     "seen_from",
     "sensor_of",
-    "split",
+    "split_state",
     "state_of",
 ]
 
@@ -147,12 +147,12 @@ def state_of(parts: Parts, last: Tensor, aim: Tensor) -> Tensor:
     )
 
 
-def inputs_of(parts: Parts) -> Tensor:
+def network_input(parts: Parts) -> Tensor:
     """States (…, 647) as the network is given them: seen from their own future and goal."""
     return state_of(parts, parts.trajectory[..., LAST, :4], goal_place(parts.goal[..., NOW, :]))
 
 
-def split(state: Tensor) -> tuple[Parts, Tensor]:
+def split_state(state: Tensor) -> tuple[Parts, Tensor]:
     """The parts of states (…, 647), and their trajectory seen from the goal (…, 13, 4)."""
     pose, _, trajectory, touches, from_goal, goal = state.split(list(_SIZES), dim=-1)
     parts = Parts(
@@ -182,7 +182,7 @@ def clean_place(place: Tensor) -> Tensor:
     return torch.cat([place[..., :2], F.normalize(place[..., 2:], dim=-1)], dim=-1)
 
 
-def following(made: Parts, goal: Tensor, root: Tensor | None = None) -> Parts:
+def next_input(made: Parts, goal: Tensor, root: Tensor | None = None) -> Parts:
     """The next state as it is fed back: seen from the next ``root`` (B, 4), or from where the made
     trajectory has it, and with the true ``goal`` (B, 13, 11) seen from there.
     """
@@ -205,7 +205,7 @@ def _on_bones(joints: Tensor) -> Tensor:
     return torch.stack(out, dim=-2)
 
 
-def read(made: Parts, last: Tensor) -> Parts:
+def read_pose(made: Parts, last: Tensor) -> Parts:
     """The pose as the authors' program reads it: half its positions, half the ``last`` ones moved
     on by its velocities.
     """
@@ -213,7 +213,7 @@ def read(made: Parts, last: Tensor) -> Parts:
     return replace(made, pose=torch.cat([_on_bones(positions), made.pose[..., 3:]], dim=-1))
 
 
-def led(made: Parts, from_goal: Tensor, goal: Tensor) -> Parts:
+def led_to_goal(made: Parts, from_goal: Tensor, goal: Tensor) -> Parts:
     """The future trajectory led to the ``goal`` (B, 13, 11): near it, and late, the one that was
     made as the goal sees it.
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from ..training.checkpoints import Checkpoint, generators, of_training, write_checkpoint
+from ..training.checkpoints import Checkpoint, generators, training_tensors, write_checkpoint
 from ..training.config import TrainingConfig
 from ..training.steps import clock_of, dataset_pool, descend, mean_loss
 from .samp import KINDS, MotionNet, SampConfig, SampTraining, network_of
@@ -36,6 +36,7 @@ def train_samp(
     torch.manual_seed(training.seed)
     pool = dataset_pool(dataset)
     device = torch.device("cpu")
+
     run = SampTraining(kind, config, pool.statistics(), device, pool)
     optimiser = torch.optim.Adam(run.network.parameters(), lr=training.peak)
     step, seconds = 0, 0.0
@@ -57,7 +58,7 @@ def train_samp(
             mean = mean_loss(losses, kind, step, device)
             drawn = {f"generator.{name}": state for name, state in generators(device).items()}
             state = {"kind": kind, "config": asdict(run.config), "step": step, "seconds": seconds}
-            write_checkpoint(file, {**of_training(run.network, optimiser), **drawn}, state)
+            write_checkpoint(file, {**training_tensors(run.network, optimiser), **drawn}, state)
             progress(training.share(step, seconds), mean)
             losses.clear()
 

@@ -23,11 +23,11 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace, _progress: Progress) -> Result:
     from ..training import ranks
-    from ..training.candidates import cooled
+    from ..training.candidates import cool
 
     device = ranks.device_of(options.device)
     require_writable(options.output / "weights")
-    file = cooled(options.training, options.dataset, options.output, options.minutes, device)
+    file = cool(options.training, options.dataset, options.output, options.minutes, device)
     return {"weights": str(file)}, f"Written to {file}"
 
 

@@ -79,9 +79,9 @@ def _on_held_out_clips(
     """The main test: clips of bodies that training has not seen."""
     from ..core.weights import load_weights
     from ..training.evaluation.contact_sheets import contact_sheets
-    from ..training.evaluation.plots import plot
+    from ..training.evaluation.plots import draw_bars
     from ..training.evaluation.report import report
-    from ..training.evaluation.report_text import text
+    from ..training.evaluation.report_text import report_text
     from ..training.export import annotate
 
     weights = load_weights(options.weights)
@@ -95,12 +95,12 @@ def _on_held_out_clips(
 
     if options.output:
         save_text(options.output / "evaluation.json", json.dumps(found, indent=2))
-        save_text(options.output / "evaluation.md", text(found))
-        plot(found, options.output / "evaluation.png")
+        save_text(options.output / "evaluation.md", report_text(found))
+        draw_bars(found, options.output / "evaluation.png")
     if options.sheets:
         contact_sheets(weights, clips, options.sheets)
 
-    return found, text(found)
+    return found, report_text(found)
 
 
 def _among_real_furniture(options: argparse.Namespace, progress: Progress) -> Result:
@@ -132,9 +132,9 @@ def _among_real_furniture(options: argparse.Namespace, progress: Progress) -> Re
 
 def _samp(options: argparse.Namespace, clips: "list[HeldClip]", progress: Progress) -> Result:
     """A checkpoint of SAMP: only the rows, for each way to run its network."""
-    from ..baselines.samp_evaluate import measured_samp
+    from ..baselines.samp_evaluate import measure_samp
     from ..baselines.train import load_samp
-    from ..training.evaluation.clips import rows, table
+    from ..training.evaluation.clips import rows_by_group, table
 
     if options.save or options.sheets or options.output:
         raise InputError(
@@ -144,7 +144,7 @@ def _samp(options: argparse.Namespace, clips: "list[HeldClip]", progress: Progre
     kind, _ = load_samp(options.weights)
     found = {}
     for each in ("samp", "samp-a") if kind == "samp" else (kind,):
-        found[each] = rows(measured_samp(options.weights, each, clips, progress))
+        found[each] = rows_by_group(measure_samp(options.weights, each, clips, progress))
 
     return found, "\n\n".join(f"## {name}\n\n{table(r)}" for name, r in found.items())
 

@@ -58,7 +58,7 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
     file = options.output / f"{model.system}.safetensors"
     require_writable(file)
     if ranks.rank() == 0:
-        precision.announce(config.mixed, device)
+        precision.warn_if_missing(config.mixed, device)
 
     train(
         options.dataset,

@@ -30,11 +30,11 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
     import torch
 
     from ..data.held_out.real import real_test
-    from ..training.validation import BEST, describe, recorded, validations
+    from ..training.validation import BEST, describe, read_record, validate_steps
 
     torch.set_num_threads(options.processes)
     require_writable(options.training / BEST)
-    for found in validations(
+    for found in validate_steps(
         options.training,
         options.dataset,
         real_test(options.folder, options.furniture, "choose"),
@@ -45,7 +45,7 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
         if options.every is not None:
             complain(describe(found))
 
-    rows = recorded(options.training)
+    rows = read_record(options.training)
     return rows, "\n".join(describe(each) for each in rows)
 
 

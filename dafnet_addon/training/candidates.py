@@ -23,7 +23,7 @@ from .parts import load_run, saved_runs, trained_networks, uncooled_run
 from .steps import dataset_pool
 from .train import train
 
-__all__ = ["cooled", "has_weights", "provenance", "snapshot", "write_weights"]
+__all__ = ["cool", "has_weights", "provenance", "snapshot", "write_weights"]
 
 
 @contextmanager
@@ -108,7 +108,7 @@ def provenance(folder: Path, dataset: Path) -> dict[str, str]:
     }
 
 
-def cooled(
+def cool(
     folder: Path,
     dataset: Path,
     out: Path,
@@ -116,7 +116,7 @@ def cooled(
     device: str = "cpu",
 ) -> Path:
     """Train a copy of a run for ``minutes`` more a part, in which its rate falls from its peak to
-    the last: the weights file in the folder ``out``. A copy that was begun there is gone on with.
+    the last: the weights file in the folder ``out``. A copy that was begun there is resumed.
 
     The copy begins where the run is now; where its own rate has begun to fall, before it did.
     Raises InputError where the run has no weights of the whole flow yet.

@@ -1,4 +1,4 @@
-"""Checkpoints of a training: tensors and JSON, so that a stranger's run is gone on with and nothing
+"""Checkpoints of a training: tensors and JSON, so that a stranger's run can be resumed and nothing
 of it is executed.
 
 A checkpoint is a safetensors file: "network.NAME" and, of each parameter that has been moved, the
@@ -25,21 +25,21 @@ from ..core.text import read_json
 from ..core.weights import read_safetensors, write_safetensors
 
 __all__ = [
-    "HELD",
+    "BEFORE_COOLING",
     "Checkpoint",
     "checkpoint_file",
     "generators",
-    "of_training",
+    "training_tensors",
     "set_generators",
     "slim",
     "slim_run",
-    "typed",
+    "typed_settings",
     "write_checkpoint",
 ]
 
 _FORMAT, _PICKLED = "dafnet-training-1", ".pt"
 _AVERAGED = "averaged."
-HELD = "-held"
+BEFORE_COOLING = "-held"
 """Behind the name of a part: its checkpoint from before its rate fell."""
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
 
@@ -70,7 +70,7 @@ def _refused(path: Path, what: str) -> InputError:
     )
 
 
-def of_training(network: nn.Module, optimiser: torch.optim.Optimizer) -> dict[str, Tensor]:
+def training_tensors(network: nn.Module, optimiser: torch.optim.Optimizer) -> dict[str, Tensor]:
     """The tensors of a network and of its Adam optimiser, by the names that ``Checkpoint.restore``
     knows them by.
     """
@@ -91,8 +91,8 @@ def write_checkpoint(file: Path, tensors: Mapping[str, Tensor], state: Mapping[s
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """What a checkpoint holds, as it stands in the file ``path``: nothing of it is checked yet but
-    that it can be read.
+    """What a checkpoint holds, as the file ``path`` has it: that it can be read is all that is
+    checked yet.
     """
 
     path: Path
@@ -101,9 +101,7 @@ class Checkpoint:
 
     @staticmethod
     def read(path: Path) -> "Checkpoint":
-        """Raises InputError where the file is missing, damaged, or something else than a
-        checkpoint.
-        """
+        """Raises InputError where the file is missing, damaged, or not a checkpoint."""
         if path.suffix == _PICKLED:
             raise _pickled(path)
 
@@ -137,12 +135,12 @@ class Checkpoint:
         another type.
         """
         try:
-            return typed(kind, self.state.get(name))
+            return typed_settings(kind, self.state.get(name))
         except ValueError as error:
             raise self.refused(f"{name}: {error}") from None
 
     def progress(self) -> tuple[int, float]:
-        """Steps and seconds that were trained. Raises InputError where they are no such numbers."""
+        """Steps and seconds that were trained. Raises InputError where they cannot be that."""
         step, seconds = self.state.get("step"), self.state.get("seconds")
         if type(step) is not int or not 0 <= step < 1 << 53:
             raise self.refused("its number of steps")
@@ -151,7 +149,7 @@ class Checkpoint:
         return step, seconds
 
     def text(self, name: str) -> str:
-        """A text of the state. Raises InputError where it is none."""
+        """A text of the state. Raises InputError where it is something else."""
         text = self.state.get(name)
         if not isinstance(text, str):
             raise self.refused(name)
@@ -173,7 +171,7 @@ class Checkpoint:
         return not any(name.startswith(_AVERAGED) for name in self.tensors)
 
     def fits(self, network: nn.Module) -> None:
-        """Raise InputError where the file's network is another than this one, whose tensors may be
+        """Raise InputError where the file's network has other tensors than this one, which may be
         on the device 'meta'.
         """
         for name, like in network.state_dict().items():
@@ -244,7 +242,7 @@ def slim_run(folder: Path, out: Path) -> list[Path]:
     written = []
     for file in sorted(folder.glob("*.checkpoint")):
         # One from before the rate fell is of use where the optimiser is.
-        if not file.stem.endswith(HELD):
+        if not file.stem.endswith(BEFORE_COOLING):
             slim(Checkpoint.read(file), out / file.name)
             written.append(out / file.name)
 
@@ -272,7 +270,7 @@ def set_generators(states: Mapping[str, Tensor], device: torch.device) -> None:
         torch.cuda.set_rng_state(states["cuda"], device)
 
 
-def typed(kind: type[Settings], values: object) -> Settings:
+def typed_settings(kind: type[Settings], values: object) -> Settings:
     """A dataclass of numbers, words and switches from what JSON or TOML gives for its fields; the
     others keep their defaults.
 

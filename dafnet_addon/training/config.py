@@ -8,58 +8,83 @@ from pathlib import Path
 
 from ..core.errors import InputError
 from ..model.config import PAPER, SMALL, ModelConfig
-from .checkpoints import typed
+from .checkpoints import typed_settings
 
 __all__ = ["TrainingConfig", "read_config"]
 
 
 @dataclass(frozen=True)
 class TrainingConfig:
-    """``minutes_predictor``, ``minutes_flow``: time budgets; ``steps_flow``, where not 0, is the
-    flow's instead. Learning rates rise over ``warmup`` steps to ``peak``, stay there, and fall
-    straight to ``final`` over the last ``cool_down`` share of the budget: a run that gets a larger
-    budget goes on from before it cooled. ``noam``: from ``peak`` they fall as one over the root of
-    the steps instead, to ``final``, as in the paper (Vaswani et al. 2017). What a run is worth are
-    its weights averaged over about 1 / (1 - ``average``) steps. ``slot_dropout``: share of past
-    poses hidden from the predictor while it learns, number by number, and from MoGlow.
-    ``environment_dropout``: share of sensor values hidden from all, in a share ``dropout_windows``
-    of the windows (the paper hides them in all; then only whole layers of spheres are told apart,
-    and seats are met to 12 cm).
-    ``ahead_hidden``: share of windows in which the way ahead is hidden, as it is from a live root.
-    ``legs_given``: share in which feet, or the whole lower body, may be given (``batches``).
-    ``clip_norm``: largest gradient norm. ``free_run``: weight of the losses of motion that the flow
-    makes by itself (see ``free_run``; 0 as in the paper), which begins after ``captured`` frames of
-    a window, in a share ``cold`` of the batches after the first, with an empty memory, as a take
-    begins; ``calm`` of the windows make it from z = 0, ``lively`` of them from noise that lasts and
-    comes and goes as it is found along captured motion while the run goes on (see ``noise``: what
-    takes at temperature 1 are drawn from), the others from one vector of N(0, I). ``mixed``: LSTMs
-    and environment encoders compute in bfloat16, where the device can.
+    """How a run is trained. Learning rates rise over ``warmup`` steps to ``peak``, stay there, and
+    fall straight to ``final`` at the end of the budget: a run that gets a larger budget goes on
+    from before its rate fell.
     """
 
     minutes_predictor: float = 5.0
+    """Budget of the predictor."""
     minutes_flow: float = 60.0
+    """Budget of each part of the flow."""
     steps_flow: int = 0
+    """Steps of each part of the flow: its budget, where not 0, in place of minutes."""
+
     batch: int = 50
+    """Windows a step."""
     warmup: int = 150
+    """Steps in which the learning rate rises."""
     peak: float = 2e-3
+    """The highest learning rate."""
     final: float = 1e-4
+    """The last learning rate."""
     cool_down: float = 0.3
+    """The last share of the budget, in which the learning rate falls."""
     noam: bool = False
+    """From ``peak`` on the rate falls as one over the root of the steps instead, to ``final``, as
+    in the paper (Vaswani et al. 2017).
+    """
     average: float = 0.99
-    slot_dropout: float = 0.95
-    environment_dropout: float = 0.5
-    dropout_windows: float = 0.5
-    ahead_hidden: float = 0.0
-    legs_given: float = 0.0
+    """A run's weights are averaged over about 1 / (1 - ``average``) steps."""
     clip_norm: float = 50.0
+    """The largest norm of a gradient."""
+
+    slot_dropout: float = 0.95
+    """Share of past poses hidden from the predictor while it learns, number by number, and from
+    MoGlow.
+    """
+    environment_dropout: float = 0.5
+    """Share of sensor values hidden from all networks."""
+    dropout_windows: float = 0.5
+    """Share of windows in which they are hidden. The paper hides them in all; then only whole
+    layers of spheres can be distinguished, and seats are met to 12 cm.
+    """
+    ahead_hidden: float = 0.0
+    """Share of windows in which the way ahead is hidden, as it is from a live root."""
+    legs_given: float = 0.0
+    """Share of windows in which feet, or the whole lower body, may be given (see ``batches``)."""
+
     free_run: float = 0.0
+    """Weight of the losses of motion that the flow makes by itself (see ``free_run``; 0 as in the
+    paper).
+    """
     captured: int = 20
+    """Frames of a window before its free run begins."""
     cold: float = 0.25
+    """Share of batches whose free runs begin after the first frame, with an empty memory, as takes
+    begin.
+    """
     calm: float = 0.5
+    """Share of windows whose free runs are made from z = 0."""
     lively: float = 0.0
+    """Share of windows whose free runs are made from noise that lasts, and comes and goes, as it is
+    found along captured motion while the run goes on: what takes at temperature 1 are drawn from
+    (see ``noise``). The others are made from one vector of N(0, I).
+    """
+
     mixed: bool = False
+    """LSTMs and environment encoders compute in bfloat16, where the device can."""
     save_every: int = 100
+    """Steps between checkpoints."""
     seed: int = 0
+    """Of the first weights, and of all that is drawn."""
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
@@ -123,7 +148,9 @@ def read_config(file: Path, changes: Sequence[str] = ()) -> tuple[ModelConfig, T
         for name, value in tomllib.loads("\n".join(changes)).items():
             (given if name in sizes else training)[name] = value
 
-        return typed(ModelConfig, {**presets[preset], **given}), typed(TrainingConfig, training)
+        return typed_settings(ModelConfig, {**presets[preset], **given}), typed_settings(
+            TrainingConfig, training
+        )
     except ValueError as error:
         raise InputError(
             f"The configuration '{file}' cannot be used ({error}); change it there."

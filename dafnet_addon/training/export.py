@@ -45,10 +45,8 @@ def tensors_of(
             out[f"{part_name}.encoders.{name}"] = tensor.numpy()
         for k, (norm, linear, coupling) in enumerate(part.steps()):
             prefix = f"{part_name}.{k}"
-            out[f"{prefix}.bias"], out[f"{prefix}.log_scale"] = (
-                norm.bias.detach().numpy(),
-                norm.log_scale.detach().numpy(),
-            )
+            out[f"{prefix}.bias"] = norm.bias.detach().numpy()
+            out[f"{prefix}.log_scale"] = norm.log_scale.detach().numpy()
             out[f"{prefix}.weight"] = linear.weight().detach().numpy()
             for name, tensor in coupling.state_dict().items():
                 out[f"{prefix}.{name}"] = tensor.numpy()
@@ -56,7 +54,7 @@ def tensors_of(
     return out
 
 
-def _grown(weights: Weights, name: str, array: np.ndarray, target: torch.Tensor) -> None:
+def _copy_into_wider(weights: Weights, name: str, array: np.ndarray, target: torch.Tensor) -> None:
     """Give ``target`` what ``array`` holds, a matrix or vector of a narrower network of the same
     kind.
 
@@ -87,7 +85,7 @@ def adopt_predictor(predictor: ActionPredictor, weights: Weights) -> None:
     where they do not fit.
     """
     for name, target in predictor.state_dict().items():
-        _grown(weights, name, weights.require(f"predictor.{name}"), target)
+        _copy_into_wider(weights, name, weights.require(f"predictor.{name}"), target)
 
 
 @torch.no_grad()
@@ -95,44 +93,41 @@ def adopt_part(part: PartFlow, name: str, weights: Weights, config: ModelConfig)
     """Give the flow's part ``name`` what a weights file of the same or smaller sizes holds. Raises
     WeightsError where they do not fit.
 
-    A file that was not told of the root's way ahead, or of whether that is known, serves a model
-    that is: what weighs it starts at zero.
+    Weights without inputs for the root's way ahead, or for whether that is known, serve a model
+    that has them: these start at zero.
     """
     for key, target in part.encoders.state_dict().items():
-        _grown(weights, key, weights.require(f"{name}.encoders.{key}"), target)
+        _copy_into_wider(weights, key, weights.require(f"{name}.encoders.{key}"), target)
 
     model = weights.config["model"]
-    told = int(model.get("ahead", 0)) + bool(model.get("ahead_mask", False))
+    given = int(model.get("ahead", 0)) + bool(model.get("ahead_mask", False))
     wanted = config.ahead + config.ahead_mask
-    if told not in (0, config.ahead, wanted):
+    if given not in (0, config.ahead, wanted):
         raise WeightsError(
-            f"The weights '{weights.path}' are told of the root's way in another manner; choose "
+            f"The weights '{weights.path}' read the root's way ahead in another form; choose "
             "another file."
         )
 
     for k, (norm, linear, coupling) in enumerate(part.steps()):
         prefix = f"{name}.{k}"
         for key, target in (("bias", norm.bias), ("log_scale", norm.log_scale)):
-            target.copy_(
-                torch.from_numpy(np.array(weights.require(f"{prefix}.{key}", tuple(target.shape))))
-            )
+            array = weights.require(f"{prefix}.{key}", tuple(target.shape))
+            target.copy_(torch.from_numpy(np.array(array)))
 
-        linear.adopt(
-            torch.from_numpy(
-                np.array(weights.require(f"{prefix}.weight", tuple(linear.weight().shape)))
-            )
-        )
+        array = weights.require(f"{prefix}.weight", tuple(linear.weight().shape))
+        linear.adopt(torch.from_numpy(np.array(array)))
+
         for key, target in coupling.state_dict().items():
             array = weights.require(f"{prefix}.{key}")
-            if key == "lstm.weight_ih_l0" and told < wanted:
+            if key == "lstm.weight_ih_l0" and given < wanted:
                 way = coupling.passes + config.actions + VELOCITY_SIZE
-                array = np.insert(array, [way + told] * (wanted - told), 0.0, axis=1)
-            _grown(weights, f"{prefix}.{key}", array, target)
+                array = np.insert(array, [way + given] * (wanted - given), 0.0, axis=1)
+            _copy_into_wider(weights, f"{prefix}.{key}", array, target)
 
 
 def adopted_statistics(weights: Weights, found: Statistics) -> Statistics:
-    """What a weights file standardises with; of the way ahead, where it is not told of it, what was
-    ``found``.
+    """What a weights file standardises with; what was ``found`` where it has nothing, as older
+    files have not for the way ahead.
     """
     return Statistics(
         **{name: weights.tensors.get(name, value) for name, value in asdict(found).items()}
@@ -163,6 +158,7 @@ def export(
         "offsets": OFFSETS.tolist(),
         "noise_metres": NOISE,
     }
+
     tensors = {}
     for name, array in tensors_of(flow, predictor, statistics).items():
         inverted = (
@@ -175,11 +171,9 @@ def export(
         else:
             tensors[name], tensors[f"{name}.scale"] = quantised(array)
 
-    tensors |= noise or {}
+    metadata = {"format": FORMAT, "config": json.dumps(description), **words}
     with whole_file(file) as part:
-        write_safetensors(
-            part, tensors, {"format": FORMAT, "config": json.dumps(description), **words}
-        )
+        write_safetensors(part, tensors | dict(noise or {}), metadata)
 
 
 def annotate(file: Path, words: Mapping[str, str]) -> None:

@@ -15,7 +15,7 @@ from ..core.series import MODEL_FPS
 from ..core.skeleton import LOWER, LOWER_SIZE, OFFSETS, PARENTS, TOE_HEIGHT, UPPER, UPPER_SIZE
 from .batches import Statistics
 
-__all__ = ["free_run_loss", "lower_loss", "sliding", "upper_loss"]
+__all__ = ["free_run_loss", "lower_loss", "sliding_speed", "upper_loss"]
 
 # nats for each metre
 _POSE = 100.0
@@ -59,7 +59,7 @@ def _bone_error(joints: Tensor, bones: tuple[list[int], list[int], list[float]])
     return (made - torch.tensor(lengths, device=made.device)).abs().mean()
 
 
-def _followed(made: Tensor, true: Tensor, calm: Tensor) -> Tensor:
+def _tracking_error(made: Tensor, true: Tensor, calm: Tensor) -> Tensor:
     """How far calm motion (B, T, J, 3) is from the captured one, in place and in speed."""
     share = calm.float().mean().clamp_min(1e-6)
     place = (made - true).norm(dim=-1).mean((1, 2))
@@ -83,7 +83,7 @@ def free_run_loss(
 
     ``calm`` (B,): whether z = 0; ``given`` (B, T, 22): which joints the observation gives;
     ``pelvis`` (B, T, 3): the captured one; all standardised as poses are. ``step`` (B, T, 3): see
-    ``sliding``.
+    ``sliding_speed``.
     """
     mean, std = (
         torch.as_tensor(values, dtype=made.dtype, device=made.device)
@@ -121,14 +121,14 @@ def upper_loss(made: Tensor, true: Tensor, calm: Tensor, given: Tensor) -> Tenso
     """
     height = (made[..., 0, 2] - true[..., 0, 2]).abs().mean()
     return (
-        _followed(made, true, calm)
+        _tracking_error(made, true, calm)
         + _GIVEN * _missed(made, true, given)
         + _HEIGHT * height
         + _BONE * _bone_error(made, _UPPER_BONES)
     )
 
 
-def sliding(feet: Tensor, step: Tensor) -> Tensor:
+def sliding_speed(feet: Tensor, step: Tensor) -> Tensor:
     """Horizontal speed over the floor (B, T − 1, J), metres a second, of points (B, T, J, 3) in the
     root's frames.
 
@@ -157,12 +157,12 @@ def lower_loss(
     Calm feet stay where the captured ones do; others where they themselves are low.
     """
     bones = _bone_error(torch.cat([pelvis[:, :, None], made], dim=2), _LOWER_BONES)
-    still = sliding(true[:, :, _FEET], step) < _PLANTED
+    still = sliding_speed(true[:, :, _FEET], step) < _PLANTED
     planted = still & (true[:, 1:, _TOES, 2] < TOE_HEIGHT + _LOW)
     height = (made[:, 1:, _TOES, 2].detach() - TOE_HEIGHT).clamp_min(0.0)
     low = (2.0 - 2.0 ** (height / _FADE)).clamp_min(0.0)
 
     weight = torch.where(calm[:, None, None], planted.float(), low)
-    slid = (sliding(made[:, :, _FEET], step) * weight).sum() / weight.sum().clamp_min(1.0)
+    slid = (sliding_speed(made[:, :, _FEET], step) * weight).sum() / weight.sum().clamp_min(1.0)
     missed = _GIVEN * _missed(made, true, given)
-    return _followed(made, true, calm) + _BONE * bones + _SLIDE * slid + missed
+    return _tracking_error(made, true, calm) + _BONE * bones + _SLIDE * slid + missed

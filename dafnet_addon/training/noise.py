@@ -31,9 +31,10 @@ _SETTLED = 20
 _AT_ONCE = 50
 """Windows."""
 _DAMPED_OVER = 400
-"""Windows."""
+"""Windows whose speed is compared with what the noise makes."""
 _SMOOTH = np.array([0.25, 0.5, 0.25])
-_HAIR = 1e-6
+"""Weights by which shares of neighbouring frequencies are averaged."""
+_JITTER = 1e-6
 """Of variance, for what a few windows leave out of the space."""
 
 
@@ -78,12 +79,12 @@ def noise_along(
     """Noise of each of these parts (None: all) of the flow (B, T, …) along captured windows in FREE
     mode, each beside the captured parts before it.
     """
-    told = _told(predictor, batch)
+    base = _base(predictor, batch)
     pose = torch.cat([batch.upper, batch.lower], dim=-1)
     found = {}
     for name, part in flow.parts().items():
         if parts is None or name in parts:
-            condition = _condition(flow, name, told, pose)
+            condition = _condition(flow, name, base, pose)
             found[name] = part(pose[..., flow.partition[name]], condition, batch.occupancy)[0]
 
     return found
@@ -115,8 +116,8 @@ def take_noise(
         noise = np.concatenate(noises)
         mean = noise.mean(axis=1)
         passing = noise - mean[:, None]
-        tensors[f"{part}.spread"] = _root(mean)
-        tensors[f"{part}.passing"] = _root(passing.reshape(-1, passing.shape[-1]))
+        tensors[f"{part}.spread"] = _cholesky(mean)
+        tensors[f"{part}.passing"] = _cholesky(passing.reshape(-1, passing.shape[-1]))
         tensors[f"{part}.taps"] = _filters(passing)
 
     batches = (
@@ -196,7 +197,7 @@ def _powers(
     noise that lasts, and of all of it. The second part sees what was made of the first, as in a
     take.
     """
-    told = _told(predictor, batch)
+    base = _base(predictor, batch)
     captured = torch.cat([batch.upper, batch.lower], dim=-1)
     lasting, passing = captured.clone(), captured.clone()
     powers = {}
@@ -207,7 +208,7 @@ def _powers(
         columns = flow.partition[name]
         held, comes = noise[name].draw_apart(len(captured), captured.shape[1] - _SETTLED)
         for poses, z in ((lasting, held.expand_as(comes)), (passing, held + comes)):
-            condition = _condition(flow, name, told, poses)
+            condition = _condition(flow, name, base, poses)
             poses[:, _SETTLED:, columns] = part.free_run(
                 captured[..., columns], condition, batch.occupancy, z, _SETTLED
             )[1]
@@ -223,17 +224,17 @@ def _powers(
     return powers
 
 
-def _told(predictor: ActionPredictor | None, batch: Batch) -> Tensor:
-    """What every part is told of captured windows (B, T, …), beside what it sees of the body."""
+def _base(predictor: ActionPredictor | None, batch: Batch) -> Tensor:
+    """The first part of every condition along captured windows (B, T, …), as training has it."""
     if predictor is None:
         return batch.past
     return torch.cat([predictor(batch.past, batch.occupancy), batch.root], dim=-1)
 
 
 def _condition(flow: BodyFlow, part: str, told: Tensor, pose: Tensor) -> Tensor:
-    """What a part's flow is told (B, T, …) in FREE mode, beside ``pose`` (B, T, 66)."""
+    """The condition of a part's flow (B, T, …) in FREE mode, beside ``pose`` (B, T, 66)."""
     nothing = torch.zeros_like(pose)
-    return flow.condition(part, told, nothing, nothing[..., :22], pose)
+    return flow.condition(part, base, nothing, nothing[..., :22], pose)
 
 
 def _speed_spectrum(poses: np.ndarray) -> np.ndarray:
@@ -248,10 +249,10 @@ def _damped(taps: np.ndarray, kept: np.ndarray) -> np.ndarray:
     return np.fft.irfft(np.fft.rfft(taps, axis=1) * kept, TAPS, axis=1)
 
 
-def _root(values: np.ndarray) -> np.ndarray:
+def _cholesky(values: np.ndarray) -> np.ndarray:
     """Lower triangular L (n, n), of which L e, with e from N(0, I), varies as values (N, n) do."""
     moment = values.T @ values / len(values)
-    return np.linalg.cholesky(moment + _HAIR * np.eye(len(moment)))
+    return np.linalg.cholesky(moment + _JITTER * np.eye(len(moment)))
 
 
 def _filters(passing: np.ndarray) -> np.ndarray:

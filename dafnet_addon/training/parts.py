@@ -18,7 +18,7 @@ from ..model.flow import BodyFlow, Coupling, EnvironmentEncoder
 from ..model.predictor import GMVAE, ActionPredictor, gumbel_temperature
 from ..model.systems import system_named
 from .batches import Batch, Pool, Statistics, observation_for
-from .checkpoints import HELD, Checkpoint, checkpoint_file
+from .checkpoints import BEFORE_COOLING, Checkpoint, checkpoint_file
 from .config import TrainingConfig
 from .export import adopt_part, adopt_predictor
 from .free_run import free_run_loss
@@ -45,7 +45,7 @@ _NOISE = "noise"
 _MEASURED_EVERY = 1000
 """Steps after which that noise is measured anew."""
 _MEASURED_WINDOWS = 500
-"""Windows that it is measured along: less than a hundredth of the time that those steps take."""
+"""Windows that it is measured along, which takes about a hundredth of the time of those steps."""
 _STRIDE = 5
 """Frames between two that the predictor learns from: neighbours say nearly the same, and it has no
 memory.
@@ -269,7 +269,7 @@ def resumed_run(part: str, folder: Path, config: TrainingConfig, device: str = "
     """The saved run with these settings; where its budget has grown since its rate fell, as it was
     before that.
     """
-    name = f"{part}{HELD}"
+    name = f"{part}{BEFORE_COOLING}"
     if checkpoint_file(folder, name).exists():
         run = load_run(part, folder, config, device, name)
         # A share of the old budget in which the rate fell is less of a new one.
@@ -281,7 +281,7 @@ def resumed_run(part: str, folder: Path, config: TrainingConfig, device: str = "
 
 def uncooled_run(part: str, folder: Path) -> Run:
     """The saved run as it is; where its rate has begun to fall, as it was before that."""
-    run, name = load_run(part, folder), f"{part}{HELD}"
+    run, name = load_run(part, folder), f"{part}{BEFORE_COOLING}"
     if run.is_cooling and checkpoint_file(folder, name).exists():
         return load_run(part, folder, name=name)
     return run

@@ -8,11 +8,11 @@ from functools import cache
 import torch
 from torch import nn
 
-__all__ = ["announce", "mixes"]
+__all__ = ["warn_if_missing", "is_available"]
 
 
 @cache
-def mixes(device: str) -> bool:
+def is_available(device: str) -> bool:
     """Whether LSTMs compute in bfloat16 on a device, there and back: one of two layers is run once,
     on a few numbers.
 
@@ -34,11 +34,11 @@ def mixes(device: str) -> bool:
     return all(bool(p.grad.isfinite().all()) for p in lstm.parameters() if p.grad is not None)
 
 
-def announce(mixed: bool, device: str = "cpu") -> None:
+def warn_if_missing(mixed: bool, device: str = "cpu") -> None:
     """Tell the user, in one line on standard error, where the mixed precision that was asked for is
     not to be had.
     """
-    if mixed and not mixes(device):
+    if mixed and not is_available(device):
         print(
             "This device has no LSTM in bfloat16: it trains in single precision, in more time a "
             "step.",

@@ -7,19 +7,19 @@ from typing import Any
 
 from ..core.threads import cores
 
-__all__ = ["spread_out"]
+__all__ = ["map_in_processes"]
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     pass
 
 
-def spread_out(
+def map_in_processes(
     task: Callable[[Any], Any],
     items: Sequence[Any],
     processes: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
-    start: Callable[[], None] = _nothing,
+    start: Callable[[], None] = _do_nothing,
 ) -> Iterator[Any]:
     """``task`` of each item, in order, in ``processes`` (None: one for each core), each of which
     first calls ``start``.

@@ -10,10 +10,10 @@ from torch import Tensor, nn
 
 from ..core.errors import InputError
 
-__all__ = ["joined", "rank", "device_of", "average", "mean", "from_first"]
+__all__ = ["is_distributed", "rank", "device_of", "average", "mean", "broadcast_parameters"]
 
 
-def joined() -> bool:
+def is_distributed() -> bool:
     """Whether ``torchrun`` started this process with others; joins them at the first call."""
     if int(os.environ.get("WORLD_SIZE", "1")) < 2:
         return False
@@ -25,7 +25,7 @@ def joined() -> bool:
 
 def rank() -> int:
     """This process's number; 0 where it is alone."""
-    return dist.get_rank() if joined() else 0
+    return dist.get_rank() if is_distributed() else 0
 
 
 def device_of(device: str) -> str:
@@ -34,7 +34,7 @@ def device_of(device: str) -> str:
 
     Raises InputError where it is not there.
     """
-    device = f"cuda:{os.environ['LOCAL_RANK']}" if device == "cuda" and joined() else device
+    device = f"cuda:{os.environ['LOCAL_RANK']}" if device == "cuda" and is_distributed() else device
     try:
         torch.zeros(1, device=device)
     except (RuntimeError, AssertionError) as error:  # torch asserts that it was built for a device
@@ -48,7 +48,7 @@ def device_of(device: str) -> str:
 
 def average(values: list[Tensor]) -> None:
     """Replace tensors by their means over all ranks."""
-    if joined():
+    if is_distributed():
         for value in values:
             dist.all_reduce(value)
             value /= dist.get_world_size()
@@ -56,17 +56,17 @@ def average(values: list[Tensor]) -> None:
 
 def mean(value: float, device: torch.device) -> float:
     """The mean of a number over all ranks."""
-    if not joined():
+    if not is_distributed():
         return value
     shared = torch.tensor(value, device=device)
     average([shared])
     return float(shared)
 
 
-def from_first(network: nn.Module) -> None:
+def broadcast_parameters(network: nn.Module) -> None:
     """Give every rank rank 0's parameters: the first batch, which sets activation norms, is another
     one on each.
     """
-    if joined():
+    if is_distributed():
         for parameter in network.parameters():
             dist.broadcast(parameter.data, 0)

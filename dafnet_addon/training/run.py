@@ -17,8 +17,8 @@ from .checkpoints import (
     Checkpoint,
     checkpoint_file,
     generators,
-    of_training,
     set_generators,
+    training_tensors,
     write_checkpoint,
 )
 from .config import TrainingConfig
@@ -47,7 +47,7 @@ class Run(ABC):
     def __init__(self, part: str, network: nn.Module, setup: Setup) -> None:
         self.part, self.folder, self.model = part, setup.folder, setup.model
         self.statistics, self.device = setup.statistics, setup.device
-        mixed = setup.config.mixed and precision.mixes(str(setup.device))
+        mixed = setup.config.mixed and precision.is_available(str(setup.device))
         self.config = replace(setup.config, mixed=mixed)
 
         self.network = network.to(self.device)
@@ -139,7 +139,7 @@ class Run(ABC):
             for name, value in asdict(self.statistics).items()
         }
         tensors = {
-            **of_training(self.network, self.optimiser),
+            **training_tensors(self.network, self.optimiser),
             **self._own_tensors(),
             **{f"averaged.{name}": value for name, value in self.averaged.items()},
             **{f"generator.{name}": state for name, state in generators(self.device).items()},

@@ -61,7 +61,7 @@ def descend(
     optimiser.zero_grad()
     loss.backward()
     if step == 0:
-        ranks.from_first(network)
+        ranks.broadcast_parameters(network)
 
     ranks.average([p.grad for p in network.parameters() if p.grad is not None])
     nn.utils.clip_grad_norm_(network.parameters(), config.clip_norm)

@@ -26,7 +26,7 @@ from ..model.config import ModelConfig
 from ..model.systems import system_named
 from . import ranks
 from .batches import Pool
-from .checkpoints import HELD, checkpoint_file
+from .checkpoints import BEFORE_COOLING, checkpoint_file
 from .config import TrainingConfig
 from .export import adopted_statistics
 from .parts import FlowRun, PredictorRun, load_run, new_run, resumed_run
@@ -69,7 +69,7 @@ def train(
         )
 
     parts = tuple(system_named(model.system).partition)
-    if ranks.joined():
+    if ranks.is_distributed():
         for part in parts:
             train_part(part, dataset, folder, model, config, device=device, begin_with=begin_with)
         return
@@ -193,7 +193,7 @@ def _spend_budget(
 
         run.seconds = ranks.mean(run.seconds + clock() - begin, run.device)
         if run.is_cooling and not was_cooling and leads:
-            run.save(f"{run.part}{HELD}")
+            run.save(f"{run.part}{BEFORE_COOLING}")
 
         if saves or run.share >= 1.0:
             loss = mean_loss(recent, run.part, run.step, run.device)

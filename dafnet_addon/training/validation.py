@@ -25,10 +25,11 @@ from ..core.text import read_json
 from ..core.weights import Weights, load_weights
 from ..data.held_out.captured import HeldClip
 from .candidates import has_weights, snapshot, write_weights
-from .evaluation.clips import Measured, measured, row
-from .evaluation.plots import curves
+from .evaluation.clips import MeasuredClip, grouped, measure_clips, pooled_row
+from .evaluation.plots import draw_curves
 from .export import annotate
 from .parts import FlowRun, PredictorRun, saved_runs
+from .run import Run
 from .steps import held_out_pool
 
 __all__ = [
@@ -36,10 +37,10 @@ __all__ = [
     "CURVES",
     "RECORD",
     "describe",
-    "likelihoods",
-    "recorded",
+    "held_out_losses",
+    "read_record",
     "score",
-    "validations",
+    "validate_steps",
 ]
 
 RECORD, BEST, CURVES = "validation.jsonl", "best.safetensors", "validation.png"
@@ -72,7 +73,7 @@ _GROUPS: dict[str, Callable[[HeldClip], str]] = {
 _HELD_WINDOWS = 200
 
 
-def score(clips: Sequence[Measured]) -> float:
+def score(clips: Sequence[MeasuredClip]) -> float:
     """Centimetres by which calm takes are off, the less the better: the pelvis over its seats in
     FREE, the mean over makers, so that one counts as much as another; head and hands from their
     targets in EE; and what feet skate in a second in FREE, over what captured ones do.
@@ -83,14 +84,15 @@ def score(clips: Sequence[Measured]) -> float:
 
     seats = 100.0 * float(np.mean([np.mean(errors) for errors in makers.values() if errors]))
     free, ee, truth = (
-        row([each.runs[run] for each in clips]) for run in ("free_t0", "ee_t0", "ground_truth")
+        pooled_row([each.runs[run] for each in clips])
+        for run in ("free_t0", "ee_t0", "ground_truth")
     )
     targets = 100.0 * STATURE * ee["end_effector_error"]
     skates = 30.0 * max(0.0, free["skate_cm"] - truth["skate_cm"])
     return round(seats + targets + skates, 3)
 
 
-def likelihoods(folder: Path, dataset: Path) -> dict[str, float]:
+def held_out_losses(folder: Path, dataset: Path) -> dict[str, float]:
     """Negative log-likelihood a frame of held-out windows for each part of a run's flow, its
     weights averaged: nats, in standardised units, with the same draws each time.
     """
@@ -110,7 +112,7 @@ def likelihoods(folder: Path, dataset: Path) -> dict[str, float]:
     return found
 
 
-def recorded(folder: Path) -> list[dict[str, Any]]:
+def read_record(folder: Path) -> list[dict[str, Any]]:
     """The rows of a run's validation so far. Raises InputError where its file is damaged."""
     file = folder / RECORD
     if not file.exists():
@@ -124,7 +126,7 @@ def recorded(folder: Path) -> list[dict[str, Any]]:
         ) from None
 
 
-def validations(
+def validate_steps(
     folder: Path,
     dataset: Path,
     clips: Sequence[HeldClip],
@@ -143,7 +145,7 @@ def validations(
     seats = [clip for clip in clips if clip.room != "bed"]
 
     def measure(weights: Weights) -> dict[str, Any]:
-        found = measured(
+        found = measure_clips(
             weights,
             seats,
             progress,
@@ -154,7 +156,7 @@ def validations(
         )
         return {"score": score(found), **_figures(found)}
 
-    rows = recorded(folder)
+    rows = read_record(folder)
     spent = False
     while not spent:
         begin = time.monotonic()
@@ -162,31 +164,33 @@ def validations(
             with snapshot(folder) as copy:
                 if not any(each["weights"] == SHIPPED for each in rows):
                     rows.append({"weights": SHIPPED, **measure(load_weights(None))})
-                    _record(folder, rows)
+                    _write_record(folder, rows)
+
                 runs = saved_runs(copy)
                 spent = every is None or all(run.share >= 1.0 for run in runs.values())
-                parts = {
-                    part: {"steps": run.step, "minutes": round(run.seconds / 60, 2)}
-                    for part, run in runs.items()
-                }
-                if not any(each.get("parts") == parts for each in rows):
+                place = _place_of(runs)
+                if not any(each.get("parts") == place["parts"] for each in rows):
                     file = copy / BEST
                     write_weights(copy, dataset, file)
-                    flow = [part for part in parts if part != "predictor"]
-                    rows.append(
-                        {
-                            "weights": "the run",
-                            "hours": round(max(parts[part]["minutes"] for part in flow) / 60, 3),
-                            "parts": parts,
-                            "held_out": likelihoods(copy, dataset),
-                            **measure(load_weights(file)),
-                        }
-                    )
+                    losses = {"held_out": held_out_losses(copy, dataset)}
+                    rows.append({**place, **losses, **measure(load_weights(file))})
+
                     _keep_if_best(folder, file, rows[-1])
-                    _record(folder, rows)
+                    _write_record(folder, rows)
                     yield rows[-1]
+
         if not spent and every is not None:
             time.sleep(max(0.0, 60.0 * every - (time.monotonic() - begin)))
+
+
+def _place_of(runs: Mapping[str, Run]) -> dict[str, Any]:
+    """How far a run is: the beginning of its row."""
+    parts = {
+        part: {"steps": run.step, "minutes": round(run.seconds / 60, 2)}
+        for part, run in runs.items()
+    }
+    minutes = max(place["minutes"] for part, place in parts.items() if part != "predictor")
+    return {"weights": "the run", "hours": round(minutes / 60, 3), "parts": parts}
 
 
 def describe(found: Mapping[str, Any]) -> str:
@@ -217,13 +221,13 @@ def _lively(figures: Mapping[str, Any]) -> str:
     return f"; temperature 1: {', '.join(words)}"
 
 
-def _figures(clips: Sequence[Measured]) -> dict[str, Any]:
+def _figures(clips: Sequence[MeasuredClip]) -> dict[str, Any]:
     """The figures of all clips, with intervals, and how well those of each maker, body and kind of
     piece are sat on.
     """
     figures = {}
     for run in _RUNS:
-        found = row([each.runs[run] for each in clips])
+        found = pooled_row([each.runs[run] for each in clips])
         figures[run] = {name: found[name] for name in _FIGURES if name in found}
         figures[run]["intervals"] = {
             name: found["intervals"][name] for name in figures[run] if name in found["intervals"]
@@ -231,17 +235,14 @@ def _figures(clips: Sequence[Measured]) -> dict[str, Any]:
 
     groups: dict[str, dict[str, Any]] = {}
     for group, of in _GROUPS.items():
-        parts: dict[str, list[Measured]] = defaultdict(list)
-        for each in clips:
-            parts[of(each.clip)].append(each)
         groups[group] = {
             name: {"clips": len(own)}
             | {
                 run: {share: found[share] for share in _SHARES}
                 for run in ("free_t0", "ee_t0")
-                for found in [row([each.runs[run] for each in own])]
+                for found in [pooled_row([each.runs[run] for each in own])]
             }
-            for name, own in sorted(parts.items())
+            for name, own in grouped(clips, of).items()
         }
 
     return {"clips": len(clips), "figures": figures, **groups}
@@ -265,6 +266,6 @@ def _keep_if_best(folder: Path, file: Path, found: dict[str, Any]) -> None:
         shutil.copyfile(file, part)
 
 
-def _record(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
+def _write_record(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
     save_text(folder / RECORD, "\n".join(json.dumps(each) for each in rows))
-    curves(rows, folder / CURVES)
+    draw_curves(rows, folder / CURVES)

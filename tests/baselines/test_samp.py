@@ -17,7 +17,7 @@ from dafnet_addon.baselines.samp import (  # noqa: E402
     SampConfig,
     SampTraining,
     network_of,
-    takes,
+    sample_takes,
 )
 from dafnet_addon.core.conditions import Shot  # noqa: E402
 from dafnet_addon.core.root import RootPath, ahead, velocities  # noqa: E402
@@ -78,8 +78,8 @@ def _windows(
 
 
 def _inputs(windows: dict[str, np.ndarray]) -> torch.Tensor:
-    track, at = samp_features.of_windows(windows, np.zeros(len(windows["poses"])))
-    return samp_state.inputs_of(samp_features.parts_of(track, at, at))
+    track, at = samp_features.window_tracks(windows, np.zeros(len(windows["poses"])))
+    return samp_state.network_input(samp_features.states_at(track, at, at))
 
 
 def test_a_state_has_the_papers_size():
@@ -111,7 +111,7 @@ def test_blended_outputs_are_those_of_blended_weights():
 
 
 def test_a_straight_walk_is_sampled_where_it_was_and_will_be():
-    parts, from_goal = samp_state.split(_inputs(_windows(REST)))
+    parts, from_goal = samp_state.split_state(_inputs(_windows(REST)))
     way = STEP * torch.arange(-30, 31, 5)
     assert torch.allclose(parts.trajectory[..., 0], torch.zeros(13), atol=1e-5)
     assert torch.allclose(parts.trajectory[..., 1], way.expand(1, 50, 13), atol=1e-5)
@@ -146,8 +146,8 @@ def test_states_do_not_know_where_in_the_world_they_are():
         _windows(**at_seat, boxes=seat[None]),
         _windows(**at_seat, place=(3.0, -2.0), yaw=2.3, boxes=turned[None]),
     ):
-        track, at = samp_features.of_windows(windows, np.zeros(1))
-        aim = samp_features.parts_of(track, at, at).goal[:, :, samp_state.NOW]
+        track, at = samp_features.window_tracks(windows, np.zeros(1))
+        aim = samp_features.states_at(track, at, at).goal[:, :, samp_state.NOW]
         seen.append(samp_state.sensor_of(track.solid[track.which[:, at]], aim))
     assert (seen[0] - seen[1]).abs().max() < 2e-3
     voxels = seen[0][0, 0].view(512, 4)
@@ -156,7 +156,7 @@ def test_states_do_not_know_where_in_the_world_they_are():
 
 
 def test_a_seated_body_sits_at_its_goal():
-    parts, _ = samp_state.split(_inputs(_windows(_seated(), step=0.0)))
+    parts, _ = samp_state.split_state(_inputs(_windows(_seated(), step=0.0)))
     goal = parts.goal[..., samp_state.NOW, :]
     assert torch.allclose(goal[..., :3], torch.tensor([0.0, 0.0, 0.43]), atol=1e-3)
     sits = samp_state.ACTIONS.index("sit")
@@ -174,19 +174,19 @@ def test_a_root_that_will_stay_over_a_seat_goes_there_to_sit():
     ).position[-1]
     windows["ahead"] = np.minimum(windows["ahead"], (end[1] - windows["root"][:, :, 1])[..., None])
     windows["boxes"][0, 0] = box((end[0], end[1], 0.2), (0.5, 0.5, 0.4))
-    goal = samp_state.split(_inputs(windows))[0].goal[0, -1, samp_state.NOW]
+    goal = samp_state.split_state(_inputs(windows))[0].goal[0, -1, samp_state.NOW]
     assert goal[6 + samp_state.ACTIONS.index("sit")] == 1 and abs(float(goal[2]) - 0.4) < 1e-6
 
 
 def test_states_give_their_joints_back_and_follow_one_another():
     turning = _windows(REST, place=(1.0, 2.0), yaw=0.7)
-    track, at = samp_features.of_windows(turning, np.zeros(1))
-    then = samp_features.parts_of(track, at + 1, at)
+    track, at = samp_features.window_tracks(turning, np.zeros(1))
+    then = samp_features.states_at(track, at + 1, at)
     world = samp_state.points_back(then.pose[..., :3], track.root[:, at, None])
     assert (world - track.joints[:, at + 1 - track.first]).abs().max() < 1e-5
-    after = samp_features.parts_of(track, at + 1, at + 1)
-    fed = samp_state.following(then, after.goal)
-    assert (samp_state.inputs_of(fed) - samp_state.inputs_of(after)).abs().max() < 1e-4
+    after = samp_features.states_at(track, at + 1, at + 1)
+    fed = samp_state.next_input(then, after.goal)
+    assert (samp_state.network_input(fed) - samp_state.network_input(after)).abs().max() < 1e-4
 
 
 @pytest.fixture
@@ -227,7 +227,7 @@ def test_mixed_precision_is_nearly_the_same(pool):
 def test_mixed_precision_is_asked_for_only_where_it_is_there(pool, monkeypatch):
     losses = {}
     for asked, there in ((False, False), (True, False), (True, True)):
-        monkeypatch.setattr(precision, "mixes", lambda device, there=there: there)
+        monkeypatch.setattr(precision, "is_available", lambda device, there=there: there)
         torch.manual_seed(0)
         training = SampTraining("samp", replace(TINY, mixed=asked), pool.statistics(), "cpu", pool)
         assert training.config.mixed is (asked and there)
@@ -254,11 +254,11 @@ def walk() -> tuple[HeldClip, Shot]:
 @pytest.mark.parametrize("kind", samp.KINDS)
 def test_takes_are_bodies(walk, kind):
     torch.manual_seed(0)
-    made = takes(network_of(kind, TINY), *walk, [None, 0, 1], kind)
+    made = sample_takes(network_of(kind, TINY), *walk, [None, 0, 1], kind)
     assert made.shape == (3, 40, 22, 3) and np.isfinite(made).all()
     bones = np.linalg.norm(made[:, :, 1:] - made[:, :, list(PARENTS[1:])], axis=-1)
     assert np.abs(bones - np.linalg.norm(OFFSETS[1:], axis=-1)).max() < 1e-5
-    again = takes(network_of(kind, TINY), *walk, [None], kind)
+    again = sample_takes(network_of(kind, TINY), *walk, [None], kind)
     assert again.shape[0] == 1
 
 
@@ -268,8 +268,8 @@ def _statue(step: float) -> MotionNet:
     with torch.no_grad():
         for parameter in net.third.parameters():
             parameter.zero_()
-    track, at = samp_features.of_windows(_windows(REST, step=step), np.zeros(1))
-    now, then = samp_features.parts_of(track, at, at), samp_features.parts_of(track, at + 1, at)
+    track, at = samp_features.window_tracks(_windows(REST, step=step), np.zeros(1))
+    now, then = samp_features.states_at(track, at, at), samp_features.states_at(track, at + 1, at)
     last, aim = (
         now.trajectory[:, :, samp_state.LAST, :4],
         samp_state.goal_place(now.goal[:, :, samp_state.NOW]),
@@ -281,7 +281,7 @@ def _statue(step: float) -> MotionNet:
 def test_samp_goes_its_own_way_and_samp_a_the_clips(walk):
     clip, _ = walk
     slow = _statue(0.5 * STEP)
-    with_root, own = (takes(slow, *walk, [None], kind)[0] for kind in ("samp-a", "samp"))
+    with_root, own = (sample_takes(slow, *walk, [None], kind)[0] for kind in ("samp-a", "samp"))
     assert (
         np.linalg.norm(with_root[:, 0, :2] - clip.path.position[:, :2], axis=-1).max() < 1.1 * STEP
     )
@@ -297,5 +297,5 @@ def test_near_the_goal_the_trajectory_is_led_there():
     parts = samp_state.Parts(torch.zeros(1, 22, 12), trajectory, torch.zeros(1, 5), goal)
     for distance, weight in ((0.05, (6 / 7) ** 0.25), (2.0, 0.0)):
         goal[..., 1] = distance
-        led = samp_state.led(parts, from_goal, goal).trajectory
+        led = samp_state.led_to_goal(parts, from_goal, goal).trajectory
         assert abs(float(led[0, -1, 1]) - weight * distance) < 1e-4 and float(led[0, 0, 1]) == 0.0

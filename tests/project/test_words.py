@@ -52,6 +52,14 @@ NAMES = {
     "_adopted": "_adopt",
     "_unbake": "_remove_bake",
     "_worked": "_advance",
+    "spread_out": "map_in_processes",
+    "in_processes": "map_clips",
+    "of_training": "training_tensors",
+    "rows_of": "rows_by_run",
+    "before_it_cooled": "uncooled_run",
+    "held_loss": "held_out_loss",
+    "_lived": "_scheduled",
+    "measured_samp": "measure_samp",
 }
 """Names that said nothing alone, or two things, and what stands in their place."""
 

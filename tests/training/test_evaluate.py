@@ -119,7 +119,7 @@ def test_no_body_of_the_unseen_test_clips_is_in_training():
 def test_the_frozen_furniture_is_under_those_who_sit():
     clips = _clips()
     assert len(clips) == len(json.loads(h.FROZEN.read_text(encoding="utf-8"))["clips"])
-    assert sum(len(clip.rests) for clip in e.captured(clips)) >= 40
+    assert sum(len(clip.rests) for clip in e.captured_clips(clips)) >= 40
     for clip in clips:
         for rest in clip.rests:
             tops = [solid.center[2] + solid.half_size[2] for solid in clip.scene.solids]
@@ -129,7 +129,7 @@ def test_the_frozen_furniture_is_under_those_who_sit():
 
 def test_the_real_motion_has_no_errors():
     clip = _clip()
-    figures = e.figures(clip, clip.joints[None], "FULL")
+    figures = e.measure_takes(clip, clip.joints[None], "FULL")
     for name, value in (
         ("sits_within_6cm", 1),
         ("stands_when_it_should", 1),
@@ -145,7 +145,7 @@ def test_the_real_motion_has_no_errors():
 def test_errors_are_those_that_were_made():
     clip = _clip()
     high = clip.joints + np.array([0.0, 0.0, 0.1])
-    figures = e.figures(clip, np.stack([clip.joints, high]), "FULL")
+    figures = e.measure_takes(clip, np.stack([clip.joints, high]), "FULL")
     assert _figure(figures, "sits_within_6cm") == 0.5 and figures.seats == [0.0, pytest.approx(0.1)]
     assert _figure(figures, "upper_body_error") == pytest.approx(0.05 / STATURE)
     assert _figure(figures, "end_effector_error") == pytest.approx(0.05 / 1.7)
@@ -153,7 +153,7 @@ def test_errors_are_those_that_were_made():
     # the standing half of the second take
     assert _figure(figures, "feet_off_floor") == pytest.approx(0.25)
     crouching = clip.joints - np.array([0.0, 0.0, 0.15])
-    assert _figure(e.figures(clip, crouching[None]), "stands_when_it_should") == 0.0
+    assert _figure(e.measure_takes(clip, crouching[None]), "stands_when_it_should") == 0.0
 
 
 def test_rows_pool_clips_by_their_frames():
@@ -161,10 +161,10 @@ def test_rows_pool_clips_by_their_frames():
         e.Figures({"a": (10.0, 100.0)}, [0.01]),
         e.Figures({"a": (90.0, 100.0), "b": (1.0, 2.0)}, [-0.05, 0.2]),
     )
-    row = e.row([one, other])
+    row = e.pooled_row([one, other])
     assert row["clips"] == 2 and row["seat_episodes"] == 3 and row["seat_error_median"] == 0.05
     assert row["a"] == 0.5 and row["intervals"]["a"] == [0.1, 0.9] and row["b"] == 0.5
-    many = e.row(
+    many = e.pooled_row(
         [
             e.Figures({"a": (float(value), 1.0)})
             for value in np.random.default_rng(1).normal(3.0, 1.0, 400)
@@ -172,7 +172,7 @@ def test_rows_pool_clips_by_their_frames():
     )
     low, high = many["intervals"]["a"]
     assert low < many["a"] < high and high - low == pytest.approx(2 * 1.96 / 20, rel=0.25)
-    assert many == e.row(
+    assert many == e.pooled_row(
         [
             e.Figures({"a": (float(value), 1.0)})
             for value in np.random.default_rng(1).normal(3.0, 1.0, 400)
@@ -196,7 +196,7 @@ def test_rows_keep_kinds_of_clips_apart():
         {"unseen": False},
     ]
     kinds.append({"room": "bed", "composed": True})
-    rows = e.rows([e.Measured(_clip(**kind), runs) for kind in kinds])
+    rows = e.rows_by_group([e.MeasuredClip(_clip(**kind), runs) for kind in kinds])
     counts = {
         name: values["clips"]
         for name, values in rows.items()
@@ -220,7 +220,7 @@ def test_takes_made_together_are_those_that_generate_makes():
     frames = len(shot.conditions)
     calm = sampler.noise(frames, 0, temperature=0.0)
     lively = sampler.noise(frames, 3), sampler.noise(frames, 3, 5)
-    takes = e.made(sampler, shot, np.concatenate([calm, *lively], axis=1))
+    takes = e.sample_takes(sampler, shot, np.concatenate([calm, *lively], axis=1))
     controls = Controls(fps=30.0, root=clip.path.matrices())
     for take, (seed, lower, temperature) in zip(
         takes, ((0, None, 0.0), (3, None, 1.0), (3, 5, 1.0)), strict=True
@@ -236,7 +236,7 @@ def test_beside_measures_all_modes_and_the_likelihood_of_real_poses():
     from dafnet_addon.training.evaluation.actions import follow
 
     sampler, clip = Sampler(load_weights()), _clip(40, seated=0)
-    runs = e.beside(sampler, clip, seeds=2).runs
+    runs = e.measure_clip(sampler, clip, seeds=2).runs
     assert set(runs) == {
         "ground_truth",
         "legs",

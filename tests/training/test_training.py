@@ -465,7 +465,7 @@ def test_mixed_precision_is_nearly_the_same(dataset, tmp_path):
 def test_mixed_precision_is_asked_for_only_where_it_is_there(
     dataset, tmp_path, monkeypatch, capsys, there
 ):
-    monkeypatch.setattr(precision, "mixes", lambda device: there)
+    monkeypatch.setattr(precision, "is_available", lambda device: there)
     run = new_run(
         "upper", tmp_path, TINY, replace(_config(2), mixed=True), _pool(dataset).statistics()
     )
@@ -477,9 +477,9 @@ def test_mixed_precision_is_asked_for_only_where_it_is_there(
     assert switches and set(switches) == {there} and run.config.mixed is there, (
         "what is said of the run is what was done"
     )
-    precision.announce(True)
+    precision.warn_if_missing(True)
     assert capsys.readouterr().err.count("\n") == (0 if there else 1)
-    precision.announce(False)
+    precision.warn_if_missing(False)
     assert capsys.readouterr().err == ""
 
 
@@ -563,7 +563,7 @@ def test_the_optimiser_is_adam(dataset, tmp_path):
 
 def test_the_probe_leaves_the_generators_alone():
     before = torch.get_rng_state()
-    precision.mixes.__wrapped__("cpu")
+    precision.is_available.__wrapped__("cpu")
     assert torch.equal(torch.get_rng_state(), before)
 
 
@@ -674,7 +674,7 @@ def test_batches_are_noisy_by_three_millimetres(dataset):
 
 def test_free_running_loss_is_zero_for_the_captured_motion_and_knows_sliding():
     from dafnet_addon.core.skeleton import LOWER, REST, UPPER
-    from dafnet_addon.training.free_run import lower_loss, sliding, upper_loss
+    from dafnet_addon.training.free_run import lower_loss, sliding_speed, upper_loss
 
     rest = torch.from_numpy(REST).float()
     upper, lower = rest[list(UPPER)].repeat(3, 8, 1, 1), rest[list(LOWER)].repeat(3, 8, 1, 1)
@@ -690,7 +690,7 @@ def test_free_running_loss_is_zero_for_the_captured_motion_and_knows_sliding():
     # The root goes 1 cm to the right each frame and turns; feet that stay in its frame slide over
     # the floor.
     step[..., 0] = 0.01
-    assert torch.allclose(sliding(lower, step), torch.tensor(0.3), atol=1e-3)
+    assert torch.allclose(sliding_speed(lower, step), torch.tensor(0.3), atol=1e-3)
     assert float(lower_loss(lower, lower, ~calm, upper[:, :, 0], step, free)) > still + 1.0
     asked = free.clone()
     asked[..., 4:] = 1.0
@@ -703,7 +703,7 @@ def test_free_running_loss_is_zero_for_the_captured_motion_and_knows_sliding():
     turning = torch.zeros(1, 2, 3)
     turning[..., 2] = 0.1
     fixed = torch.tensor([[0.0, 1.0, 0.0], [0.1, 0.995, 0.0]])[None, :, None]
-    assert float(sliding(fixed, turning)) < 0.02, (
+    assert float(sliding_speed(fixed, turning)) < 0.02, (
         "a point that stays in the world while the root turns to the left"
     )
 

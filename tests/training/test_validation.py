@@ -24,11 +24,11 @@ from dafnet_addon.data.motion.rests import Rest  # noqa: E402
 from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training import candidates, validation  # noqa: E402
 from dafnet_addon.training.config import TrainingConfig  # noqa: E402
-from dafnet_addon.training.evaluation.clips import Measured, figures  # noqa: E402
+from dafnet_addon.training.evaluation.clips import MeasuredClip, measure_takes  # noqa: E402
 from dafnet_addon.training.evaluation.real_report import real_report  # noqa: E402
 from dafnet_addon.training.parts import load_run  # noqa: E402
 from dafnet_addon.training.train import train_part  # noqa: E402
-from dafnet_addon.training.validation import likelihoods, recorded, score, validations  # noqa: E402
+from dafnet_addon.training.validation import held_out_losses, read_record, score, validate_steps  # noqa: E402
 from kit.places import ROOT  # noqa: E402
 
 pytestmark = pytest.mark.torch
@@ -101,13 +101,13 @@ def test_a_run_is_measured_as_it_goes_on_and_its_best_weights_are_kept(
     run = tmp_path / "run"
     _train(described, run, 2)
     before = _files(run)
-    (first,) = validations(run, described, CLIPS)
+    (first,) = validate_steps(run, described, CLIPS)
     assert _files(run) == before, "the run is only read"
-    assert not list(validations(run, described, CLIPS)), "nothing is measured twice"
+    assert not list(validate_steps(run, described, CLIPS)), "nothing is measured twice"
     _train(described, run, 30)
-    (second,) = validations(run, described, CLIPS)
+    (second,) = validate_steps(run, described, CLIPS)
 
-    shipped, *own = recorded(run)
+    shipped, *own = read_record(run)
     assert own == [first, second] and "hours" not in shipped
     assert [each["parts"]["upper"]["steps"] for each in own] == [2, 30]
     assert set(first["makers"]) == {"maker", "other maker"} and set(first["held_out"]) == {
@@ -115,7 +115,7 @@ def test_a_run_is_measured_as_it_goes_on_and_its_best_weights_are_kept(
         "lower",
     }
     assert second["held_out"]["lower"] < first["held_out"]["lower"], "it has learnt"
-    assert {"speed_middle", "speed_quick"} <= second["figures"]["free_t1"].keys()
+    assert "speed_quick" in second["figures"]["free_t1"], "slower bands need longer clips"
     assert "temperature 1: skate" in validation.describe(second)
     best = load_weights(run / validation.BEST)
     kept = json.loads(best.metadata["validation"])
@@ -139,7 +139,7 @@ def test_only_what_is_better_takes_the_place_of_the_best(
     monkeypatch.setattr(validation, "score", lambda clips: next(scores))
     for steps, best in ((2, 5.0), (4, 5.0), (6, 4.0)):
         _train(described, run, steps)
-        list(validations(run, described, CLIPS))
+        list(validate_steps(run, described, CLIPS))
         words = load_weights(run / validation.BEST).metadata
         assert json.loads(words["validation"])["score"] == best
     assert json.loads(words["training"])["upper"]["steps"] == 6
@@ -154,8 +154,8 @@ def test_it_goes_on_until_the_budget_is_spent(described: Path, tmp_path: Path, m
 
     monkeypatch.setattr(validation.time, "sleep", sleep)
     with pytest.raises(InputError, match="no weights of the whole flow yet"):
-        list(validations(run, described, CLIPS))
-    rows = list(validations(run, described, CLIPS, every=10.0))
+        list(validate_steps(run, described, CLIPS))
+    rows = list(validate_steps(run, described, CLIPS, every=10.0))
     assert [each["parts"]["lower"]["steps"] for each in rows] == [2, 20, 60]
     assert len(slept) == 4 and all(500.0 < seconds <= 600.0 for seconds in slept)
 
@@ -163,7 +163,7 @@ def test_it_goes_on_until_the_budget_is_spent(described: Path, tmp_path: Path, m
 def test_what_fails_leaves_all_as_it_was(described: Path, tmp_path: Path, monkeypatch):
     run = tmp_path / "run"
     _train(described, run, 2)
-    list(validations(run, described, CLIPS))
+    list(validate_steps(run, described, CLIPS))
     _train(described, run, 4)
     names = (validation.RECORD, validation.BEST, validation.CURVES)
     before = [(run / name).read_bytes() for name in names]
@@ -174,12 +174,12 @@ def test_what_fails_leaves_all_as_it_was(described: Path, tmp_path: Path, monkey
     with monkeypatch.context() as patch:
         patch.setattr(validation, "measured", fails)
         with pytest.raises(KeyboardInterrupt):
-            list(validations(run, described, CLIPS))
+            list(validate_steps(run, described, CLIPS))
     assert [(run / name).read_bytes() for name in names] == before
-    assert len(list(validations(run, described, CLIPS))) == 1, "and can be gone on with"
+    assert len(list(validate_steps(run, described, CLIPS))) == 1, "and can be gone on with"
     (run / validation.RECORD).write_text('{"weights": ', encoding="utf-8")
     with pytest.raises(InputError, match=r"validation\.jsonl' is not JSON; restore"):
-        list(validations(run, described, CLIPS))
+        list(validate_steps(run, described, CLIPS))
 
 
 def test_a_row_says_how_lively_takes_are_beside_captured_motion():
@@ -207,9 +207,11 @@ def test_a_row_says_how_lively_takes_are_beside_captured_motion():
 
 
 def test_a_score_is_how_far_calm_takes_are_off():
-    def measured(clip: HeldClip, free: np.ndarray, ee: np.ndarray) -> Measured:
+    def measured(clip: HeldClip, free: np.ndarray, ee: np.ndarray) -> MeasuredClip:
         takes = {"ground_truth": clip.joints, "free_t0": free, "ee_t0": ee}
-        return Measured(clip, {name: figures(clip, take[None]) for name, take in takes.items()})
+        return MeasuredClip(
+            clip, {name: measure_takes(clip, take[None]) for name, take in takes.items()}
+        )
 
     one, two, three = _clip("one"), _clip("two"), _clip("three", "other maker")
     true = [measured(clip, clip.joints, clip.joints) for clip in (one, two, three)]
@@ -227,12 +229,12 @@ def test_a_score_is_how_far_calm_takes_are_off():
 def test_likelihoods_are_of_the_averaged_weights(described: Path, tmp_path: Path):
     run = tmp_path / "run"
     _train(described, run, 12)
-    averaged = likelihoods(run, described)
+    averaged = held_out_losses(run, described)
     for part in ("predictor", "upper", "lower"):
         kept = load_run(part, run)
         kept.adopt_average()
         kept.save()
-    assert likelihoods(run, described) == averaged == likelihoods(run, described)
+    assert held_out_losses(run, described) == averaged == held_out_losses(run, described)
 
 
 def test_a_snapshot_is_whole_while_the_run_is_saved(described: Path, tmp_path: Path):
@@ -263,7 +265,7 @@ def test_a_snapshot_is_whole_while_the_run_is_saved(described: Path, tmp_path: P
 def test_a_copy_is_cooled_and_the_run_is_not_disturbed(described: Path, tmp_path: Path):
     run, out = tmp_path / "run", tmp_path / "candidate"
     with pytest.raises(InputError, match="no weights of the whole flow yet"):
-        candidates.cooled(run, described, out, 0.02)
+        candidates.cool(run, described, out, 0.02)
     _train(described, run, 4)
     for part, seconds in (("upper", 600.0), ("lower", 540.0)):
         kept = load_run(part, run)
@@ -283,14 +285,14 @@ def test_a_copy_is_cooled_and_the_run_is_not_disturbed(described: Path, tmp_path
         # All but a second of it is over: what is left is trained by the command.
         begun.seconds = 659.0
         begun.save()
-    file = candidates.cooled(run, described, out, 1.0)
+    file = candidates.cool(run, described, out, 1.0)
     assert _files(run) == before and file == out / "dafnet.safetensors"
     for part in ("upper", "lower"):
         assert load_run(part, out).step > 4 and load_run(part, out).share == 1.0
     said = json.loads(load_weights(file).metadata["training"])
     assert said["upper"]["minutes"] >= 11.0 and said["settings"]["cool_down"] == 1.0 / 11.0
     steps = load_run("upper", out).step
-    candidates.cooled(run, described, out, 1.0)
+    candidates.cool(run, described, out, 1.0)
     assert load_run("upper", out).step == steps, "what is cooled stays so"
 
 
@@ -309,7 +311,7 @@ def test_a_run_that_cools_itself_is_cooled_from_before(described: Path, tmp_path
     other.mkdir()
     (other / "mine.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(InputError, match="something else"):
-        candidates.cooled(run, described, other, 1.0)
+        candidates.cool(run, described, other, 1.0)
     assert [file.name for file in other.iterdir()] == ["mine.txt"]
 
 

@@ -1,4 +1,4 @@
-"""What the action predictor says along real clips, and what that is worth to the likelihood."""
+"""What the action predictor says along real clips, and how much their likelihood owes to it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from ...core.sampler import Sampler
 from ...core.weights import Weights
 from ...data.held_out.captured import ACTIVITIES, HeldClip
 from ..batches import NOISE
-from .clips import Figures, in_processes, row, shot_of
+from .clips import Figures, map_clips, pooled_row, shot_of
 
 __all__ = ["FollowedClip", "actions_and_likelihood", "follow"]
 
@@ -61,11 +61,11 @@ def follow(sampler: Sampler, task: tuple[HeldClip, np.ndarray | None]) -> Follow
 def actions_and_likelihood(
     weights: Weights, clips: Sequence[HeldClip], progress: Callable[[float], None]
 ) -> dict[str, Any]:
-    """What the action predictor, if there is one, says along real clips, and what its word is worth
-    to the likelihood.
+    """What the action predictor, if there is one, says along real clips, and how much the
+    likelihood of their poses owes to it.
     """
     tasks: list[tuple[HeldClip, np.ndarray | None]] = [(clip, None) for clip in clips]
-    own = list(in_processes(weights, follow, tasks, lambda share: progress(share / 2)))
+    own = list(map_clips(weights, follow, tasks, lambda share: progress(share / 2)))
     actions = np.concatenate([each.actions for each in own])
 
     activity = np.repeat([clip.activity for clip in clips], [len(clip.joints) for clip in clips])
@@ -77,7 +77,7 @@ def actions_and_likelihood(
         return {**counts, "likelihood": likelihood}
 
     tasks = list(zip(clips, _shuffled(actions, clips), strict=True))
-    shuffled = list(in_processes(weights, follow, tasks, lambda share: progress(0.5 + share / 2)))
+    shuffled = list(map_clips(weights, follow, tasks, lambda share: progress(0.5 + share / 2)))
 
     likeliest = actions.argmax(1)
     shares = {"all": _shares(likeliest, actions.shape[1])}
@@ -118,7 +118,7 @@ def _pooled(
     activities.
     """
     own = [n for each, n in zip(clips, nats, strict=True) if each.clip.activity in chosen]
-    found = row([Figures({"nats": (float(n.sum()), float(len(n)))}) for n in own])
+    found = pooled_row([Figures({"nats": (float(n.sum()), float(len(n)))}) for n in own])
     return found, np.array([float(n.mean()) for n in own])
 
 

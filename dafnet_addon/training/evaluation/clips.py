@@ -8,7 +8,7 @@ a bootstrap over clips.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -43,23 +43,24 @@ from ...core.threads import one_thread
 from ...core.weights import Weights
 from ...data.held_out.captured import HeldClip
 from ...model.systems import sampler_of
-from ..processes import spread_out
+from ..processes import map_in_processes
 from .markdown import markdown_table
 
 __all__ = [
     "COLUMNS",
     "SEEDS",
     "Figures",
-    "Measured",
-    "beside",
-    "captured",
-    "figures",
-    "in_processes",
-    "made",
-    "measured",
-    "row",
-    "rows",
-    "rows_of",
+    "MeasuredClip",
+    "measure_clip",
+    "captured_clips",
+    "grouped",
+    "measure_takes",
+    "map_clips",
+    "sample_takes",
+    "measure_clips",
+    "pooled_row",
+    "rows_by_group",
+    "rows_by_run",
     "shot_of",
     "table",
 ]
@@ -110,7 +111,7 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredClip:
     """One clip measured: the figures of its runs by name."""
 
     clip: HeldClip
@@ -118,9 +119,7 @@ class Measured:
 
 
 def shot_of(clip: HeldClip, mode: str, scene: Scene | None = None) -> Shot:
-    """What the model is told of a clip in a mode; of another furniture where a ``scene`` is
-    given.
-    """
+    """The shot of a clip in a mode; among other furniture where a ``scene`` is given."""
     targets = {effector: clip.joints[:, j] for effector, j in END_EFFECTORS.items()}
     controls = Controls(
         fps=MODEL_FPS,
@@ -134,7 +133,7 @@ def shot_of(clip: HeldClip, mode: str, scene: Scene | None = None) -> Shot:
     return run_to_end(shot_steps(clip.scene if scene is None else scene, controls))
 
 
-def made(sampler: Sampler, shot: Shot, noise: np.ndarray) -> np.ndarray:
+def sample_takes(sampler: Sampler, shot: Shot, noise: np.ndarray) -> np.ndarray:
     """Takes (S, T, 22, 3) of noise (T, S, 66), or (S, 66) where it is held: world joints on
     constant bones, as the model gives them.
     """
@@ -145,24 +144,25 @@ def made(sampler: Sampler, shot: Shot, noise: np.ndarray) -> np.ndarray:
     return np.stack(takes)
 
 
-def made_clean(takes: np.ndarray, shot: Shot) -> np.ndarray:
+def clean_up_takes(takes: np.ndarray, shot: Shot) -> np.ndarray:
     """Takes (S, T, 22, 3) after the clean-up at full strength."""
     return np.stack(
         [on_bones(cleaned_up(joints, shot, CleanUp(1.0, 1.0, 1.0))) for joints in takes]
     )
 
 
-def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
+def measure_takes(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
     """Figures of takes (S, T, 22, 3) of a clip; APD where there are several."""
     count, frames = takes.shape[:2]
     flat = takes.reshape(-1, 22, 3)
-    reach = partial(distance, clip.scene, floor=0.0)
-    targets = {name: np.tile(clip.joints[:, j], (count, 1)) for name, j in END_EFFECTORS.items()}
-    toes = flat[:, FEET, 2]
-    points = reach(body_points(flat))
-    upper = np.linalg.norm(takes[:, :, UPPER] - clip.joints[:, UPPER], axis=-1)
-    standing = clip.joints[:, PELVIS, 2] > _STANDING
     weight = float(count * frames)
+
+    outside = partial(distance, clip.scene, floor=0.0)
+    points = outside(body_points(flat))
+    collisions = bad_collisions(outside(flat[:, list(BAD_COLLISION_JOINTS)]))
+    toes = flat[:, FEET, 2]
+    targets = {name: np.tile(clip.joints[:, j], (count, 1)) for name, j in END_EFFECTORS.items()}
+    standing = clip.joints[:, PELVIS, 2] > _STANDING
 
     def each(measure: Callable[[np.ndarray], float]) -> float:
         return float(sum(measure(take) for take in takes)) * frames
@@ -178,7 +178,7 @@ def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
         ),
         "skate_cm": (each(lambda j: skate(j, MODEL_FPS)), weight),
         "bad_collisions_per_frame": (
-            float(bad_collisions(reach(flat[:, list(BAD_COLLISION_JOINTS)])).sum()),
+            float(collisions.sum()),
             weight,
         ),
         "penetration_mean": (penetration(points)[0] * weight, weight),
@@ -195,18 +195,17 @@ def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
         "legs_penetration_mean": (penetration(points[:, _LEGS])[0] * weight, weight),
     }
     if mode == "FULL":
+        upper = np.linalg.norm(takes[:, :, UPPER] - clip.joints[:, UPPER], axis=-1)
         sums["upper_body_error"] = (float(upper.mean()) / STATURE * weight, weight)
+
     if count > 1:
         sums["apd_upper"] = (diversity(takes[:, :, list(UPPER)]) * frames, float(frames))
         sums["apd_legs"] = (diversity(takes[:, :, list(LOWER)]) * frames, float(frames))
 
     seats = [
-        float(
-            np.median(take[r.start : r.end, 0, 2])
-            - np.median(clip.joints[r.start : r.end, PELVIS, 2])
-        )
+        float(np.median(take[seated, 0, 2]) - np.median(clip.joints[seated, PELVIS, 2]))
         for take in takes
-        for r in clip.rests
+        for seated in (slice(rest.start, rest.end) for rest in clip.rests)
     ]
     for within in _SITS_WITHIN:
         sums[f"sits_within_{within}cm"] = (
@@ -214,21 +213,21 @@ def figures(clip: HeldClip, takes: np.ndarray, mode: str = "FREE") -> Figures:
             float(len(seats)),
         )
 
-    return Figures(sums | _life(clip, takes), seats)
+    return Figures(sums | _liveliness(clip, takes), seats)
 
 
-def _life(clip: HeldClip, takes: np.ndarray) -> Sums:
+def _liveliness(clip: HeldClip, takes: np.ndarray) -> Sums:
     """How lively takes (S, T, 22, 3) are, how they sway, sit down and lean: means over takes and
     episodes that show it.
     """
-    found: dict[str, list[float]] = defaultdict(list)
+    ends = liveliness.LIVELY["wrists"] + liveliness.LIVELY["head"]
     forward = forward_of(clip.path.yaw)
+
+    found: dict[str, list[float]] = defaultdict(list)
     for take in takes:
         for name, joints in liveliness.LIVELY.items():
             found[f"speed_{name}"].append(liveliness.speed(take, MODEL_FPS, joints))
-        for band, value in liveliness.band_speeds(
-            take, MODEL_FPS, liveliness.LIVELY["wrists"] + liveliness.LIVELY["head"]
-        ).items():
+        for band, value in liveliness.band_speeds(take, MODEL_FPS, ends).items():
             found[f"speed_{band}"].append(value)
 
         found["sway"].append(liveliness.sway(take, MODEL_FPS))
@@ -259,14 +258,14 @@ def _noise(
     return np.concatenate(noise, axis=1), runs
 
 
-def beside(
+def measure_clip(
     sampler: Sampler,
     clip: HeldClip,
     seed: int = 0,
     seeds: int = SEEDS,
     modes: Sequence[str] = MODES,
     clean: bool = True,
-) -> Measured:
+) -> MeasuredClip:
     """One clip made again in these modes, ``seeds`` times at temperature 1, and measured beside
     itself; calm takes also after the clean-up where it is asked for.
     """
@@ -277,18 +276,18 @@ def beside(
         conditions = replace(other.conditions, occupancy=known.occupancy)
         shots[mode] = replace(shots["EE"], conditions=conditions, request=other.request)
 
-    runs = {"ground_truth": figures(clip, clip.joints[None])}
+    runs = {"ground_truth": measure_takes(clip, clip.joints[None])}
     for mode in modes:
         noise, takes_of = _noise(sampler, len(known), seed, seeds, mode)
-        takes = made(sampler, shots[mode], noise)
-        runs |= {run: figures(clip, takes[chosen], mode) for run, chosen in takes_of.items()}
+        takes = sample_takes(sampler, shots[mode], noise)
+        runs |= {run: measure_takes(clip, takes[chosen], mode) for run, chosen in takes_of.items()}
         calm = f"{mode.lower()}_t0"
         if clean:
-            runs[f"{calm}_clean"] = figures(
-                clip, made_clean(takes[takes_of[calm]], shots[mode]), mode
+            runs[f"{calm}_clean"] = measure_takes(
+                clip, clean_up_takes(takes[takes_of[calm]], shots[mode]), mode
             )
 
-    return Measured(clip, runs)
+    return MeasuredClip(clip, runs)
 
 
 _sampler: Sampler | None = None
@@ -305,7 +304,7 @@ def _call(task: Callable[..., Any], item: Any) -> Any:
         return task(_sampler, item)
 
 
-def in_processes(
+def map_clips(
     weights: Weights,
     task: Callable[[Sampler, Any], Any],
     items: Sequence[Any],
@@ -316,10 +315,10 @@ def in_processes(
     core); in order.
     """
     start = partial(_start, weights)
-    yield from spread_out(partial(_call, task), items, processes, progress, start)
+    yield from map_in_processes(partial(_call, task), items, processes, progress, start)
 
 
-def measured(
+def measure_clips(
     weights: Weights,
     clips: Sequence[HeldClip],
     progress: Callable[[float], None] = lambda share: None,
@@ -328,10 +327,10 @@ def measured(
     modes: Sequence[str] = MODES,
     clean: bool = True,
     processes: int | None = None,
-) -> list[Measured]:
-    """Every clip beside itself (see ``beside``), in ``processes`` (None: one for each core)."""
-    task = partial(beside, seed=seed, seeds=seeds, modes=modes, clean=clean)
-    return list(in_processes(weights, task, clips, progress, processes))
+) -> list[MeasuredClip]:
+    """Every clip measured beside itself, in ``processes`` (None: one for each core)."""
+    task = partial(measure_clip, seed=seed, seeds=seeds, modes=modes, clean=clean)
+    return list(map_clips(weights, task, clips, progress, processes))
 
 
 def _interval(totals: np.ndarray, weights: np.ndarray) -> list[float]:
@@ -342,7 +341,7 @@ def _interval(totals: np.ndarray, weights: np.ndarray) -> list[float]:
     return [float(f"{value:.4g}") for value in np.quantile(drawn, [0.025, 0.975])]
 
 
-def row(chosen: Sequence[Figures]) -> dict[str, Any]:
+def pooled_row(chosen: Sequence[Figures]) -> dict[str, Any]:
     """One setting over clips: each figure, the 95 % intervals, and how many clips and seat episodes
     they are of.
     """
@@ -362,24 +361,34 @@ def row(chosen: Sequence[Figures]) -> dict[str, Any]:
     return out
 
 
-def rows_of(clips: Sequence[Measured], runs: Sequence[str]) -> dict[str, dict[str, Any]]:
+def rows_by_run(clips: Sequence[MeasuredClip], runs: Sequence[str]) -> dict[str, dict[str, Any]]:
     """A row for each run, over these clips."""
-    return {run: row([clip.runs[run] for clip in clips]) for run in runs} if clips else {}
+    return {run: pooled_row([clip.runs[run] for clip in clips]) for run in runs} if clips else {}
 
 
-def captured(clips: Sequence[HeldClip]) -> list[HeldClip]:
+def grouped(
+    clips: Iterable[MeasuredClip], group: Callable[[HeldClip], str]
+) -> dict[str, list[MeasuredClip]]:
+    """Clips by what ``group`` says of each, in the order of the groups' names."""
+    found: dict[str, list[MeasuredClip]] = defaultdict(list)
+    for each in clips:
+        found[group(each.clip)].append(each)
+    return dict(sorted(found.items()))
+
+
+def captured_clips(clips: Sequence[HeldClip]) -> list[HeldClip]:
     """Those of unseen bodies that were captured as they are, among seats and chance furniture: the
     headline figures' clips.
     """
     return [clip for clip in clips if clip.unseen and not clip.composed and not clip.room]
 
 
-def rows(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
+def rows_by_group(clips: Sequence[MeasuredClip]) -> dict[str, dict[str, Any]]:
     """Ground truth and all runs on unseen bodies, captured as they are; then at desks and shelves,
     raised onto beds, on composed clips, and on bodies that are also in training.
     """
     groups = {
-        "": [m for m in clips if captured([m.clip])],
+        "": [m for m in clips if captured_clips([m.clip])],
         "_at_desks_and_shelves": [
             m for m in clips if m.clip.unseen and m.clip.room not in ("", "bed")
         ],
@@ -390,7 +399,7 @@ def rows(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
     out: dict[str, dict[str, Any]] = {}
     for suffix, chosen in groups.items():
         runs = [run for run in _RUNS if chosen and run in chosen[0].runs]
-        out |= {run + suffix: values for run, values in rows_of(chosen, runs).items()}
+        out |= {run + suffix: values for run, values in rows_by_run(chosen, runs).items()}
 
     return out
 

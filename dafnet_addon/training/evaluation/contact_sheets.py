@@ -11,7 +11,7 @@ from ...core.skeleton import POSE_SIZE
 from ...core.weights import Weights
 from ...data.dataset.sheet import Row, sheet
 from ...data.held_out.captured import HeldClip
-from .clips import in_processes, made, shot_of
+from .clips import map_clips, sample_takes, shot_of
 
 __all__ = ["contact_sheets"]
 
@@ -46,13 +46,11 @@ def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) ->
 
     chosen: list[HeldClip] = []
     for kind, count in _SHEETS_OF.items():
-        of_it = [clip for clip in clips if clip.unseen and _kind(clip) == kind]
-        chosen += [
-            of_it[i]
-            for i in np.unique(np.linspace(0, len(of_it) - 1, min(count, len(of_it))).astype(int))
-        ]
+        own = [clip for clip in clips if clip.unseen and _kind(clip) == kind]
+        spaced = np.linspace(0, len(own) - 1, min(count, len(own))).astype(int)
+        chosen += [own[k] for k in np.unique(spaced)]
 
-    takes = in_processes(weights, _calm, chosen, lambda share: None)
+    takes = map_clips(weights, _calm, chosen, lambda share: None)
     drawn: list[Row] = [
         (f"{clip.name}, {kind}", joints, clip.furniture)
         for clip, take in zip(chosen, takes, strict=True)
@@ -61,10 +59,12 @@ def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) ->
             ("generated", take),
         )
     ]
+
     files = []
     for k in range(0, len(drawn), 2 * _A_SHEET):
         files.append(folder / f"held_out_{k // (2 * _A_SHEET) + 1}.png")
         sheet(files[-1], drawn[k : k + 2 * _A_SHEET])
+
         with Image.open(files[-1]) as picture:
             flat = picture.convert("RGB").quantize(
                 _COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
@@ -76,4 +76,4 @@ def contact_sheets(weights: Weights, clips: Sequence[HeldClip], folder: Path) ->
 
 
 def _calm(sampler: Sampler, clip: HeldClip) -> np.ndarray:
-    return made(sampler, shot_of(clip, "FREE"), np.zeros((1, POSE_SIZE)))[0]
+    return sample_takes(sampler, shot_of(clip, "FREE"), np.zeros((1, POSE_SIZE)))[0]

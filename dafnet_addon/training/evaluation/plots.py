@@ -11,7 +11,7 @@ import numpy as np
 from ...core.files import whole_file
 from ...core.liveliness import BANDS
 
-__all__ = ["curves", "plot"]
+__all__ = ["draw_curves", "draw_bars"]
 
 _PANELS = {
     "sits_within_6cm": "sits within 6 cm",
@@ -45,35 +45,28 @@ _KINDS = {
 """By run, its label and colour."""
 
 
-def plot(report: dict[str, Any], file: Path) -> None:
+def draw_bars(report: dict[str, Any], file: Path) -> None:
     """Draw the runs on captured clips of unseen bodies into ``file`` (PNG), with 95 % intervals
     over clips.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
+    plt = _pyplot()
     rows = {
         name: row
         for name, row in report["rows"].items()
         if name.split("_t")[0] in ("ground", "free", "ee", "full")
         and name.endswith(("_truth", "_t0", "_t1", "_clean"))
     }
+
     figure, axes = plt.subplots(2, 3, figsize=(12, 7), constrained_layout=True)
     for ax, (key, title) in zip(axes.flat, _PANELS.items(), strict=True):
         shown = {name: row for name, row in rows.items() if row.get(key) is not None}
         values = np.array([row[key] for row in shown.values()])
         low, high = np.array([row["intervals"][key] for row in shown.values()]).T
         errors = np.maximum([values - low, high - values], 0.0)
+
         colours = [_COLOURS[name.split("_")[0]] for name in shown]
-        ax.barh(
-            range(len(shown)),
-            values,
-            xerr=errors,
-            color=colours,
-            error_kw={"lw": 1.0, "ecolor": "#222222"},
-        )
+        whiskers = {"lw": 1.0, "ecolor": "#222222"}
+        ax.barh(range(len(shown)), values, xerr=errors, color=colours, error_kw=whiskers)
         ax.set_yticks(range(len(shown)), [name.replace("_", " ") for name in shown])
         ax.invert_yaxis()
         ax.set_title(title)
@@ -82,21 +75,14 @@ def plot(report: dict[str, Any], file: Path) -> None:
     figure.suptitle(
         f"{some['clips']} captured clips of unseen bodies, {some['seat_episodes']} seat episodes"
     )
-    with whole_file(file) as part:
-        figure.savefig(part, format="png", dpi=80)
-
-    plt.close(figure)
+    _save(figure, file)
 
 
-def curves(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
+def draw_curves(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
     """Draw a run's validation (rows of ``validation``) over its hours into ``file`` (PNG), with
     95 % intervals over clips; level lines are what was captured and other weights' figures.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
+    plt = _pyplot()
     own = sorted((each for each in rows if "hours" in each), key=lambda each: each["hours"])
     others = [each for each in rows if "hours" not in each]
     hours = [each["hours"] for each in own]
@@ -105,14 +91,16 @@ def curves(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
         for which in shown:
             label, colour = _KINDS[which]
             if which == "ground_truth":
-                value, _, _ = _of(rows[0], which, name)
+                value, _, _ = _figure_and_interval(rows[0], which, name)
                 ax.axhline(value, ls="--", color=colour, label=label)
                 continue
-            values, low, high = np.array([_of(each, which, name) for each in own]).reshape(-1, 3).T
+            values, low, high = (
+                np.array([_figure_and_interval(each, which, name) for each in own]).reshape(-1, 3).T
+            )
             ax.plot(hours, values, marker="o", ms=3, color=colour, label=label)
             ax.fill_between(hours, low, high, color=colour, alpha=0.15, lw=0)
             for each in others:
-                value, _, _ = _of(each, which, name)
+                value, _, _ = _figure_and_interval(each, which, name)
                 ax.axhline(value, ls=":", color=colour, label=f"{label}, {each['weights']}")
         ax.set_title(title)
 
@@ -138,14 +126,30 @@ def curves(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
             ax.legend(fontsize=7)
 
     figure.suptitle(f"{rows[0]['clips']} captured clips of bodies and makers that choose weights")
-    with whole_file(file) as part:
-        figure.savefig(part, format="png", dpi=80)
-
-    plt.close(figure)
+    _save(figure, file)
 
 
-def _of(found: Mapping[str, Any], which: str, name: str) -> tuple[float, float, float]:
+def _figure_and_interval(
+    found: Mapping[str, Any], which: str, name: str
+) -> tuple[float, float, float]:
     """A figure of a row and its interval; NaN where nothing showed it, as a descent to a seat."""
     figures = found["figures"][which]
     low, high = figures["intervals"].get(name, (np.nan, np.nan))
     return figures.get(name, np.nan), low, high
+
+
+def _pyplot() -> Any:
+    """Matplotlib, which draws into files alone."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    return pyplot
+
+
+def _save(figure: Any, file: Path) -> None:
+    with whole_file(file) as part:
+        figure.savefig(part, format="png", dpi=80)
+
+    _pyplot().close(figure)

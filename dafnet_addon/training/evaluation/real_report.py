@@ -8,7 +8,7 @@ from typing import Any
 from ...core.weights import Weights
 from ...data.held_out.captured import HeldClip
 from ...data.held_out.walks import Walks
-from .clips import Measured, measured, rows_of, table
+from .clips import MeasuredClip, grouped, measure_clips, rows_by_run, table
 from .markdown import markdown_table
 
 __all__ = ["real_page", "real_report", "real_text"]
@@ -69,46 +69,50 @@ def real_report(
     seeds: int = 3,
     walks: Walks | None = None,
 ) -> dict[str, Any]:
-    """Rows (``evaluate.row``) over all clips of ``real_test``, and over those of each kind of
-    piece, maker and body; where ``walks`` are given, over all that were sent to seats, and by kind
-    of piece, with the share that was refused.
+    """Rows (``clips.pooled_row``) over all clips of ``real_test``, and over those of each kind of
+    piece, maker and body; where ``walks`` are given, over all that the director sent to seats, and
+    by kind of piece, with the share that was refused.
     """
     part = len(clips) / max(1, len(clips) + (len(walks.clips) if walks else 0))
-    found = measured(
+    found = measure_clips(
         weights, clips, lambda done: progress(part * done), seeds=seeds, modes=("FREE", "EE")
     )
+
     seated = [each for each in found if each.clip.room != "bed"]
     lying = [each for each in found if each.clip.room == "bed"]
-    report: dict[str, Any] = {"all seats": rows_of(seated, _RUNS), "lying": rows_of(lying, _RUNS)}
+    report: dict[str, Any] = {
+        "all seats": rows_by_run(seated, _RUNS),
+        "lying": rows_by_run(lying, _RUNS),
+    }
     for group, of in _GROUPS.items():
-        parts: dict[str, list[Measured]] = {}
-        for each in seated:
-            parts.setdefault(of(each.clip), []).append(each)
-        report[f"by {group}"] = {name: rows_of(each, _RUNS) for name, each in sorted(parts.items())}
+        report[f"by {group}"] = {
+            name: rows_by_run(own, _RUNS) for name, own in grouped(seated, of).items()
+        }
 
     if walks is None:
         return report
 
-    sent = measured(
+    sent = measure_clips(
         weights,
         walks.clips,
         lambda done: progress(part + (1.0 - part) * done),
         seeds=seeds,
         modes=("FREE",),
     )
-    report[_SENT] = _sent(sent, sum(walks.refused.values()) / max(1, sum(walks.sent.values())))
-    report[f"by kind, {_SENT}"] = {
-        kind: _sent(
-            [each for each in sent if each.clip.kind == kind], walks.refused.get(kind, 0) / times
-        )
-        for kind, times in sorted(walks.sent.items())
-    }
+    refused = sum(walks.refused.values()) / max(1, sum(walks.sent.values()))
+    report[_SENT] = _directed_rows(sent, refused)
+
+    of_kinds = report[f"by kind, {_SENT}"] = {}
+    for kind, times in sorted(walks.sent.items()):
+        own = [each for each in sent if each.clip.kind == kind]
+        of_kinds[kind] = _directed_rows(own, walks.refused.get(kind, 0) / times)
+
     return report
 
 
-def _sent(found: Sequence[Measured], refused: float) -> dict[str, dict[str, Any]]:
-    """The rows of some that were sent to seats, and how often that was refused."""
-    return {run: row | {"refused": refused} for run, row in rows_of(found, _SENT_RUNS).items()}
+def _directed_rows(found: Sequence[MeasuredClip], refused: float) -> dict[str, dict[str, Any]]:
+    """Rows of clips in which the director sent somebody to a seat, with the share ``refused``."""
+    return {run: row | {"refused": refused} for run, row in rows_by_run(found, _SENT_RUNS).items()}
 
 
 def real_text(report: dict[str, Any]) -> str:
@@ -126,8 +130,8 @@ def real_text(report: dict[str, Any]) -> str:
 
 
 def real_page(report: dict[str, Any], title: str) -> str:
-    """The main figures as one Markdown table of captured motion and one of who was sent, a row for
-    each kind, maker and body, under ``title``: what docs/evaluation-real.md holds.
+    """The main figures as one Markdown table of captured motion and one of directed walks, a row
+    for each kind, maker and body, under ``title``: what docs/evaluation-real.md holds.
     """
     groups = {
         "all seats": report["all seats"],
@@ -156,7 +160,7 @@ def _page_table(
     )
 
 
-def _within(run: str) -> Callable[[dict[str, Any]], str]:
+def _shares_within(run: str) -> Callable[[dict[str, Any]], str]:
     """Shares within 2, 4 and 8 cm, with the interval of the last."""
 
     def cell(rows: dict[str, Any]) -> str:
@@ -168,13 +172,15 @@ def _within(run: str) -> Callable[[dict[str, Any]], str]:
     return cell
 
 
-def _figure(name: str, run: str, shown: str, times: float = 1.0) -> Callable[[dict[str, Any]], str]:
+def _figure_cell(
+    name: str, run: str, shown: str, times: float = 1.0
+) -> Callable[[dict[str, Any]], str]:
     """One figure of a run, with the captured motion's in brackets where there is one."""
 
     def cell(rows: dict[str, Any]) -> str:
         values = [rows[r].get(name) for r in (run, "ground_truth") if r in rows]
-        told = ["–" if v is None else format(times * v, shown) for v in values]
-        return told[0] if len(told) == 1 else f"{told[0]} ({told[1]})"
+        words = ["–" if value is None else format(times * value, shown) for value in values]
+        return words[0] if len(words) == 1 else f"{words[0]} ({words[1]})"
 
     return cell
 
@@ -184,25 +190,25 @@ def _clips(rows: dict[str, Any]) -> str:
 
 
 _LATER: dict[str, Callable[[dict[str, Any]], str]] = {
-    "flesh in furniture, % of frames": _figure("penetrates", "free_t0", ".0f", 100.0),
-    "how deep, mm": _figure("penetration_deepest", "free_t0", ".1f", 1000.0),
-    "skate, cm/s": _figure("skate_cm", "free_t0", ".1f", 30.0),
-    "way down, s": _figure("descent_seconds", "free_t0", ".2f"),
-    "lean, degrees": _figure("lean_degrees", "free_t0", "z.0f"),
+    "flesh in furniture, % of frames": _figure_cell("penetrates", "free_t0", ".0f", 100.0),
+    "how deep, mm": _figure_cell("penetration_deepest", "free_t0", ".1f", 1000.0),
+    "skate, cm/s": _figure_cell("skate_cm", "free_t0", ".1f", 30.0),
+    "way down, s": _figure_cell("descent_seconds", "free_t0", ".2f"),
+    "lean, degrees": _figure_cell("lean_degrees", "free_t0", "z.0f"),
 }
 _CAPTURED_CELLS: dict[str, Callable[[dict[str, Any]], str]] = {
     "clips": _clips,
-    "FREE within 2 / 4 / 8 cm, %": _within("free_t0"),
-    "FREE, clean": _within("free_t0_clean"),
-    "EE": _within("ee_t0"),
+    "FREE within 2 / 4 / 8 cm, %": _shares_within("free_t0"),
+    "FREE, clean": _shares_within("free_t0_clean"),
+    "EE": _shares_within("ee_t0"),
     "EED in EE": lambda rows: f"{rows['ee_t0']['end_effector_error']:.4f}",
     **_LATER,
-    "wrists, m/s": _figure("speed_wrists", "free_t0", ".2f"),
+    "wrists, m/s": _figure_cell("speed_wrists", "free_t0", ".2f"),
 }
 _SENT_CELLS: dict[str, Callable[[dict[str, Any]], str]] = {
     "sent, not refused": _clips,
-    "refused, %": _figure("refused", "free_t0", ".0f", 100.0),
-    "FREE within 2 / 4 / 8 cm, %": _within("free_t0"),
-    "FREE, clean": _within("free_t0_clean"),
+    "refused, %": _figure_cell("refused", "free_t0", ".0f", 100.0),
+    "FREE within 2 / 4 / 8 cm, %": _shares_within("free_t0"),
+    "FREE, clean": _shares_within("free_t0_clean"),
     **_LATER,
 }

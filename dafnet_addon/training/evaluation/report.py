@@ -5,17 +5,26 @@ One dictionary, JSON all through; every figure stands beside the number of clips
 that it is of.
 """
 
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from ...core.weights import Weights
 from ...data.held_out.captured import ACTIVITIES, HeldClip
 from .actions import actions_and_likelihood
-from .clips import Measured, captured, measured, rows, rows_of
+from .clips import MeasuredClip, captured_clips, grouped, measure_clips, rows_by_group, rows_by_run
 from .rooms import drift, seats_of_three_heights
 
 __all__ = ["report"]
+
+_RUNS_BY_ACTIVITY = ("ground_truth", "free_t0", "ee_t0", "free_t1", "ee_t1")
+_LEGS_FIT = (
+    "feet_off_floor",
+    "toes_under_floor",
+    "legs_penetration_mean",
+    "foot_sliding_per_frame",
+    "sits_within_6cm",
+)
+"""Whether legs stand on the floor and in nothing."""
 
 
 def report(
@@ -32,40 +41,31 @@ def report(
     def part(k: int) -> Callable[[float], None]:
         return lambda share: progress(sum(shares[:k]) + shares[k] * share)
 
-    found = measured(weights, clips, part(0), seed)
-    plain = [each for each in found if captured([each.clip])]
-    groups: dict[str, list[Measured]] = defaultdict(list)
-    for each in found:
-        if each.clip.unseen and not each.clip.composed:
-            groups[each.clip.activity].append(each)
+    found = measure_clips(weights, clips, part(0), seed)
+    plain = [each for each in found if captured_clips([each.clip])]
+    unseen = [each for each in found if each.clip.unseen and not each.clip.composed]
+    by_activity = grouped(unseen, lambda clip: clip.activity)
 
     return {
-        "rows": rows(found),
+        "rows": rows_by_group(found),
         "by_activity": {
-            name: rows_of(groups[name], ["ground_truth", "free_t0", "ee_t0", "free_t1", "ee_t1"])
+            name: rows_by_run(by_activity[name], _RUNS_BY_ACTIVITY)
             for name in ACTIVITIES
-            if name in groups
+            if name in by_activity
         },
         "drift": drift(weights, part(1)),
         "diversity": _diversity(plain),
         "seats": seats_of_three_heights(weights, part(2)),
-        "actions": actions_and_likelihood(weights, captured(clips), part(3)),
+        "actions": actions_and_likelihood(weights, captured_clips(clips), part(3)),
     }
 
 
-def _diversity(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
+def _diversity(clips: Sequence[MeasuredClip]) -> dict[str, dict[str, Any]]:
     """APD of the upper body by mode; of the legs under one upper body, and whether those stand on
     the floor and in nothing.
     """
-    lively = rows_of(clips, ["free_t1", "ee_t1", "full_t1"])
-    legs = rows_of(clips, ["ground_truth", "free_t0", "legs"])
-    fit = (
-        "feet_off_floor",
-        "toes_under_floor",
-        "legs_penetration_mean",
-        "foot_sliding_per_frame",
-        "sits_within_6cm",
-    )
+    lively = rows_by_run(clips, ["free_t1", "ee_t1", "full_t1"])
+    legs = rows_by_run(clips, ["ground_truth", "free_t0", "legs"])
 
     def kept(values: dict[str, Any], names: Sequence[str]) -> dict[str, Any]:
         names = [name for name in names if name in values]
@@ -77,14 +77,12 @@ def _diversity(clips: Sequence[Measured]) -> dict[str, dict[str, Any]]:
         }
 
     out = {run: kept(values, ["apd_upper", "apd_legs"]) for run, values in lively.items()}
-    out["free_t1"]["over_ee"] = round(
-        lively["free_t1"]["apd_upper"] / lively["ee_t1"]["apd_upper"], 3
-    )
-    out["ee_t1"]["over_full"] = round(
-        lively["ee_t1"]["apd_upper"] / lively["full_t1"]["apd_upper"], 3
-    )
-    out |= {
-        run if run != "legs" else "legs_vary_t1": kept(v, ["apd_upper", "apd_legs", *fit])
-        for run, v in legs.items()
-    }
+    free, ee, full = (lively[f"{mode}_t1"]["apd_upper"] for mode in ("free", "ee", "full"))
+    out["free_t1"]["over_ee"] = round(free / ee, 3)
+    out["ee_t1"]["over_full"] = round(ee / full, 3)
+
+    for run, values in legs.items():
+        name = "legs_vary_t1" if run == "legs" else run
+        out[name] = kept(values, ["apd_upper", "apd_legs", *_LEGS_FIT])
+
     return out

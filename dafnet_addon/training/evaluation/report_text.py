@@ -7,10 +7,10 @@ from .clips import table
 from .criteria import criteria
 from .markdown import markdown_table
 
-__all__ = ["text"]
+__all__ = ["report_text"]
 
 
-def text(values: dict[str, Any]) -> str:
+def report_text(values: dict[str, Any]) -> str:
     """A report (see ``report``) in Markdown."""
     parts = [
         "## What has to be seen",

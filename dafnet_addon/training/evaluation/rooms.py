@@ -31,7 +31,7 @@ from ...core.take import Controls
 from ...core.weights import Weights
 from ...data.furnish.boxes import box, placed
 from ...data.furnish.flesh import Furnishing
-from .clips import SEEDS, Figures, in_processes, made, row
+from .clips import SEEDS, Figures, map_clips, pooled_row, sample_takes
 
 __all__ = ["Room", "drift", "long_rooms", "seat_rooms", "seats_of_three_heights"]
 
@@ -106,18 +106,14 @@ def long_rooms() -> list[Room]:
         # A round is to last 600 frames: what it lacks is shared out among its three rests.
         brief = _round_walk(mirror, 1.0)
         walked = _round_walk(mirror, 1.0 + (_MINUTE / _LOOPS - brief.rests[3].start) / 90.0)
+
         seats = [
             _seat(walked.rests[k].place, height, back)
             for k, height, back in ((1, chair, True), (2, stool, False))
         ]
-        rooms.append(
-            Room(
-                f"{chair:.2f}, {stool:.2f} m",
-                np.concatenate(seats),
-                walked,
-                {"chair": chair, "stool": stool},
-            )
-        )
+        heights = {"chair": chair, "stool": stool}
+        name = f"{chair:.2f}, {stool:.2f} m"
+        rooms.append(Room(name, np.concatenate(seats), walked, heights))
 
     return rooms
 
@@ -137,55 +133,61 @@ def seat_rooms() -> list[Room]:
     ]
 
 
-def _walk(sampler: Sampler, room: Room, seeds: int) -> np.ndarray:
+def _sample(sampler: Sampler, room: Room, seeds: int) -> np.ndarray:
     """Takes (1 + seeds, T, 22, 3) in a room: temperature 0 first, then 1."""
     controls = Controls(fps=MODEL_FPS, root=room.walked.path.matrices())
     shot = run_to_end(shot_steps(Furnishing(room.boxes).scene(), controls))
     frames = len(shot.conditions)
-    noise = [np.zeros((frames, 1, POSE_SIZE)), *(sampler.noise(frames, s) for s in range(seeds))]
-    return made(sampler, shot, np.concatenate(noise, axis=1))
+    lively = (sampler.noise(frames, seed) for seed in range(seeds))
+    noise = [np.zeros((frames, 1, POSE_SIZE)), *lively]
+    return sample_takes(sampler, shot, np.concatenate(noise, axis=1))
 
 
-def _round(room: Room, takes: np.ndarray, first: int, last: int) -> Figures:
+def _measure(room: Room, takes: np.ndarray, first: int, last: int) -> Figures:
     """Figures of takes (S, T, 22, 3) in frames ``first`` to ``last``; a seat's right height is that
     of its top plus 0.12 m.
     """
-    walked, scene = room.walked, Furnishing(room.boxes).scene()
+    walked = room.walked
     cut = takes[:, first:last]
     flat, weight = cut.reshape(-1, 22, 3), float(cut.shape[0] * cut.shape[1])
-    reach = partial(distance, scene, floor=0.0)
+
+    outside = partial(distance, Furnishing(room.boxes).scene(), floor=0.0)
+    collisions = bad_collisions(outside(flat[:, list(BAD_COLLISION_JOINTS)]))
+    depth = penetration(outside(body_points(flat)))[0]
+
     places = np.array([rest.place.position for rest in walked.rests if rest.place.seated])
     away = (
         np.linalg.norm(walked.path.position[first:last, None, :2] - places, axis=-1).min(1) > _AWAY
     )
+    standing = float((cut[:, away, 0, 2] > _STANDS_ABOVE).sum())
+
     seats = [
-        float(np.median(take[r.start : r.stop, 0, 2]) - room.heights[r.place.name] - SEAT_TO_PELVIS)
+        float(
+            np.median(take[rest.start : rest.stop, 0, 2])
+            - room.heights[rest.place.name]
+            - SEAT_TO_PELVIS
+        )
         for take in takes
-        for r in walked.rests
-        if r.place.seated and first <= r.start < last
+        for rest in walked.rests
+        if rest.place.seated and first <= rest.start < last
     ]
+    sits = float(sum(abs(error) <= _SITS_WITHIN for error in seats))
+
     each = [
-        (foot_sliding(j, MODEL_FPS).mean(), skate(j, MODEL_FPS), jerk(j, MODEL_FPS)) for j in cut
+        (foot_sliding(take, MODEL_FPS).mean(), skate(take, MODEL_FPS), jerk(take, MODEL_FPS))
+        for take in cut
     ]
     sliding, skating, jerking = (np.array(each).mean(0) * weight).tolist()
+
     return Figures(
         {
             "foot_sliding_per_frame": (sliding, weight),
             "skate_cm": (skating, weight),
             "jerk": (jerking, weight),
-            "bad_collisions_per_frame": (
-                float(bad_collisions(reach(flat[:, list(BAD_COLLISION_JOINTS)])).sum()),
-                weight,
-            ),
-            "penetration_mean": (penetration(reach(body_points(flat)))[0] * weight, weight),
-            "sits_within_6cm": (
-                float(sum(abs(error) <= _SITS_WITHIN for error in seats)),
-                float(len(seats)),
-            ),
-            "stands_when_it_should": (
-                float((cut[:, away, 0, 2] > _STANDS_ABOVE).sum()),
-                float(cut.shape[0] * away.sum()),
-            ),
+            "bad_collisions_per_frame": (float(collisions.sum()), weight),
+            "penetration_mean": (depth * weight, weight),
+            "sits_within_6cm": (sits, float(len(seats))),
+            "stands_when_it_should": (standing, float(cut.shape[0] * away.sum())),
         },
         seats,
     )
@@ -193,13 +195,15 @@ def _round(room: Room, takes: np.ndarray, first: int, last: int) -> Figures:
 
 def _rounds(sampler: Sampler, room: Room) -> dict[str, Figures]:
     """Figures of the first and the last round of a long walk."""
-    takes = _walk(sampler, room, seeds=3)
+    takes = _sample(sampler, room, seeds=3)
     starts = [rest.start for rest in room.walked.rests[::3]]
     rounds = {"first": (starts[0], starts[1]), "last": (starts[_LOOPS - 1], starts[_LOOPS])}
+
     out = {}
     for name, (first, last) in rounds.items():
         for temperature, chosen in (("t0", takes[:1]), ("t1", takes[1:])):
-            out[f"{name}_third_{temperature}"] = _round(room, chosen, first, last)
+            out[f"{name}_third_{temperature}"] = _measure(room, chosen, first, last)
+
     return out
 
 
@@ -208,14 +212,14 @@ def _heights(sampler: Sampler, room: Room) -> list[float]:
     seat = Seat("seat", np.array([0.0, 0.0, room.heights["seat"]]))
     reports = [
         seat_report(take, room.walked.path, MODEL_FPS, [seat])[0]
-        for take in _walk(sampler, room, SEEDS)
+        for take in _sample(sampler, room, SEEDS)
     ]
     return [float(report["pelvis_height"] or np.nan) for report in reports]
 
 
 def drift(weights: Weights, progress: Callable[[float], None]) -> dict[str, dict[str, Any]]:
-    found = list(in_processes(weights, _rounds, long_rooms(), progress))
-    return {name: row([rounds[name] for rounds in found]) for name in found[0]}
+    found = list(map_clips(weights, _rounds, long_rooms(), progress))
+    return {name: pooled_row([rounds[name] for rounds in found]) for name in found[0]}
 
 
 def seats_of_three_heights(weights: Weights, progress: Callable[[float], None]) -> dict[str, Any]:
@@ -223,10 +227,12 @@ def seats_of_three_heights(weights: Weights, progress: Callable[[float], None]) 
     right.
     """
     rooms = seat_rooms()
-    found = np.array(list(in_processes(weights, _heights, rooms, progress)))
+    found = np.array(list(map_clips(weights, _heights, rooms, progress)))
     found = found.reshape(-1, len(_HEIGHTS), found.shape[1])  # way, height, take
+
     wanted = np.array(list(_HEIGHTS.values()))[:, None] + SEAT_TO_PELVIS
     right = np.abs(found - wanted) <= _RIGHT_HEIGHT
+
     out: dict[str, Any] = {}
     for temperature, takes in (("t0", slice(0, 1)), ("t1", slice(1, None))):
         out[temperature] = {
