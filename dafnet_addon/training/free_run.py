@@ -119,10 +119,12 @@ def upper_loss(made: Tensor, true: Tensor, calm: Tensor, given: Tensor) -> Tenso
     """Loss of made upper bodies (B, T, 14, 3) beside the captured; ``calm`` (B,) where z = 0;
     ``given`` (B, T, 14).
     """
+    # In this order: gradients are summed backwards through it, and runs resume to the last bit.
+    missed = _missed(made, true, given)
     height = (made[..., 0, 2] - true[..., 0, 2]).abs().mean()
     return (
         _tracking_error(made, true, calm)
-        + _GIVEN * _missed(made, true, given)
+        + _GIVEN * missed
         + _HEIGHT * height
         + _BONE * _bone_error(made, _UPPER_BONES)
     )

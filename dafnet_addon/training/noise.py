@@ -231,7 +231,7 @@ def _base(predictor: ActionPredictor | None, batch: Batch) -> Tensor:
     return torch.cat([predictor(batch.past, batch.occupancy), batch.root], dim=-1)
 
 
-def _condition(flow: BodyFlow, part: str, told: Tensor, pose: Tensor) -> Tensor:
+def _condition(flow: BodyFlow, part: str, base: Tensor, pose: Tensor) -> Tensor:
     """The condition of a part's flow (B, T, …) in FREE mode, beside ``pose`` (B, T, 66)."""
     nothing = torch.zeros_like(pose)
     return flow.condition(part, base, nothing, nothing[..., :22], pose)
