@@ -22,11 +22,12 @@ from dafnet_addon.data.capture.cuts import bad_frames
 from dafnet_addon.data.capture.mocap import Clip, read_clips
 from dafnet_addon.data.motion.canonical import Calibration, calibrate, canonical
 
-_PLANTED, _STILL = 0.25, 0.04  # metres a second: of a toe on the floor, of a hand that rests
-_TOES, _WRISTS = (
-    FEET,
-    WRISTS,
-)
+_PLANTED = 0.25
+"""Metres a second of a toe on the floor, under which it stands."""
+_STILL = 0.04
+"""Metres a second of a hand, under which it rests."""
+_RESTS = 20
+"""Frames that a joint has to stay for."""
 _SLIDE, _TOE, _ANKLE, _WRIST, _SEAT = (
     "toe slide",
     "toe moved",
@@ -63,7 +64,7 @@ def pairs(clips: list[Clip]) -> list[Pair]:
         for clip in own:
             after = canonical(clip, body)
             before = clip.joints * body.scale
-            toes = before[:, _TOES, 2].min(1)
+            toes = before[:, FEET, 2].min(1)
             before = before - (0.0, 0.0, float(np.percentile(toes, 8)) - TOE_HEIGHT)
             out.append((before, after))
 
@@ -78,7 +79,7 @@ def _wander(joints: np.ndarray) -> float:
     return float(np.linalg.norm(joints - joints.mean(0), axis=-1).max())
 
 
-def measured(found: list[Pair]) -> dict[str, tuple[float, float, int]]:
+def measure(found: list[Pair]) -> dict[str, tuple[float, float, int]]:
     """Mean before and after (millimetres) of each figure of a source, and how many frames or
     episodes it is of.
 
@@ -91,30 +92,33 @@ def measured(found: list[Pair]) -> dict[str, tuple[float, float, int]]:
         if len(before) < 3:
             continue
 
-        for toe in _TOES:
+        for toe in FEET:
             planted = (before[:-1, toe, 2] < 0.05) & (_speed(before[:, toe]) < _PLANTED)
             steps = [
                 np.linalg.norm(np.diff(j[:, toe, :2], axis=0), axis=-1)[planted]
                 for j in (before, after)
             ]
             values[_SLIDE] += list(zip(*steps, strict=True))
-            values[_TOE] += [
-                (0.0, d) for d in np.linalg.norm(after[:, toe] - before[:, toe], axis=-1)
-            ]
-            values[_ANKLE] += [
-                (0.0, d) for d in np.linalg.norm(after[:, toe - 3] - before[:, toe - 3], axis=-1)
-            ]
+            for name, moved in ((_TOE, toe), (_ANKLE, toe - 3)):
+                away = np.linalg.norm(after[:, moved] - before[:, moved], axis=-1)
+                values[name] += [(0.0, each) for each in away]
 
-        for wrist in _WRISTS:
-            for a, b in runs(_speed(before[:, wrist]) < _STILL, 20):
-                if _wander(before[a:b, joint("spine3")]) > 0.04:
-                    values[_WRIST].append((_wander(before[a:b, wrist]), _wander(after[a:b, wrist])))
-        for a, b in runs(
-            (_speed(before[:, 0]) < 0.1) & (before[:-1, 0, 2] < 0.7) & (before[:-1, 0, 2] > 0.3), 20
-        ):
-            values[_SEAT].append((_wander(before[a:b, 0]), _wander(after[a:b, 0])))
+        for wrist in WRISTS:
+            for start, stop in runs(_speed(before[:, wrist]) < _STILL, _RESTS):
+                if _wander(before[start:stop, joint("spine3")]) > 0.04:
+                    own = [_wander(each[start:stop, wrist]) for each in (before, after)]
+                    values[_WRIST].append((own[0], own[1]))
 
-    return {name: (*(1000 * np.array(v).mean(0)).tolist(), len(v)) for name, v in values.items()}
+        height = before[:-1, PELVIS, 2]
+        seated = (_speed(before[:, PELVIS]) < 0.1) & (height < 0.7) & (height > 0.3)
+        for start, stop in runs(seated, _RESTS):
+            own = [_wander(each[start:stop, PELVIS]) for each in (before, after)]
+            values[_SEAT].append((own[0], own[1]))
+
+    return {
+        name: (*(1000 * np.array(pairs).mean(0)).tolist(), len(pairs))
+        for name, pairs in values.items()
+    }
 
 
 def table(sources: dict[str, list[Pair]]) -> str:
@@ -130,7 +134,7 @@ def table(sources: dict[str, list[Pair]]) -> str:
     )
     rows: list[tuple[str, ...]] = [heads]
     for source, found in sources.items():
-        figures = measured(found)
+        figures = measure(found)
         cells = [source]
         for name in names:
             if name not in figures:
@@ -164,7 +168,7 @@ def _poses(found: list[Pair]) -> list[Pair]:
             joints[:, joint("left_ankle")] - joints[:, joint("right_ankle")], axis=-1
         )
         height = joints[:, PELVIS, 2]
-        unfit = (height < 0.85) | (joints[:, _TOES, 2].min(1) > 0.04)
+        unfit = (height < 0.85) | (joints[:, FEET, 2].min(1) > 0.04)
         return [
             *(np.abs(stride - apart) + 9.0 * unfit for apart in (0.2, 0.65)),
             np.abs(height - 0.55),

@@ -15,7 +15,7 @@ from dafnet_addon.data.motion.retarget import at_seat_height, at_top_height
 from . import furniture
 from .furniture import HERE
 from .motions import make, motion_of
-from .studio import MODE_COLOURS, Studio, furnish, put_pose
+from .studio import MODE_COLOURS, Studio, corners, furnish, put_pose
 from .tasks import TYPING, at_a_desk, training_course
 
 __all__ = ["augmented", "moved_to", "typing"]
@@ -42,31 +42,26 @@ def augmented(studio: Studio) -> Image.Image:
     """Figure 9: how training moves one motion to chairs and desks of other heights."""
     chairs, desks = {"hc": 0.50, "mc": 0.42}, {"hd": 0.80, "md": 0.72}
     source = typing(studio.weights, chairs["hc"], desks["hd"])
+    hands = [END_EFFECTORS["hand_left"], END_EFFECTORS["hand_right"]]
+    seen = corners((-0.65, 0.65), (-0.3, 0.82), (0.0, 1.65))
+
     panels = []
     for chair, desk in (("hc", "hd"), ("hc", "md"), ("mc", "hd"), ("mc", "md")):
         lower = chairs[chair] - chairs["hc"], desks[desk] - desks["hd"]
         motion = motion_of(moved_to(source, *lower) if any(lower) else source, np.zeros((0, 0)))
+
         stage = Stage(62.0)
-        furnish(
-            stage,
-            [(furniture.chair(chairs[chair]), HERE), (furniture.desk(desks[desk], 0.22), HERE)],
-        )
+        pieces = furniture.chair(chairs[chair]), furniture.desk(desks[desk], 0.22)
+        furnish(stage, [(piece, HERE) for piece in pieces])
         put_pose(stage, motion, 75, MODE_COLOURS["FREE" if any(lower) else "EE"])
-        seen = np.array(
-            [(x, y, z) for x in (-0.65, 0.65) for y in (-0.3, 0.82) for z in (0.0, 1.65)]
-        )
         picture = studio.photograph(stage, 390, 350, seen, margin=0.02)
-        hands = [END_EFFECTORS["hand_left"], END_EFFECTORS["hand_right"]]
-        keep = motion.joints[:, hands, 2] - desks[desk]
-        was = source[:, hands, 2] - desks["hd"]
-        panels.append(
-            studio.captioned(
-                picture,
-                f"{chair}, {desk}: chair {chairs[chair]:.2f}, desk {desks[desk]:.2f}",
-                f"hands {100.0 * np.abs(keep - was).mean():.1f} cm off their place to it"
-                if any(lower)
-                else "source, made by the network in EE",
-            )
-        )
+
+        over_desk = motion.joints[:, hands, 2] - desks[desk]
+        before = source[:, hands, 2] - desks["hd"]
+        off = 100.0 * np.abs(over_desk - before).mean()
+        moved = f"hands {off:.1f} cm off their place to it"
+        title = f"{chair}, {desk}: chair {chairs[chair]:.2f}, desk {desks[desk]:.2f}"
+        words = moved if any(lower) else "source, made by the network in EE"
+        panels.append(studio.captioned(picture, title, words))
 
     return studio.grid([panels])

@@ -12,7 +12,7 @@ from dafnet_addon.model.systems import sampler_of
 from . import furniture
 from .furniture import HERE
 from .motions import free, make_with, target_error
-from .studio import MODE_COLOURS, Studio, draw_targets, furnish, moment_picture, put_pose
+from .studio import MODE_COLOURS, Studio, corners, draw_targets, furnish, moment_picture, put_pose
 from .tasks import drawing, sorting
 
 __all__ = ["compared_free", "compared_led"]
@@ -32,6 +32,7 @@ def compared_free(studio: Studio) -> Image.Image:
         (furniture.bookcase(), Place((-0.95, 0.05), -np.pi / 2)),
         (furniture.bench(0.40), Place((1.9, 1.45), 0.3)),
     ]
+
     down = walked.rests[1]
     moments = {
         "walks": down.start - 70,
@@ -41,18 +42,16 @@ def compared_free(studio: Studio) -> Image.Image:
         "gets up": down.stop + 17,
         "leaves": down.stop + 54,
     }
+
     rows = []
     for system, sampler in _systems(studio).items():
         motion = make_with(sampler, pieces, free(walked))
-        rows.append(
-            [
-                studio.captioned(
-                    moment_picture(studio, pieces, motion, frame, 58.0, 262, 290),
-                    f"{system}: {name}",
-                )
-                for name, frame in moments.items()
-            ]
+        pictures = (
+            moment_picture(studio, pieces, motion, frame, 58.0, 262, 290)
+            for frame in moments.values()
         )
+        titles = (f"{system}: {name}" for name in moments)
+        rows.append([studio.captioned(*each) for each in zip(pictures, titles, strict=True)])
 
     return studio.grid(rows)
 
@@ -61,25 +60,25 @@ def compared_led(studio: Studio) -> Image.Image:
     """Figure 16: every system, its head and hands led."""
     systems = _systems(studio)
     order = [*(name for name in systems if name != "ours"), "ours"]
+
     rows = []
     for (pieces, controls), frame, toward, low in (
         (sorting(), 60, 60.0, 0.55),
         (drawing(), 100, -40.0, 0.90),
     ):
-        seen = np.array(
-            [(x, y, z) for x in (-0.45, 0.45) for y in (-0.15, 0.50) for z in (low, low + 0.85)]
-        )
+        seen = corners((-0.45, 0.45), (-0.15, 0.50), (low, low + 0.85))
         panels = []
         for system in order:
             motion = make_with(systems[system], pieces, controls)
+
             stage = Stage(toward)
             furnish(stage, pieces)
             put_pose(stage, motion, frame, MODE_COLOURS["EE"])
             draw_targets(stage, motion, controls, [frame])
             picture = studio.photograph(stage, 520, 360, seen, margin=0.0)
-            panels.append(
-                studio.captioned(picture, system, f"{target_error(motion, controls):.1f} cm off")
-            )
+
+            off = target_error(motion, controls)
+            panels.append(studio.captioned(picture, system, f"{off:.1f} cm off"))
 
         rows.append(panels)
 

@@ -22,6 +22,7 @@ from .studio import (
     MODE_COLOURS,
     PALE,
     Studio,
+    corners,
     draw_path,
     draw_targets,
     frames_along,
@@ -53,25 +54,23 @@ def copied(studio: Studio) -> Image.Image:
         ("seat 0.60, desk 0.88", 0.15, [(furniture.stool(0.60), HERE)]),
         (f"desk {desk + standing:.2f}", standing, []),
     ]
+    seen = corners((-0.65, 0.65), (-0.3, 0.82), (0.0, 1.75))
+
     rows = []
     for task, course in (("writes", partial(training_course, HANDWRITING)), ("greets", greeting)):
         asked = at_a_desk(course, desk)
-        source = make(
-            studio.weights,
-            [(furniture.chair(seat), HERE), (furniture.desk(desk, 0.22), HERE)],
-            asked,
-        )
+        own = [(furniture.chair(seat), HERE), (furniture.desk(desk, 0.22), HERE)]
+        source = make(studio.weights, own, asked)
+
         panels = []
         for name, up, seats in combinations:
             pieces = [*seats, (furniture.desk(desk + up, 0.22), HERE)]
             given = source.joints[:, list(UPPER)] + (0.0, 0.0, up)
             motion = make(studio.weights, pieces, replace(asked, mode="FULL", upper_body=given))
+
             stage = Stage(48.0)
             furnish(stage, pieces)
             put_pose(stage, motion, 75, MODE_COLOURS["FULL"])
-            seen = np.array(
-                [(x, y, z) for x in (-0.65, 0.65) for y in (-0.3, 0.82) for z in (0.0, 1.75)]
-            )
             gap = 100.0 * np.linalg.norm(motion.joints[:, list(UPPER)] - given, axis=-1).mean()
             picture = studio.photograph(stage, 390, 350, seen, margin=0.02)
             panels.append(
@@ -138,6 +137,7 @@ def through_a_room(studio: Studio) -> Image.Image:
         (FURNITURE["Desk"], Place((4.1, 1.65), np.pi)),
         (furniture.bookcase(), Place((-3.75, 1.80), np.pi)),
     ]
+
     rest = walked.rests[2]
     frames = np.arange(len(walked.path))
     modes = np.where((frames >= rest.start) & (frames < (rest.stop - 1)), "EE", "FREE")
@@ -150,20 +150,16 @@ def through_a_room(studio: Studio) -> Image.Image:
     furnish(stage, pieces)
     draw_path(stage, walked.path)
     stage.line(hand, ASKED, 0.010)
+
     picked: list[int] = []
     for before, after in zip(walked.rests[:-1], walked.rests[1:], strict=True):
-        picked += frames_along(
-            walked.path, (before.stop - 1) + (55 if picked else 0), after.start - 30, 0.90
-        )
+        first = (before.stop - 1) + (55 if picked else 0)
+        picked += frames_along(walked.path, first, after.start - 30, 0.90)
         picked.append((after.start + after.stop - 1) // 2)
 
     for k, frame in enumerate(picked):
-        put_pose(
-            stage,
-            motion,
-            frame,
-            mixed(PALE, MODE_COLOURS[modes[frame]], 0.40 + 0.60 * k / (len(picked) - 1)),
-        )
+        share = 0.40 + 0.60 * k / (len(picked) - 1)
+        put_pose(stage, motion, frame, mixed(PALE, MODE_COLOURS[modes[frame]], share))
 
     seen = np.concatenate(stage.seen)
     for wall in (
@@ -172,9 +168,9 @@ def through_a_room(studio: Studio) -> Image.Image:
     ):
         stage.furnish((wall,), HERE)
 
+    off = target_error(motion, controls, 15)
     words = (
-        "blue: FREE; orange: EE, from half a second on the hand is "
-        f"{target_error(motion, controls, 15):.1f} cm off the red line"
+        f"blue: FREE; orange: EE, from half a second on the hand is {off:.1f} cm off the red line"
     )
     title = f"{len(motion) / MODEL_FPS:.0f} seconds: sofa, whiteboard, chair"
     return studio.captioned(studio.photograph(stage, 1600, 530, seen, margin=0.02), title, words)

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -27,6 +28,7 @@ __all__ = [
     "PALE",
     "STRIP",
     "Studio",
+    "corners",
     "draw_path",
     "draw_targets",
     "frames_along",
@@ -135,34 +137,26 @@ class Studio:
         fine, radius = 4, max(4, round(0.105 * picture.width))
         size = 2 * round(1.45 * radius)
         disc = Image.new("RGBA", (fine * size, fine * size))
-        pen = ImageDraw.Draw(disc)
         middle, rim = fine * size / 2, fine * radius
-        pen.ellipse(
-            [middle - 1.4 * rim, middle - 1.4 * rim, middle + 1.4 * rim, middle + 1.4 * rim],
-            (255, 255, 255, 235),
-        )
-        pen.ellipse(
-            [middle - rim, middle - rim, middle + rim, middle + rim],
-            outline=(*_FAINT, 255),
-            width=fine,
-        )
+
+        pen = ImageDraw.Draw(disc)
+        pen.ellipse([middle - 1.4 * rim] * 2 + [middle + 1.4 * rim] * 2, (255, 255, 255, 235))
+        pen.ellipse([middle - rim] * 2 + [middle + rim] * 2, outline=(*_FAINT, 255), width=fine)
+
         font = ImageFont.load_default(0.34 * rim)
         for k, share in enumerate(action):
             angle = 2.0 * np.pi * k / len(action) - 0.5 * np.pi
             ray = np.array([np.cos(angle), np.sin(angle)])
+
             line = Image.new("RGBA", disc.size)
             ends = [(middle, middle), tuple((middle + rim * ray).tolist())]
             ImageDraw.Draw(line).line(ends, (*INK, round(255 * float(share))), round(0.13 * rim))
             disc.alpha_composite(line)
-            likely = float(share) >= float(action.max())
+
+            colour = INK if float(share) >= float(action.max()) else _FAINT
             label = middle + 1.2 * rim * ray
-            ImageDraw.Draw(disc).text(
-                (label[0], label[1]),
-                str(k + 1),
-                (*(INK if likely else _FAINT), 255),
-                font,
-                anchor="mm",
-            )
+            place = label[0], label[1]
+            ImageDraw.Draw(disc).text(place, str(k + 1), (*colour, 255), font, anchor="mm")
 
         disc = disc.resize((size, size), Image.Resampling.LANCZOS)
         out = picture.copy()
@@ -221,12 +215,15 @@ def draw_targets(stage: Stage, motion: Motion, controls: Controls, frames: Seque
                 stage.ball(target[frame], ASKED, 0.035)
 
 
+def corners(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) -> np.ndarray:
+    """Corners (8, 3) of an upright box between these coordinates: what a picture is to show."""
+    return np.array(list(product(x, y, z)))
+
+
 def corners_around(motion: Motion, frame: int) -> np.ndarray:
     """Corners of the room that a body takes, standing at this frame."""
     ground = motion.joints[frame, PELVIS] * (1.0, 1.0, 0.0)
-    return ground + np.array(
-        [(x, y, z) for x in (-0.7, 0.7) for y in (-0.7, 0.7) for z in (0.0, 1.8)]
-    )
+    return ground + corners((-0.7, 0.7), (-0.7, 0.7), (0.0, 1.8))
 
 
 def moment_picture(
