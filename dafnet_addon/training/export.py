@@ -161,11 +161,8 @@ def export(
 
     tensors = {}
     for name, array in tensors_of(flow, predictor, statistics).items():
-        inverted = (
-            name.count(".") == 2
-            and name.endswith(".weight")
-            and name[:5] in ("upper", "lower", "whole")
-        )
+        is_of_flow = name[:5] in ("upper", "lower", "whole")
+        inverted = is_of_flow and name.count(".") == 2 and name.endswith(".weight")
         if array.ndim < 2 or array.size < 1000 or inverted:
             tensors[name] = array
         else:

@@ -11,9 +11,12 @@ from ..data.furnish.shapes import DEEPEST, FARTHEST, ShapeBank
 
 __all__ = ["DeviceBank"]
 
-# Pairs of a root and a shape, of which 2640 points each are computed: what stays in a core's cache;
-# enough to keep another device busy.
-_AT_ONCE, _AT_ONCE_ELSEWHERE = 256, 4096
+_AT_ONCE = 256
+"""Pairs of a root and a shape, of which 2640 points each are computed: what stays in a core's
+cache.
+"""
+_AT_ONCE_ELSEWHERE = 4096
+"""Such pairs: enough to keep another device busy."""
 _STEP = (FARTHEST - DEEPEST) / 255.0
 
 
@@ -25,23 +28,19 @@ class DeviceBank:
         if not self.count:
             return
 
+        values = np.concatenate([shape.values.ravel() for shape in bank.shapes])
+        self.values = torch.from_numpy(values).to(device)
+
         sizes = np.array([shape.values.shape for shape in bank.shapes])
         first = np.concatenate([[0], np.cumsum(sizes.prod(1))[:-1]])
-        reach = [
-            np.linalg.norm(
-                np.maximum(
-                    np.abs(s.origin), np.abs(s.origin + s.spacing * np.array(s.values.shape))
-                )[:2]
-            )
-            for s in bank.shapes
+        self.sizes = torch.as_tensor(sizes, device=device)
+        self.first = torch.as_tensor(first, device=device)
+
+        ends = [
+            (shape.origin, shape.origin + shape.spacing * np.array(shape.values.shape))
+            for shape in bank.shapes
         ]
-        self.values = torch.from_numpy(
-            np.concatenate([shape.values.ravel() for shape in bank.shapes])
-        ).to(device)
-        self.sizes, self.first = (
-            torch.as_tensor(sizes, device=device),
-            torch.as_tensor(first, device=device),
-        )
+        reach = [np.linalg.norm(np.abs(corner).max(0)[:2]) for corner in ends]
 
         def single(values: np.ndarray) -> Tensor:
             return torch.as_tensor(np.asarray(values), dtype=torch.float32, device=device)
@@ -76,6 +75,8 @@ class DeviceBank:
     def _seen(self, placed: Tensor, root: Tensor) -> Tensor:
         """Occupancy (N, 2640) of one shape (N, 5) from one root (N, 3) each."""
         number = placed[:, 0].long()
+
+        # The sensor's points in the shape's own frame, then in cells of its grid.
         turn, own = (root[:, 2] - placed[:, 3])[:, None], placed[:, 3]
         away = root[:, :2] - placed[:, 1:3]
         x0 = (own.cos() * away[:, 0] + own.sin() * away[:, 1])[:, None]
@@ -86,10 +87,12 @@ class DeviceBank:
         at = (torch.stack([x, y, z], -1) - self.origins[number][:, None]) / self.spacings[number][
             :, None, None
         ]
+
         size = self.sizes[number][:, None]
         within = ((at > 0) & (at < size - 1)).all(-1)
         cell = torch.minimum(at.clamp_min(0).long(), size - 2)
         share = at - cell
+
         stride_y, stride_x = size[..., 2], size[..., 1] * size[..., 2]
         node = (
             self.first[number][:, None]

@@ -24,7 +24,7 @@ def map_in_processes(
     """``task`` of each item, in order, in ``processes`` (None: one for each core), each of which
     first calls ``start``.
 
-    Where one is enough it is this one, without what a new process costs.
+    Where one is enough, it is the process that calls, which saves the cost of a new one.
     """
     processes = max(1, min(processes or cores(), len(items)))
     if processes == 1:

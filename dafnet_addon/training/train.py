@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -54,43 +55,30 @@ def train(
 
     Under ``torchrun`` all processes train one part after another, together.
     """
+    train_one = partial(
+        train_part,
+        dataset=dataset,
+        folder=folder,
+        model=model,
+        config=config,
+        device=device,
+        begin_with=begin_with,
+    )
     minutes = max(config.minutes_predictor + config.minutes_flow, 1e-9)
     first = config.minutes_predictor / minutes
     if model.predicts:
-        train_part(
-            "predictor",
-            dataset,
-            folder,
-            model,
-            config,
-            progress=lambda part, share, loss: progress(first * share),
-            device=device,
-            begin_with=begin_with,
-        )
+        train_one("predictor", progress=lambda part, share, loss: progress(first * share))
 
     parts = tuple(system_named(model.system).partition)
     if ranks.is_distributed():
         for part in parts:
-            train_part(part, dataset, folder, model, config, device=device, begin_with=begin_with)
+            train_one(part)
         return
 
     threads = max(1, min(torch.get_num_threads(), cores()) // len(parts))
     with ProcessPoolExecutor(len(parts), mp_context=multiprocessing.get_context("spawn")) as pool:
         begin = time.monotonic()
-        jobs = [
-            pool.submit(
-                train_part,
-                part,
-                dataset,
-                folder,
-                model,
-                config,
-                threads=threads,
-                device=device,
-                begin_with=begin_with,
-            )
-            for part in parts
-        ]
+        jobs = [pool.submit(train_one, part, threads=threads) for part in parts]
         while wait(jobs, timeout=2.0).not_done:
             progress(first + (1.0 - first) * config.share(0, time.monotonic() - begin))
 
