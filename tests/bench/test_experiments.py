@@ -4,17 +4,15 @@ the tables.
 
 import itertools
 import json
-import runpy
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kit.places import ROOT
-
 torch = pytest.importorskip("torch", reason="the comparisons need torch")
 
+from benchmarks import experiments, speed  # noqa: E402
 from dafnet_addon.baselines.samp import SampConfig  # noqa: E402
 from dafnet_addon.core.root import raw_root_from_joints  # noqa: E402
 from dafnet_addon.core.skeleton import REST  # noqa: E402
@@ -27,7 +25,6 @@ from dafnet_addon.training.parts import load_run  # noqa: E402
 
 pytestmark = pytest.mark.torch
 
-BENCHMARKS = ROOT / "benchmarks"
 TINY = ModelConfig(
     predictor_code=8,
     predictor_width=16,
@@ -55,9 +52,6 @@ def _clip(name: str) -> HeldClip:
 def test_all_systems_train_and_land_in_the_tables(
     dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    import experiments
-
     monkeypatch.setitem(experiments.FLOWS["MoGlow"], "steps_whole", 3)
     training = TrainingConfig(batch=4, minutes_predictor=0.005, warmup=2)
     arguments = dataset, tmp_path, 0.02, 1, TINY, training, TINY_SAMP
@@ -114,7 +108,7 @@ def test_all_systems_train_and_land_in_the_tables(
             and truth["sits_within_6cm"] == 1.0
             and truth["foot_sliding_per_frame"] < 0.2
         )
-    rows = experiments.paired(clips, tmp_path, tmp_path, draws=20).splitlines()[2:]
+    rows = experiments.compare_pairs(clips, tmp_path, tmp_path, draws=20).splitlines()[2:]
     assert [row.split(" | ")[0].strip("| ") for row in rows] == list(experiments.BUDGETS)
     of_one, kept = (
         json.loads((tmp_path / f"{name}.json").read_text(encoding="utf-8"))
@@ -125,10 +119,7 @@ def test_all_systems_train_and_land_in_the_tables(
     assert total / weight == pytest.approx(there, abs=1e-4)
 
 
-def test_ratios_stand_beside_the_papers(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    import experiments
-
+def test_ratios_stand_beside_the_papers():
     def values(slides: float) -> dict[str, object]:
         run: dict[str, object] = {"clips": 1, "seat_episodes": 0, "foot_sliding_per_frame": slides}
         run["intervals"] = {"foot_sliding_per_frame": [0.0, 1.0]}
@@ -147,13 +138,12 @@ def test_ratios_stand_beside_the_papers(monkeypatch: pytest.MonkeyPatch):
     assert "×" not in next(line for line in text.splitlines() if line.startswith("| DAFNet"))
 
 
-def test_speed_of_every_system_beside_the_memory(tmp_path: Path):
-    measure = runpy.run_path(str(BENCHMARKS / "speed.py"))["measure"]
+def test_speed_of_every_system_beside_the_memory(monkeypatch: pytest.MonkeyPatch):
     clock = itertools.count()
     # whatever is timed takes a second
-    measure.__globals__["perf_counter"] = lambda: float(next(clock))
+    monkeypatch.setattr(speed, "perf_counter", lambda: float(next(clock)))
     small = replace(TINY, width=32)
-    report, text = measure(None, lambda share: None, small, 4, TINY_SAMP)
+    report, text = speed.measure(None, lambda share: None, small, 4, TINY_SAMP)
     each = [name for name in ("DAFNet", "AP-P", "MoGlow") for _ in range(2)]
     assert [row["system"] for row in report["rows"]] == [*each, "SAMP", "DAFNet, these weights"]
     for row in report["rows"]:

@@ -13,6 +13,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
+from benchmarks import ablation  # noqa: E402
 from dafnet_addon import cli  # noqa: E402
 from dafnet_addon.core.errors import InputError  # noqa: E402
 from dafnet_addon.core.root import raw_root_from_joints  # noqa: E402
@@ -29,11 +30,9 @@ from dafnet_addon.training.evaluation.real_report import real_report  # noqa: E4
 from dafnet_addon.training.parts import load_run  # noqa: E402
 from dafnet_addon.training.train import train_part  # noqa: E402
 from dafnet_addon.training.validation import held_out_losses, read_record, score, validate_steps  # noqa: E402
-from kit.places import ROOT  # noqa: E402
 
 pytestmark = pytest.mark.torch
 
-BENCHMARKS = ROOT / "benchmarks"
 TINY = ModelConfig(
     predictor_code=8,
     predictor_width=16,
@@ -172,7 +171,7 @@ def test_what_fails_leaves_all_as_it_was(described: Path, tmp_path: Path, monkey
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(validation, "measured", fails)
+        patch.setattr(validation, "measure_clips", fails)
         with pytest.raises(KeyboardInterrupt):
             list(validate_steps(run, described, CLIPS))
     assert [(run / name).read_bytes() for name in names] == before
@@ -338,9 +337,6 @@ def test_the_commands(described: Path, tmp_path: Path, monkeypatch, capsys):
 def test_what_real_pieces_give_is_measured_in_equal_time(
     described: Path, tmp_path: Path, monkeypatch
 ):
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    import ablation
-
     asked = []
 
     def prepare(folder: Path, out: Path, windows: int, processes: int, seed: int) -> None:
@@ -368,13 +364,10 @@ def test_what_real_pieces_give_is_measured_in_equal_time(
         ablation.furniture(*arguments, weights)
 
 
-def test_differences_are_paired(monkeypatch):
-    monkeypatch.syspath_prepend(str(BENCHMARKS))
-    import ablation
-
+def test_differences_are_paired():
     rng = np.random.default_rng(0)
     worse = rng.uniform(0.0, 30.0, 30)
-    mean, low, high = ablation.paired(worse - 2.0, worse)
+    mean, low, high = ablation.paired_difference(worse - 2.0, worse)
     assert mean == pytest.approx(-2.0) and low == pytest.approx(-2.0) == pytest.approx(high)
-    mean, low, high = ablation.paired(worse - rng.normal(2.0, 1.0, 30), worse)
+    mean, low, high = ablation.paired_difference(worse - rng.normal(2.0, 1.0, 30), worse)
     assert low < mean < high and high - low < 1.5
