@@ -27,6 +27,7 @@ __all__ = [
     "Stop",
     "facing",
     "route",
+    "turn_seconds",
     "walked_along",
 ]
 
@@ -110,7 +111,7 @@ def _wrapped(angle: float) -> float:
     return float((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
-def _turn_seconds(turn: float) -> float:
+def turn_seconds(turn: float) -> float:
     """How long people take to turn by ``turn`` radians: measured 0.8 s for 30 degrees, 1.2 s for
     90, 1.7 s for 180.
     """
@@ -258,17 +259,17 @@ def walked_along(
         return float(np.interp(time, clock, heading))
 
     leave_turn = _wrapped(heading[0] - origin.yaw)
-    wait = 0.0 if origin.seated else 0.5 * (_turn_seconds(leave_turn) - 0.6)
+    wait = 0.0 if origin.seated else 0.5 * (turn_seconds(leave_turn) - 0.6)
     leave = at(_TURN_AWAY) if origin.seated else -wait
     for _ in range(3):  # the turn's length depends on the heading at its end
-        leave_end = leave + _turn_seconds(leave_turn)
+        leave_end = leave + turn_seconds(leave_turn)
         leave_turn = _wrapped(walked(leave_end) - origin.yaw)
 
     arrive_turn = _wrapped(goal.yaw - heading[-1])
-    linger = 0.0 if goal.seated else 0.5 * (_turn_seconds(arrive_turn) - 0.6)
+    linger = 0.0 if goal.seated else 0.5 * (turn_seconds(arrive_turn) - 0.6)
     arrive_end = at(arc[-1] - _SETTLED) if goal.seated else clock[-1] + linger
     for _ in range(3):
-        arrive = arrive_end - _turn_seconds(arrive_turn)
+        arrive = arrive_end - turn_seconds(arrive_turn)
         arrive_turn = _wrapped(goal.yaw - walked(arrive))
 
     frames = int(np.ceil((clock[-1] + wait + linger) * fps))

@@ -5,13 +5,16 @@ JSON.
 import json
 import math
 import unicodedata
+from collections.abc import Iterable
+from difflib import get_close_matches
 from numbers import Number
 from typing import Any
 
-__all__ = ["metres", "printable", "read_json"]
+__all__ = ["metres", "nearest_known", "printable", "read_json"]
 
 _DEEPEST = 32  # lists and objects within each other
 _LONGEST = 18  # digits of a whole number
+_NAMED = 12  # words that a sentence names
 
 
 def printable(words: object, max_length: int = 200) -> str:
@@ -32,6 +35,25 @@ def printable(words: object, max_length: int = 200) -> str:
 def metres(length: float) -> str:
     """A length in metres with its unit, in two digits or more: 0.0095 m, 95 m, 1,250 m."""
     return f"{length:,.0f} m" if length >= 10.0 else f"{length:.2g} m"
+
+
+def nearest_known(word: str, known: Iterable[str]) -> str:
+    """What to say of a ``word`` that is not known: a question for the one most like it, else all of
+    them (some, where they are many).
+
+    >>> nearest_known("secnds", ("seconds", "facing"))
+    "did you mean 'seconds'?"
+    """
+    words = sorted({*known})
+    like = get_close_matches(word.lower(), [each.lower() for each in words], 1)
+    for each in words:
+        if [each.lower()] == like:
+            return f"did you mean '{each}'?"
+
+    if not words:
+        return "nothing is known here."
+    listed = ", ".join(f"'{each}'" for each in words[:_NAMED])
+    return f"known are {listed}{' and more' if len(words) > _NAMED else ''}."
 
 
 def _brief(thing: object) -> str:

@@ -1,5 +1,7 @@
-"""From what a character is to do in a scene to its root path: places to sit found on meshes, ways
-round furniture.
+"""From what a character is to do in a scene to its root path, hands and head: tasks planned one
+after another, places to sit, work and write found on meshes, ways round furniture.
+
+``planner.plan_tasks`` makes a plan of ``tasks``; what it is made of can be used alone:
 
 >>> import numpy as np
 >>> from dafnet_addon import Box

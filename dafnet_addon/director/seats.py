@@ -14,7 +14,7 @@ from ..core.solids import Box, Mesh
 from ..core.text import metres
 from .surfaces import HeightField, height_field, parts_of_surfaces
 
-__all__ = ["SeatPlace", "on_a_seat", "seat_of"]
+__all__ = ["SeatPlace", "on_a_seat", "rectangle_axes", "seat_of"]
 
 _CELL = 0.03
 """Metres; of the cells in which furniture is looked at from above."""
@@ -127,7 +127,7 @@ def _ends_of_rows(cells: np.ndarray) -> np.ndarray:
     return cells[np.concatenate([starts, np.append(starts[1:], len(cells)) - 1])]
 
 
-def _axes(cells: np.ndarray) -> np.ndarray:
+def rectangle_axes(cells: np.ndarray) -> np.ndarray:
     """The two directions (2, 2) of the smallest rectangle around points (N, 2), the longer side
     first.
     """
@@ -315,7 +315,7 @@ def seat_of(
     level, cells = found
     places = field.middles(cells)
     yield 1.0
-    axes = _axes(field.middles(_ends_of_rows(cells)))
+    axes = rectangle_axes(field.middles(_ends_of_rows(cells)))
     yield 1.0
     forward, back = _facing(
         field, places=places, level=level, floor=floor, axes=axes, towards=towards, near=near

@@ -1,0 +1,417 @@
+"""Somebody on the way through his tasks: where he is, and how he gets from there to a place, a seat
+or a bed.
+
+Canonical metres, world.
+"""
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.errors import InputError
+from ..core.paths import Stop, facing, route
+from ..core.progress import within
+from ..core.root import RootPath, forward_of
+from ..core.rotations import rotate, yaw_matrix
+from ..core.series import smoothstep
+from ..core.solids import Box, Mesh
+from ..core.trails import trail
+from .beds import Bed
+from .others import APART, Others
+from .places import Place, has_room, seated_pelvis, standing_pelvis
+from .plans import Hold
+from .room import Piece, Room
+from .seats import SeatPlace
+from .surfaces import boxes_of, surface_points
+from .track import Track
+from .walks import ways
+
+__all__ = ["SPEED", "Person", "Way"]
+
+SPEED = 1.1
+"""Metres a second, of walking where a task names none."""
+
+_SAME_SEAT = 0.2  # metres
+_THERE = 0.3  # metres within which one is there already
+_FRONT = 0.85  # metres before a seat, from which one comes straight
+_SIDE = 0.70  # metres to the side of a seat, from which one comes round a desk before it
+_STANDS_BEFORE = 0.6  # metres before a seat, where one stands who has got up
+_ROUND_SEAT = 1.4  # metres around a seat in which anything may be in the way
+_BODY = (0.50, 1.36)  # metres over the floor, from thighs to chest
+_OVER_SEAT = 0.12  # metres over a seat's top that belong to it
+_CLEAR = 0.18  # metres from the body's axis that need no other way to a seat
+_SLIPS_BY = 0.02  # metres from it, at least
+_PATIENCE = 30.0  # seconds that one waits for others
+_LOOKS_AGAIN = 0.25  # seconds between two tries to go
+_HALT = 0.4  # seconds on a bed's edge before one lies down
+_LIES_DOWN = 3.5  # seconds
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way that is not gone yet: ``path`` from one frame after the start, to rest at ``goal``."""
+
+    path: RootPath
+    goal: Stop
+
+
+class Person:
+    """``name`` is for what is said; ``size``: over the canonical body; ``begins``: second of the
+    shot in which his first frame is. He is nowhere (``track`` None) until his start or his first
+    task says where.
+    """
+
+    def __init__(self, room: Room, fps: float, size: float, begins: float, others: Others) -> None:
+        self.room, self.fps, self.size, self.begins = room, fps, size, begins
+        self.others = others
+        self.track: Track | None = None
+        self.seat: SeatPlace | None = None
+        self.seat_name = ""
+        self.bed: Bed | None = None
+        self.holds: list[Hold] = []
+
+    @property
+    def here(self) -> Track:
+        """His track; he is somewhere."""
+        assert self.track is not None
+        return self.track
+
+    @property
+    def place(self) -> Place:
+        return Place(self.here.position, self.here.yaw)
+
+    @property
+    def pelvis(self) -> float:
+        """Its height over the world's zero, sitting or standing."""
+        return standing_pelvis(self.room.floor) if self.seat is None else seated_pelvis(self.seat)
+
+    @property
+    def sits(self) -> bool:
+        return self.seat is not None and self.bed is None
+
+    @property
+    def frames(self) -> int:
+        return self.track.frames if self.track is not None else 0
+
+    @property
+    def now(self) -> float:
+        """Second of the shot."""
+        return self.begins + self.frames / self.fps
+
+    def appear(self, position: Sequence[float] | np.ndarray, yaw: float) -> None:
+        """Be somewhere from the first frame on."""
+        x, y = position
+        self.track = Track((float(x), float(y)), yaw, self.room.floor, self.fps)
+
+    def leaves(self) -> Stop:
+        """Where he gets up or sets out from."""
+        if self.bed is not None:
+            spot = self.bed.seat
+            return Stop(_pair(spot.position), spot.yaw, 0.0, seated=True)
+        at = self.here.position
+        return Stop(_pair(at), self.here.yaw, 0.0, seated=self.seat is not None)
+
+    def way(
+        self, position: np.ndarray, yaw: float | None, speed: float = SPEED
+    ) -> Generator[float, None, Way]:
+        """The way to stand at ``position`` (2,), facing ``yaw`` or where one comes to. Raises
+        InputError where there is none.
+        """
+        if self.track is None:
+            return Way(RootPath(np.zeros((0, 3)), np.zeros(0)), Stop(_pair(position), yaw or 0.0))
+        here = self.leaves()
+        left = yield from within(self._sides_of_own_seat(), 0.0, 0.3)
+        goal = Stop(_pair(position), here.yaw if yaw is None else yaw, 0.0)
+        if not here.seated and np.linalg.norm(position - here.position) < _THERE:
+            return Way(RootPath(np.zeros((0, 3)), np.zeros(0)), goal)
+        made = self._routed(here, left, (), goal, yaw is None, speed)
+        return (yield from within(made, 0.3, 1.0))
+
+    def way_to_seat(self, piece: Piece, seat: SeatPlace) -> Generator[float, None, Way]:
+        """The way to sit down on a seat of a piece, straight or, where a desk is before it, from a
+        side. Raises InputError where there is none.
+        """
+        goal = Stop(_pair(seat.position), seat.yaw, 0.0, seated=True)
+        if self.track is None:
+            return Way(RootPath(np.zeros((0, 3)), np.zeros(0)), goal)
+        left = yield from within(self._sides_of_own_seat(), 0.0, 0.2)
+        comes = yield from within(self._sides(piece.name, piece.solids, seat), 0.2, 0.5)
+        made = self._routed(self.leaves(), left, comes, goal, False, SPEED)
+        return (yield from within(made, 0.5, 1.0))
+
+    def way_up(self) -> Generator[float, None, Way]:
+        """The way to stand before the seat that he is on, or beside it where a desk is before
+        it.
+        """
+        here = self.leaves()
+        left = yield from self._sides_of_own_seat()
+        goal = left[-1] if left else here.position + _STANDS_BEFORE * forward_of(here.yaw)
+        stop = Stop(_pair(goal), here.yaw, 0.0)
+        via = map(_pair, left[:-1])
+        path = route(here, *via, stop, fps=self.fps, floor=self.room.floor).path
+        return Way(RootPath(path.position[1:], path.yaw[1:]), stop)
+
+    def _sides_of_own_seat(self) -> Generator[float, None, tuple[np.ndarray, ...]]:
+        """Points (2,) by which he leaves the seat that he is on."""
+        spot = self.bed.seat if self.bed is not None else self.seat
+        if spot is None:
+            return ()
+        own = self.room.pieces().get(self.seat_name)
+        found = yield from self._sides(self.seat_name, own.solids if own else (), spot)
+        return found[::-1]
+
+    def _sides(
+        self, name: str, own: Sequence[Box | Mesh], seat: SeatPlace
+    ) -> Generator[float, None, tuple[np.ndarray, ...]]:
+        """Points (2,) by which one comes to a seat, none where one comes straight."""
+        ahead = forward_of(seat.yaw)
+        across = np.array([ahead[1], -ahead[0]])
+        boxes = yield from boxes_of.steps(self.room.solids)
+        around = seat.position - _ROUND_SEAT, seat.position + _ROUND_SEAT
+        points: list[tuple[str, np.ndarray]] = []
+        lowest = max(_BODY[0], seat.height - self.room.floor + _OVER_SEAT)
+        for solid, box in zip(self.room.solids, boxes, strict=True):
+            if any(solid is each for each in own) or np.isnan(box).any():
+                continue
+            if (box[1, :2] < around[0]).any() or (box[0, :2] > around[1]).any():
+                continue
+            found = surface_points([solid], 0.04, around)
+            over = found[:, 2] - self.room.floor
+            points.append((solid.name, found[(over > lowest) & (over < _BODY[1]), :2]))
+            yield 0.5
+
+        goal = Stop(_pair(seat.position), seat.yaw, 0.0, seated=True)
+        sides = [(seat.position + side * across,) for side in (_SIDE, -_SIDE)]
+        options: list[tuple[np.ndarray, ...]] = [(), *sides]
+        clear, blockers = [], []
+        for via in options:
+            begin = via[0] if via else seat.position + _FRONT * ahead
+            start = Stop(_pair(begin), seat.yaw, 0.0)
+            way = route(start, *map(_pair, via[1:]), goal).path.position[::2, :2]
+            gaps = [(_gap(way, some), which) for which, some in points]
+            gap, which = min(gaps, default=(np.inf, ""))
+            if via:
+                stands = yield from has_room.steps(
+                    self.room.solids, begin[None], 0.2, self.room.floor
+                )
+                gap = gap if stands[0] else -1.0
+            clear.append(gap)
+            blockers.append(which)
+            if clear[0] >= _CLEAR:
+                return ()
+
+        best = int(np.argmax(clear))
+        if clear[best] < _SLIPS_BY:
+            raise InputError(
+                f"'{blockers[0]}' stands where one comes to sit on '{name}'; pull '{name}' out, "
+                "or choose another seat."
+            )
+        return options[best]
+
+    def _routed(
+        self,
+        here: Stop,
+        left: Sequence[np.ndarray],
+        comes: Sequence[np.ndarray],
+        goal: Stop,
+        as_one_comes: bool,
+        speed: float,
+    ) -> Generator[float, None, Way]:
+        out = left[-1] if len(left) else _before(here)
+        back = comes[0] if len(comes) else _before(goal)
+        here_and_there = [np.array(here.position), np.array(goal.position)]
+        standing = self.others.standing(round(self.now * self.fps), here_and_there)
+        (corners,) = yield from within(
+            ways.steps(
+                [*self.room.solids, *standing], [out, back], floor=self.room.floor, size=self.size
+            ),
+            0.0,
+            0.9,
+        )
+        via = [*map(_pair, left), *corners, *map(_pair, comes)]
+        via = _apart(here, via, goal)
+        if as_one_comes:
+            last = np.array(via[-1] if via else here.position)
+            goal = Stop(goal.position, facing(np.array(goal.position) - last), 0.0)
+        path = route(here, *via, goal, speed=speed, fps=self.fps, floor=self.room.floor).path
+        return Way(RootPath(path.position[1:], path.yaw[1:]), goal)
+
+    def way_along(self, line: np.ndarray, speed: float) -> Generator[float, None, Way]:
+        """The way to a line (N, 2) and along it."""
+        start, points = None, np.asarray(line, float)
+        if self.track is not None:
+            start = self.leaves()
+            out, begin = _before(start), points[0]
+            if np.linalg.norm(out - begin) > _THERE:
+                (corners,) = yield from ways.steps(
+                    self.room.solids, [out, begin], floor=self.room.floor, size=self.size
+                )
+                points = np.concatenate([np.reshape(corners, (-1, 2)), points])
+        made = trail(points, start, speed=speed, fps=self.fps, floor=self.room.floor, seconds=0.0)
+        path = made.path
+        end = made.rests[-1].place
+        if self.track is None:
+            self.appear(path.position[0, :2], float(path.yaw[0]))
+        return Way(RootPath(path.position[1:], path.yaw[1:]), end)
+
+    def go(self, way: Way) -> None:
+        """Go a way, as soon as nobody is in it; raises InputError where somebody stays there."""
+        if self.track is None:
+            self.appear(way.goal.position, way.goal.yaw)
+            return
+        later = self.here.frames + round(self._getting_up() * self.fps)
+        wait = self._wait_for(way, later)
+        if self.bed is not None:
+            self._get_up_from(self.bed)
+        self.here.let_go()
+        self._let_place_go()
+        self.here.rest(wait)
+        self.here.follow(way.path.position, way.path.yaw)
+        turn = np.angle(np.exp(1j * (way.goal.yaw - self.here.yaw)))
+        if abs(turn) > np.radians(5.0):
+            self.here.turn(way.goal.yaw)
+        self.seat, self.bed, self.seat_name = None, None, ""
+
+    def sit(self, name: str, seat: SeatPlace, way: Way) -> None:
+        """Go a way to a seat, and sit on it."""
+        self.go(way)
+        self.seat, self.seat_name = seat, name
+        self.keep(seat.position)
+
+    def sits_at(self, place: np.ndarray) -> bool:
+        """Whether he sits at a place (2,) already."""
+        return (
+            self.seat is not None
+            and self.bed is None
+            and float(np.linalg.norm(self.seat.position - place)) < _SAME_SEAT
+        )
+
+    def keep(self, place: np.ndarray, radius: float = APART) -> None:
+        """Keep a place from now on."""
+        self.holds.append(Hold(np.array(place) * self.size, radius * self.size, self.now, np.inf))
+
+    def is_taken(self, place: np.ndarray, radius: float = APART) -> bool:
+        return self.others.keep(place, radius, self.now)
+
+    def lie_down(self, bed: Bed) -> None:
+        """From the edge of a bed, where he sits."""
+        assert self.seat is not None
+        self.here.rest(_HALT)
+        positions, yaws, targets = self._swing(bed)
+        self.here.follow(positions, yaws)
+        self.here.hold(targets, 0.4)
+        self.bed = bed
+        self.keep(bed.position, 0.9)
+
+    def lie(self, seconds: float) -> None:
+        """Stay so."""
+        frames = max(1, round(seconds * self.fps))
+        places = {name: self.here.last_place(name) for name in ("head", "hand_left", "hand_right")}
+        self.here.rest(frames / self.fps)
+        self.here.hold(
+            {name: np.tile(at, (frames, 1)) for name, at in places.items() if at is not None}, 0.0
+        )
+
+    def _get_up_from(self, bed: Bed) -> None:
+        positions, yaws, targets = self._swing(bed)
+        self.here.follow(positions[::-1], yaws[::-1])
+        self.here.hold({name: values[::-1] for name, values in targets.items()}, 0.0)
+        self.here.let_go()
+        self.bed = None
+
+    def _getting_up(self) -> float:
+        return _LIES_DOWN if self.bed is not None else 0.0
+
+    def _swing(self, bed: Bed) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+        """From sitting on a bed's edge to lying: root (N, 2), (N,), head and hands (N, 3).
+
+        One leans back before one turns: the legs then come up first, else they would swing through
+        the bed.
+        """
+        after = np.arange(1, round(_LIES_DOWN * self.fps) + 1) / self.fps
+
+        def eased(begin: float, seconds: float) -> np.ndarray:
+            return smoothstep((after - begin) / seconds)
+
+        turned = eased(0.7, 1.9)
+        turn = float(np.angle(np.exp(1j * (bed.yaw - bed.seat.yaw))))
+        yaws = bed.seat.yaw + turn * turned
+        positions = bed.seat.position + turned[:, None] * (bed.position - bed.seat.position)
+        back = 0.6 * eased(0.15, 1.65) + 0.4 * eased(1.4, 2.0)
+        angle = np.radians(88.0) * back
+        soft = bed.pillow - bed.top
+        head = np.stack(
+            [
+                np.zeros(len(after)),
+                0.06 * (1.0 - back) - 0.60 * np.sin(angle),
+                bed.top + 0.12 + 0.60 * np.cos(angle) + max(soft - 0.02, 0.0) * back,
+            ],
+            axis=1,
+        )
+        right = np.stack(
+            [0.20 + 0.10 * back, 0.10 - 0.10 * back, bed.top + 0.20 - 0.11 * back], axis=1
+        )
+        root = np.column_stack([positions, np.zeros(len(after))])
+        local = {"head": head, "hand_right": right, "hand_left": right * (-1.0, 1.0, 1.0)}
+        turns = yaw_matrix(yaws)
+        return positions, yaws, {name: rotate(turns, at) + root for name, at in local.items()}
+
+    def _let_place_go(self) -> None:
+        """The places that he kept are free from now on."""
+        self.holds = [
+            hold if np.isfinite(hold.stop) else Hold(hold.place, hold.radius, hold.start, self.now)
+            for hold in self.holds
+        ]
+
+    def _wait_for(self, way: Way, frame: int) -> float:
+        """Seconds to wait before a way is gone, so that nobody is met on it nor comes to where it
+        ends.
+        """
+        last = self.others.last_frame()
+        first = round(self.begins * self.fps) + frame
+        here, path = self.here.position, way.path.position[:, :2]
+        stay = max(0, last - first)
+        end = np.array(way.goal.position)
+        whole = np.concatenate([path, np.tile(end, (stay + 1, 1))])
+        best = -np.inf
+        for delay in np.arange(0.0, _PATIENCE, _LOOKS_AGAIN):
+            waits = round(delay * self.fps)
+            gone = np.concatenate([np.tile(here, (waits, 1)), whole])
+            gap = self.others.gap(gone, first)
+            close = float(gap.min())
+            # Who already stands beside him does not keep him from leaving.
+            if close >= min(APART, float(gap[0])) - 0.01:
+                return float(delay)
+            best = max(best, close)
+
+        raise InputError(
+            "Somebody else stays in the way, or comes there later; begin at another time, or go "
+            "elsewhere."
+        )
+
+
+def _pair(point: np.ndarray | Sequence[float]) -> tuple[float, float]:
+    return float(point[0]), float(point[1])
+
+
+def _before(stop: Stop) -> np.ndarray:
+    """Where (2,) one is on the way to or from a stop: before a seat, else at the stop itself."""
+    return np.array(stop.position) + (0.55 if stop.seated else 0.0) * forward_of(stop.yaw)
+
+
+def _apart(here: Stop, via: Sequence[tuple[float, float]], goal: Stop) -> list[tuple[float, float]]:
+    """Points of a way that are not too close to one another or to its ends to bend there."""
+    kept: list[np.ndarray] = []
+    ends = [np.array(here.position), _before(here), np.array(goal.position), _before(goal)]
+    for each in map(np.array, via):
+        if all(np.linalg.norm(each - other) > 0.12 for other in (*kept[-1:], *ends)):
+            kept.append(each)
+    return [_pair(each) for each in kept]
+
+
+def _gap(way: np.ndarray, points: np.ndarray) -> float:
+    """Metres between a way (N, 2) and points (M, 2)."""
+    if not len(points):
+        return np.inf
+    return float(np.sqrt(min(((points - at) ** 2).sum(axis=1).min() for at in way)))

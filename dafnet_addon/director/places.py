@@ -1,0 +1,169 @@
+"""Where one sits and stands: as many as fit on a seat, beside anything, where there is room; and
+how far hands reach from there.
+
+Canonical metres, world. Several places are given in no order; whoever asks chooses.
+"""
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.paths import facing
+from ..core.progress import stepwise, within
+from ..core.root import forward_of
+from ..core.rotations import normalised
+from ..core.skeleton import OFFSETS, SEAT_TO_PELVIS, STANDING_PELVIS, joint
+from ..core.solids import Box, Mesh
+from .room import Piece, top_view
+from .seats import SeatPlace, seat_of
+from .surfaces import parts_of_surfaces
+
+__all__ = [
+    "REACH",
+    "Place",
+    "Surface",
+    "beside",
+    "has_room",
+    "seated_pelvis",
+    "seats_on",
+    "shoulder",
+    "standing_pelvis",
+]
+
+_STEPPED_OVER = 0.07  # metres over the floor
+_HEAD_HIGH = 1.85  # metres over the floor
+_ELBOW_ROOM = 0.6  # metres between people on one seat or at one top
+_SPACING = 0.05  # metres between points of what stands in the way
+_ARM = float(np.linalg.norm(OFFSETS[[joint("left_elbow"), joint("left_wrist")]], axis=1).sum())
+_LEAN = 0.19  # metres that a trunk helps a hand
+
+REACH = _ARM + _LEAN
+"""Metres from a shoulder within which a wrist comes, the trunk helping."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a body stands: ``position`` (2,) of its root, and ``yaw``."""
+
+    position: np.ndarray
+    yaw: float
+
+
+@dataclass(frozen=True)
+class Surface:
+    """What hands work on before a body: ``origin`` (3,), on a top's edge or on a board; ``low`` and
+    ``high``: how far from there they may go, away from the body on a top, up on a board; metres.
+    """
+
+    origin: np.ndarray
+    low: float
+    high: float
+
+
+def shoulder(place: Place, pelvis: float, side: float) -> np.ndarray:
+    """(3,): the left (−1) or right (1) shoulder of a body that is at a place, its pelvis at a
+    height.
+    """
+    rest = _SHOULDER * (side, 1.0, 1.0)
+    ahead = forward_of(place.yaw)
+    across = np.array([ahead[1], -ahead[0]])
+    return np.array([*(place.position + rest[0] * across + rest[1] * ahead), pelvis + rest[2]])
+
+
+def _shoulder_over_pelvis() -> np.ndarray:
+    names = ("spine1", "spine2", "spine3", "right_collar", "right_shoulder")
+    return np.asarray(OFFSETS[[joint(name) for name in names]].sum(axis=0))
+
+
+_SHOULDER = _shoulder_over_pelvis()
+
+
+@stepwise
+def has_room(
+    solids: Sequence[Box | Mesh], spots: np.ndarray, radius: float, floor: float
+) -> Generator[float, None, np.ndarray]:
+    """Whether (N,) a body that stands at ``spots`` (N, 2) keeps ``radius`` metres from all
+    solids.
+    """
+    if not len(spots):
+        return np.zeros(0, bool)
+    reach = spots.min(axis=0) - radius, spots.max(axis=0) + radius
+    parts = yield from within(parts_of_surfaces.steps(solids, _SPACING, reach), 0.0, 0.5)
+    free = np.ones(len(spots), bool)
+    for k, part in enumerate(parts):
+        over = part[:, 2] - floor
+        points = part[(over > _STEPPED_OVER) & (over < _HEAD_HIGH), :2]
+        for i in np.flatnonzero(free):
+            free[i] = not (((points - spots[i]) ** 2).sum(axis=1) < radius**2).any()
+        yield 0.5 + 0.5 * k / len(parts)
+    return free
+
+
+@stepwise
+def seats_on(
+    piece: Piece,
+    towards: np.ndarray,
+    floor: float,
+    near: np.ndarray | None = None,
+    size: float = 1.0,
+) -> Generator[float, None, list[SeatPlace]]:
+    """Where people sit on a piece, as many as fit, or the one place ``near`` (2,); see
+    ``seats.seat_of``.
+    """
+    found = yield from within(
+        seat_of.steps(piece.solids, towards, floor, piece.name, near, size), 0.0, 0.5
+    )
+    count = 1 + int(2.0 * found.aside / _ELBOW_ROOM)
+    if near is not None or count == 1:
+        return [found]
+
+    ahead = forward_of(found.yaw)
+    across = np.array([ahead[1], -ahead[0]])
+    middle = found.position
+    places = []
+    for k, aside in enumerate(np.linspace(-found.aside, found.aside, count)):
+        spot = middle + aside * across
+        job = seat_of.steps(piece.solids, towards, floor, piece.name, spot, size)
+        places.append((yield from within(job, 0.5 + 0.5 * k / count, 0.5 + 0.5 * (k + 1) / count)))
+    return places
+
+
+@stepwise
+def beside(
+    thing: Piece | np.ndarray, floor: float, ring: Sequence[float]
+) -> Generator[float, None, list[Place]]:
+    """Where one stands before a piece or a point (3,), so many metres away (``ring``, from and
+    to), facing it.
+    """
+    if isinstance(thing, Piece):
+        field, _ = yield from top_view.steps(
+            thing.solids, _SPACING, floor + _STEPPED_OVER, floor + _HEAD_HIGH
+        )
+        points = field.middles(np.argwhere(np.isfinite(field.top)))
+        points = points if len(points) else thing.box().mean(axis=0)[None, :2]
+    else:
+        points = np.asarray(thing, float)[None, :2]
+    yield 0.5
+
+    low, high = points.min(axis=0) - ring[1], points.max(axis=0) + ring[1]
+    step = max(0.12, float((high - low).max()) / 40)
+    axes = [np.arange(a, b + step, step) for a, b in zip(low, high, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    found = []
+    for spot in grid:
+        offset = points - spot
+        away = np.sqrt((offset**2).sum(axis=1))
+        nearest = int(np.argmin(away))
+        if ring[0] <= away[nearest] <= ring[1]:
+            found.append(Place(spot, facing(normalised(offset[nearest]))))
+    return found
+
+
+def seated_pelvis(seat: SeatPlace) -> float:
+    """Height of a pelvis that rests on a seat, over the world's zero."""
+    return seat.height + SEAT_TO_PELVIS
+
+
+def standing_pelvis(floor: float) -> float:
+    return floor + STANDING_PELVIS
