@@ -19,7 +19,7 @@ APART = 0.5
 _STAYS = 0.15  # metres within which somebody counts as standing still
 _WATCHED = 15.0  # seconds for which he has to
 _TALL = 0.85  # metres; half the height of one who is walked round
-_WIDE = 0.18  # metres; half the width of one
+_WIDE = 0.34  # metres; half the width of one, since ways cut corners
 
 
 class Others:

@@ -15,17 +15,17 @@ from ..core.progress import within
 from ..core.root import RootPath, forward_of
 from ..core.rotations import rotate, yaw_matrix
 from ..core.series import smoothstep
-from ..core.solids import Box, Mesh
+from ..core.solids import Box
 from ..core.trails import trail
+from .approach import pair, way_in
 from .beds import Bed
 from .others import APART, Others
-from .places import Place, has_room, seated_pelvis, standing_pelvis
+from .places import Place, seated_pelvis, standing_pelvis
 from .plans import Hold
 from .room import Piece, Room
 from .seats import SeatPlace
-from .surfaces import boxes_of, surface_points
 from .track import Track
-from .walks import ways
+from .walks import NoWay, ways
 
 __all__ = ["SPEED", "Person", "Way"]
 
@@ -34,16 +34,10 @@ SPEED = 1.1
 
 _SAME_SEAT = 0.2  # metres
 _THERE = 0.3  # metres within which one is there already
-_FRONT = 0.85  # metres before a seat, from which one comes straight
-_SIDE = 0.70  # metres to the side of a seat, from which one comes round a desk before it
 _STANDS_BEFORE = 0.6  # metres before a seat, where one stands who has got up
-_ROUND_SEAT = 1.4  # metres around a seat in which anything may be in the way
-_BODY = (0.50, 1.36)  # metres over the floor, from thighs to chest
-_OVER_SEAT = 0.12  # metres over a seat's top that belong to it
-_CLEAR = 0.18  # metres from the body's axis that need no other way to a seat
-_SLIPS_BY = 0.02  # metres from it, at least
 _PATIENCE = 30.0  # seconds that one waits for others
 _LOOKS_AGAIN = 0.25  # seconds between two tries to go
+_BRUSHES = 0.01  # metres by which two may come closer
 _HALT = 0.4  # seconds on a bed's edge before one lies down
 _LIES_DOWN = 3.5  # seconds
 
@@ -108,9 +102,9 @@ class Person:
         """Where he gets up or sets out from."""
         if self.bed is not None:
             spot = self.bed.seat
-            return Stop(_pair(spot.position), spot.yaw, 0.0, seated=True)
+            return Stop(pair(spot.position), spot.yaw, 0.0, seated=True)
         at = self.here.position
-        return Stop(_pair(at), self.here.yaw, 0.0, seated=self.seat is not None)
+        return Stop(pair(at), self.here.yaw, 0.0, seated=self.seat is not None)
 
     def way(
         self, position: np.ndarray, yaw: float | None, speed: float = SPEED
@@ -119,10 +113,10 @@ class Person:
         InputError where there is none.
         """
         if self.track is None:
-            return Way(RootPath(np.zeros((0, 3)), np.zeros(0)), Stop(_pair(position), yaw or 0.0))
+            return Way(RootPath(np.zeros((0, 3)), np.zeros(0)), Stop(pair(position), yaw or 0.0))
         here = self.leaves()
         left = yield from within(self._sides_of_own_seat(), 0.0, 0.3)
-        goal = Stop(_pair(position), here.yaw if yaw is None else yaw, 0.0)
+        goal = Stop(pair(position), here.yaw if yaw is None else yaw, 0.0)
         if not here.seated and np.linalg.norm(position - here.position) < _THERE:
             return Way(RootPath(np.zeros((0, 3)), np.zeros(0)), goal)
         made = self._routed(here, left, (), goal, yaw is None, speed)
@@ -132,11 +126,11 @@ class Person:
         """The way to sit down on a seat of a piece, straight or, where a desk is before it, from a
         side. Raises InputError where there is none.
         """
-        goal = Stop(_pair(seat.position), seat.yaw, 0.0, seated=True)
+        goal = Stop(pair(seat.position), seat.yaw, 0.0, seated=True)
         if self.track is None:
             return Way(RootPath(np.zeros((0, 3)), np.zeros(0)), goal)
         left = yield from within(self._sides_of_own_seat(), 0.0, 0.2)
-        comes = yield from within(self._sides(piece.name, piece.solids, seat), 0.2, 0.5)
+        comes = yield from within(way_in.steps(self.room, piece.name, piece.solids, seat), 0.2, 0.5)
         made = self._routed(self.leaves(), left, comes, goal, False, SPEED)
         return (yield from within(made, 0.5, 1.0))
 
@@ -147,8 +141,8 @@ class Person:
         here = self.leaves()
         left = yield from self._sides_of_own_seat()
         goal = left[-1] if left else here.position + _STANDS_BEFORE * forward_of(here.yaw)
-        stop = Stop(_pair(goal), here.yaw, 0.0)
-        via = map(_pair, left[:-1])
+        stop = Stop(pair(goal), here.yaw, 0.0)
+        via = map(pair, left[:-1])
         path = route(here, *via, stop, fps=self.fps, floor=self.room.floor).path
         return Way(RootPath(path.position[1:], path.yaw[1:]), stop)
 
@@ -158,56 +152,8 @@ class Person:
         if spot is None:
             return ()
         own = self.room.pieces().get(self.seat_name)
-        found = yield from self._sides(self.seat_name, own.solids if own else (), spot)
+        found = yield from way_in.steps(self.room, self.seat_name, own.solids if own else (), spot)
         return found[::-1]
-
-    def _sides(
-        self, name: str, own: Sequence[Box | Mesh], seat: SeatPlace
-    ) -> Generator[float, None, tuple[np.ndarray, ...]]:
-        """Points (2,) by which one comes to a seat, none where one comes straight."""
-        ahead = forward_of(seat.yaw)
-        across = np.array([ahead[1], -ahead[0]])
-        boxes = yield from boxes_of.steps(self.room.solids)
-        around = seat.position - _ROUND_SEAT, seat.position + _ROUND_SEAT
-        points: list[tuple[str, np.ndarray]] = []
-        lowest = max(_BODY[0], seat.height - self.room.floor + _OVER_SEAT)
-        for solid, box in zip(self.room.solids, boxes, strict=True):
-            if any(solid is each for each in own) or np.isnan(box).any():
-                continue
-            if (box[1, :2] < around[0]).any() or (box[0, :2] > around[1]).any():
-                continue
-            found = surface_points([solid], 0.04, around)
-            over = found[:, 2] - self.room.floor
-            points.append((solid.name, found[(over > lowest) & (over < _BODY[1]), :2]))
-            yield 0.5
-
-        goal = Stop(_pair(seat.position), seat.yaw, 0.0, seated=True)
-        sides = [(seat.position + side * across,) for side in (_SIDE, -_SIDE)]
-        options: list[tuple[np.ndarray, ...]] = [(), *sides]
-        clear, blockers = [], []
-        for via in options:
-            begin = via[0] if via else seat.position + _FRONT * ahead
-            start = Stop(_pair(begin), seat.yaw, 0.0)
-            way = route(start, *map(_pair, via[1:]), goal).path.position[::2, :2]
-            gaps = [(_gap(way, some), which) for which, some in points]
-            gap, which = min(gaps, default=(np.inf, ""))
-            if via:
-                stands = yield from has_room.steps(
-                    self.room.solids, begin[None], 0.2, self.room.floor
-                )
-                gap = gap if stands[0] else -1.0
-            clear.append(gap)
-            blockers.append(which)
-            if clear[0] >= _CLEAR:
-                return ()
-
-        best = int(np.argmax(clear))
-        if clear[best] < _SLIPS_BY:
-            raise InputError(
-                f"'{blockers[0]}' stands where one comes to sit on '{name}'; pull '{name}' out, "
-                "or choose another seat."
-            )
-        return options[best]
 
     def _routed(
         self,
@@ -222,20 +168,30 @@ class Person:
         back = comes[0] if len(comes) else _before(goal)
         here_and_there = [np.array(here.position), np.array(goal.position)]
         standing = self.others.standing(round(self.now * self.fps), here_and_there)
-        (corners,) = yield from within(
-            ways.steps(
-                [*self.room.solids, *standing], [out, back], floor=self.room.floor, size=self.size
-            ),
-            0.0,
-            0.9,
-        )
-        via = [*map(_pair, left), *corners, *map(_pair, comes)]
+        try:
+            corners = yield from within(self._corners(out, back, standing), 0.0, 0.5)
+        except NoWay:
+            if not standing:
+                raise
+            # Whoever stands in the way may be slipped by, or leave in time.
+            corners = yield from within(self._corners(out, back, []), 0.5, 0.9)
+
+        via = [*map(pair, left), *corners, *map(pair, comes)]
         via = _apart(here, via, goal)
         if as_one_comes:
             last = np.array(via[-1] if via else here.position)
             goal = Stop(goal.position, facing(np.array(goal.position) - last), 0.0)
         path = route(here, *via, goal, speed=speed, fps=self.fps, floor=self.room.floor).path
         return Way(RootPath(path.position[1:], path.yaw[1:]), goal)
+
+    def _corners(
+        self, start: np.ndarray, goal: np.ndarray, standing: Sequence[Box]
+    ) -> Generator[float, None, list[tuple[float, float]]]:
+        """Corners of the way from one point (2,) to another, round the furniture and others."""
+        solids = [*self.room.solids, *standing]
+        job = ways.steps(solids, [start, goal], floor=self.room.floor, size=self.size)
+        (corners,) = yield from job
+        return corners
 
     def way_along(self, line: np.ndarray, speed: float) -> Generator[float, None, Way]:
         """The way to a line (N, 2) and along it."""
@@ -244,9 +200,7 @@ class Person:
             start = self.leaves()
             out, begin = _before(start), points[0]
             if np.linalg.norm(out - begin) > _THERE:
-                (corners,) = yield from ways.steps(
-                    self.room.solids, [out, begin], floor=self.room.floor, size=self.size
-                )
+                corners = yield from self._corners(out, begin, [])
                 points = np.concatenate([np.reshape(corners, (-1, 2)), points])
         made = trail(points, start, speed=speed, fps=self.fps, floor=self.room.floor, seconds=0.0)
         path = made.path
@@ -374,25 +328,20 @@ class Person:
         stay = max(0, last - first)
         end = np.array(way.goal.position)
         whole = np.concatenate([path, np.tile(end, (stay + 1, 1))])
-        best = -np.inf
         for delay in np.arange(0.0, _PATIENCE, _LOOKS_AGAIN):
             waits = round(delay * self.fps)
             gone = np.concatenate([np.tile(here, (waits, 1)), whole])
             gap = self.others.gap(gone, first)
-            close = float(gap.min())
             # Who already stands beside him does not keep him from leaving.
-            if close >= min(APART, float(gap[0])) - 0.01:
+            leaving = np.linalg.norm(gone - here, axis=1) < APART
+            wanted = np.where(leaving, min(APART, float(gap[0])), APART)
+            if (gap >= wanted - _BRUSHES).all():
                 return float(delay)
-            best = max(best, close)
 
         raise InputError(
             "Somebody else stays in the way, or comes there later; begin at another time, or go "
             "elsewhere."
         )
-
-
-def _pair(point: np.ndarray | Sequence[float]) -> tuple[float, float]:
-    return float(point[0]), float(point[1])
 
 
 def _before(stop: Stop) -> np.ndarray:
@@ -407,11 +356,4 @@ def _apart(here: Stop, via: Sequence[tuple[float, float]], goal: Stop) -> list[t
     for each in map(np.array, via):
         if all(np.linalg.norm(each - other) > 0.12 for other in (*kept[-1:], *ends)):
             kept.append(each)
-    return [_pair(each) for each in kept]
-
-
-def _gap(way: np.ndarray, points: np.ndarray) -> float:
-    """Metres between a way (N, 2) and points (M, 2)."""
-    if not len(points):
-        return np.inf
-    return float(np.sqrt(min(((points - at) ** 2).sum(axis=1).min() for at in way)))
+    return [pair(each) for each in kept]
