@@ -61,7 +61,7 @@ class Chooser:
         """(2,): the same, where one is named."""
         return None if place is None else self.point(place)[:2]
 
-    def in_order(
+    def by_choice(
         self,
         candidates: Sequence[_T],
         at: Callable[[_T], np.ndarray],
@@ -78,13 +78,13 @@ class Chooser:
 
     def pieces(self, name: str, choose: str, near: np.ndarray | None = None) -> list[Piece]:
         """The furniture that a task names, in order."""
-        return self.in_order(self.person.room.named(name), middle_of, choose, near)
+        return self.by_choice(self.person.room.named(name), middle_of, choose, near)
 
     def things(self, what: str | Sequence[float], choose: str) -> list[Piece | np.ndarray]:
         """The furniture and points that a task names, in order."""
         if not isinstance(what, str):
             return [self.point(what)]
-        return self.in_order(self.person.room.things(what), middle_of, choose)
+        return self.by_choice(self.person.room.things(what), middle_of, choose)
 
     def first(self, candidates: Sequence[_T], attempt: Callable[[_T], Job[Done]]) -> Job[Done]:
         """The first attempt that succeeds. Raises what the first one says that was not about a

@@ -84,7 +84,7 @@ def _come_to(
         return _in_reach(top, Place(seat.position, seat.yaw), seated_pelvis(seat)) is not None
 
     middle = middle_of(piece)[:2]
-    for seat in chooser.in_order(_seats_at(person, piece), middle_of, "nearest", near):
+    for seat in chooser.by_choice(_seats_at(person, piece), middle_of, "nearest", near):
         try:
             yield from take_seat(chooser, seat, middle, task.choose, fits=fits)
         except Taken:
@@ -115,7 +115,7 @@ def _come_to(
         return Done(person.frames)
 
     choose = task.choose if near is None else "nearest"
-    ordered = chooser.in_order(spots, lambda spot: spot.position, choose, near)
+    ordered = chooser.by_choice(spots, lambda spot: spot.position, choose, near)
     yield from chooser.first(ordered[:_TRIED], stand)
     return _reached(top, person)
 
@@ -178,7 +178,7 @@ def write_on(chooser: Chooser, task: WriteOn) -> Job[Done]:
             return Done(there, piece.name)
 
         choose = task.choose if near is None else "nearest"
-        ordered = chooser.in_order(spots, lambda spot: spot.position, choose, near)
+        ordered = chooser.by_choice(spots, lambda spot: spot.position, choose, near)
         return (yield from chooser.first(ordered[:_TRIED], stand))
 
     return (yield from chooser.first(chooser.pieces(task.on, task.choose, near), write))
@@ -228,7 +228,7 @@ def _walk_up(chooser: Chooser, thing: Piece | np.ndarray, named: str, task: Reac
                 for name, at in _grips(thing, spot, pelvis, floor, task).items()
             )
         ]
-        ordered = chooser.in_order(able, lambda spot: spot.position, "nearest")
+        ordered = chooser.by_choice(able, lambda spot: spot.position, "nearest")
         if not ordered:
             continue
 

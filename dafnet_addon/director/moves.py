@@ -40,7 +40,7 @@ def walk_to(chooser: Chooser, task: WalkTo) -> Job[Done]:
             yield from chooser.stand_at(spot, spot.yaw if yaw is None else yaw, task.speed)
             return Done(person.frames, name)
 
-        ordered = chooser.in_order(free, lambda spot: spot.position, "nearest")
+        ordered = chooser.by_choice(free, lambda spot: spot.position, "nearest")
         return (yield from chooser.first(ordered[:_TRIED], stand))
 
     return (yield from chooser.first(chooser.things(task.where, task.choose), go_to))
@@ -115,7 +115,7 @@ def take_seat(
         person.sit(piece.name, seat, way)
         return Done(person.frames, piece.name, piece.name)
 
-    ordered = chooser.in_order([seat.position for seat in free], np.asarray, choose)
+    ordered = chooser.by_choice([seat.position for seat in free], np.asarray, choose)
     return (yield from chooser.first(ordered, sit))
 
 

@@ -40,11 +40,15 @@ class Others:
             rows = np.minimum((seconds * plan.fps).round().astype(int), len(plan) - 1)
             self._paths.append((first, plan.path.position[rows, :2] / size))
 
-    def keep(self, place: np.ndarray, radius: float, now: float) -> bool:
-        """Whether a place (2,) is theirs, now or later; ``now``: second of the shot."""
+    def keep(self, place: np.ndarray, radius: float, now: float, until: float) -> bool:
+        """Whether a place (2,) is theirs, ``now`` or later; those who are there now and leave
+        before ``until`` do not count. Seconds of the shot.
+        """
         return any(
-            stop > now and np.linalg.norm(held - place) < max(radius, around)
-            for held, around, _, stop in self._holds
+            stop > now
+            and not (start <= now and stop <= until)
+            and np.linalg.norm(held - place) < max(radius, around)
+            for held, around, start, stop in self._holds
         )
 
     def at(self, frames: np.ndarray) -> np.ndarray:

@@ -51,9 +51,9 @@ class Way:
 
 
 class Person:
-    """``name`` is for what is said; ``size``: over the canonical body; ``begins``: second of the
-    shot in which his first frame is. He is nowhere (``track`` None) until his start or his first
-    task says where.
+    """``size``: over the canonical body; ``begins``: second of the shot in which his first frame
+    is; ``waits``: whether he waits for places that others leave soon. He is nowhere (``track``
+    None) until his start or his first task says where.
     """
 
     def __init__(self, room: Room, fps: float, size: float, begins: float, others: Others) -> None:
@@ -64,6 +64,7 @@ class Person:
         self.seat_name = ""
         self.bed: Bed | None = None
         self.holds: list[Hold] = []
+        self.waits = False
 
     @property
     def here(self) -> Track:
@@ -246,7 +247,9 @@ class Person:
         self.holds.append(Hold(np.array(place) * self.size, radius * self.size, self.now, np.inf))
 
     def is_taken(self, place: np.ndarray, radius: float = APART) -> bool:
-        return self.others.keep(place, radius, self.now)
+        """Whether others keep a place (2,); who waits takes one that they leave soon."""
+        until = self.now + (_PATIENCE if self.waits else 0.0)
+        return self.others.keep(place, radius, self.now, until)
 
     def lie_down(self, bed: Bed) -> None:
         """From the edge of a bed, where he sits."""

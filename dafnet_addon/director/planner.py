@@ -17,7 +17,7 @@ from ..core.progress import stepwise, within
 from ..core.root import RootPath
 from ..core.series import MODEL_FPS
 from ..core.skeleton import STATURE
-from .choosing import Chooser, Done, Job
+from .choosing import Chooser, Done, Job, Taken
 from .handwork import look_at, reach, work_at, write_on
 from .moves import lie_on, sit_on, stand_up, wait, walk_along, walk_to
 from .others import Others
@@ -103,9 +103,8 @@ def plan_tasks(
     chooser, entries = Chooser(person, np.random.default_rng(seed)), []
     for k, task in enumerate(tasks):
         first = person.frames
-        job = _DOING[type(task)](chooser, task)
         try:
-            done = yield from within(job, k / len(tasks), (k + 1) / len(tasks))
+            done = yield from within(_do(chooser, task), k / len(tasks), (k + 1) / len(tasks))
         except InputError as error:
             raise InputError(f"Task {k + 1}, '{said(task)}': {error}") from error
         if person.frames > MAX_FRAMES:
@@ -123,3 +122,15 @@ def plan_tasks(
         begins=begins,
         warnings=tuple(chooser.warnings),
     )
+
+
+def _do(chooser: Chooser, task: Task) -> Job[Done]:
+    """A task, with what is free, or else with what others leave soon."""
+    try:
+        return (yield from within(_DOING[type(task)](chooser, task), 0.0, 0.5))
+    except Taken:
+        chooser.person.waits = True
+        try:
+            return (yield from within(_DOING[type(task)](chooser, task), 0.5, 1.0))
+        finally:
+            chooser.person.waits = False
