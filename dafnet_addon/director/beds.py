@@ -12,6 +12,7 @@ from ..core.errors import InputError
 from ..core.paths import facing
 from ..core.progress import stepwise, within
 from ..core.root import forward_of
+from ..core.softness import guessed
 from .room import Piece, axes_from_above, top_view
 from .seats import SeatPlace, seat_of
 
@@ -28,7 +29,7 @@ _NARROW = 0.55  # metres from it to the edge, at most
 class Bed:
     """Where one lies: ``seat``: the edge where one sits down first; ``yaw`` of a body whose feet
     point there; the resting pelvis' ``position`` (2,); heights of the ``top`` and of what is under
-    the head (``pillow``), over the world's zero.
+    the head (``pillow``), over the world's zero; ``softness``: see ``core.softness``.
     """
 
     seat: SeatPlace
@@ -36,6 +37,7 @@ class Bed:
     position: np.ndarray
     top: float
     pillow: float
+    softness: float
 
 
 @stepwise
@@ -60,7 +62,11 @@ def bed_of(
     found = []
     for seat in sides:
         level = np.argwhere(np.abs(field.top - seat.height) < 0.08)
-        bed = _lain(field.middles(level), points, seat, longer)
+        softness = max(
+            guessed(solid, seat.height - floor) if solid.softness is None else solid.softness
+            for solid in piece.solids
+        )
+        bed = _lain(field.middles(level), points, seat, longer, softness)
         if bed:
             found.append(bed)
     if not found:
@@ -71,7 +77,9 @@ def bed_of(
     return sorted(found, key=lambda bed: float(np.linalg.norm(bed.seat.position - towards)))
 
 
-def _lain(cells: np.ndarray, points: np.ndarray, seat: SeatPlace, longer: np.ndarray) -> Bed | None:
+def _lain(
+    cells: np.ndarray, points: np.ndarray, seat: SeatPlace, longer: np.ndarray, softness: float
+) -> Bed | None:
     """Lying on level cells (N, 2), along ``longer`` (2,), whose long side has a ``seat``."""
     out = forward_of(seat.yaw)
     along, across = cells @ longer, cells @ out
@@ -99,4 +107,4 @@ def _lain(cells: np.ndarray, points: np.ndarray, seat: SeatPlace, longer: np.nda
     pillow = pillow[pillow < seat.height + 0.25]
     under = float(np.percentile(pillow, 90)) if len(pillow) else seat.height
     seat = SeatPlace(sits, seat.yaw, seat.height, seat.back, 0.0, seat.edge)
-    return Bed(seat, facing(to_feet), position, seat.height, max(under, seat.height))
+    return Bed(seat, facing(to_feet), position, seat.height, max(under, seat.height), softness)

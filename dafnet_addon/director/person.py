@@ -15,6 +15,7 @@ from ..core.progress import within
 from ..core.root import RootPath, forward_of
 from ..core.rotations import rotate, yaw_matrix
 from ..core.series import smoothstep
+from ..core.softness import LIES_LOWER, OVER_HARD
 from ..core.solids import Box
 from ..core.trails import trail
 from .approach import pair, way_in
@@ -297,12 +298,14 @@ class Person:
         positions = bed.seat.position + turned[:, None] * (bed.position - bed.seat.position)
         back = 0.6 * eased(0.15, 1.65) + 0.4 * eased(1.4, 2.0)
         angle = np.radians(88.0) * back
-        soft = bed.pillow - bed.top
+        over = bed.top + OVER_HARD - bed.softness - LIES_LOWER * back
+        # A skull does not sink in as a pelvis does: its joint comes to lie 9 cm over the pillow.
+        pillow = bed.pillow - bed.top + bed.softness - 0.05
         head = np.stack(
             [
                 np.zeros(len(after)),
                 0.06 * (1.0 - back) - 0.60 * np.sin(angle),
-                bed.top + 0.12 + 0.60 * np.cos(angle) + max(soft - 0.02, 0.0) * back,
+                over + 0.60 * np.cos(angle) + pillow * back,
             ],
             axis=1,
         )
