@@ -336,8 +336,8 @@ class Sampler:
 
         ``z`` (T, B, 66): the noise of each take and frame, upper part first; or (B, 66), one vector
         a take, held constant. ``kept`` (N, B, 66), SMPL order, metres: the first N frames as they
-        are to stay; the model goes on from them, its noise passing over ten frames from the one
-        that the last kept pose is made of to ``z``, so that nothing jumps. ``watch`` is shown each
+        are to stay; the model goes on from them, and what the noise that the last kept pose is made
+        of has over ``z`` dies away over ten frames, so that nothing jumps. ``watch`` is shown each
         frame of the first take as it is made: its index and pose (66,) as above. ``unchanged``:
         stretches to be made besides, as the run would go on. Raises WeightsError where the poses
         are not a body's.
@@ -357,7 +357,7 @@ class Sampler:
                 noise = own_noise[t]
             elif t >= len(known):
                 share = float(smoothstep(np.array((t - len(known) + 1) / _PASSING)))
-                noise = last_kept + (own_noise[t] - last_kept) * share
+                noise = own_noise[t] + (last_kept - own_noise[len(known) - 1]) * (1.0 - share)
 
             for stretch in unchanged:
                 if stretch.start == t:

@@ -78,5 +78,15 @@ def test_takes_come_and_go_unless_they_are_held():
         return float(np.abs(np.diff(take.joints[30:, WRISTS], axis=0)).mean())
 
     assert stirs(lively) > 5.0 * stirs(lively, held=True)
-    both = (generate(Scene(), still, weights, temperature=1.0, held=held) for held in (False, True))
-    assert np.array_equal(*(take.joints for take in both)), "these weights hold it anyway"
+    held = replace(weights, tensors=_without_passing(weights))
+    both = (generate(Scene(), still, held, temperature=1.0, held=each) for each in (False, True))
+    assert np.array_equal(*(take.joints for take in both)), "such weights hold it anyway"
+
+
+def _without_passing(weights: Weights) -> dict[str, np.ndarray]:
+    """The tensors of weights that were exported before takes came and went."""
+    return {
+        name: tensor
+        for name, tensor in weights.tensors.items()
+        if not name.endswith((".passing", ".taps"))
+    }

@@ -417,7 +417,8 @@ def test_a_root_that_is_led_live_has_no_way_ahead(dataset, tmp_path):
     known = replace(conditions, ahead=np.zeros((5, 18)))
     assert np.abs(run_to_end(Sampler(live).run(known, z)).poses - made[0]).max() > 1e-6
     with pytest.raises(InputError, match="whole path"):
-        run_to_end(Sampler(load_weights()).run(conditions, z))
+        told = load_weights(_exported(dataset, tmp_path / "told", FORESEEING))
+        run_to_end(Sampler(told).run(conditions, z))
 
 
 def test_a_wider_network_begins_as_the_narrower_one(dataset, tmp_path):
@@ -519,9 +520,12 @@ def test_a_frozen_predictor_that_reads_the_sensor_in_bfloat16_says_the_same(data
     batch = _pool(dataset).batch(torch.arange(12), statistics, model)
     with torch.no_grad():
         exact = predictor(batch.past, batch.occupancy)
+        code = predictor.encode(batch.occupancy)
         predictor.mixed = True
         near = predictor(batch.past, batch.occupancy.bfloat16())
-    assert near.dtype == exact.dtype and 0.0 < (near - exact).abs().max() < 0.02
+        near_code = predictor.encode(batch.occupancy.bfloat16())
+    assert near.dtype == exact.dtype and (near - exact).abs().max() < 0.02
+    assert 0.0 < (near_code - code).abs().max() < 0.05 * code.abs().max()
 
 
 @pytest.mark.parametrize("share", [0.0, 0.25, 0.5, 1.0])
