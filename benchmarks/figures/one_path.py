@@ -35,6 +35,8 @@ __all__ = ["HEIGHTS", "actions", "by_furniture", "by_height", "seated_at"]
 
 HEIGHTS = (0.32, 0.38, 0.45, 0.52, 0.60, 0.70)
 """Seats of figure 11 (metres)."""
+_HALF_WAY = 0.78
+"""Metres: a pelvis half-way down to a chair, or up from it."""
 
 
 def seated_at(weights: Weights, heights: Sequence[float] = HEIGHTS) -> list[Motion]:
@@ -54,15 +56,18 @@ def actions(studio: Studio) -> Image.Image:
     pieces = [(furniture.chair(), HERE), (furniture.stool(0.55), Place(stool.position, stool.yaw))]
     motion = make(studio.weights, pieces, free(walked))
 
-    _, down, last = walked.rests
+    _, chair_rest, last = walked.rests
+    half_way = motion.joints[:, PELVIS, 2] < _HALF_WAY
+    seated_from = int(np.argmax(half_way))
+    gets_up = seated_from + int(np.argmin(half_way[seated_from:]))
     moments = {
         "stands": 15,
-        "walks": down.start - 75,
-        "turns to the chair": down.start - 28,
-        "sits down": down.start - 6,
-        "sits": (down.start + down.stop - 1) // 2,
-        "gets up": down.stop + 17,
-        "walks on": (down.stop - 1 + last.start) // 2 + 5,
+        "walks": seated_from - 70,
+        "turns to the chair": seated_from - 25,
+        "sits down": seated_from,
+        "sits": (chair_rest.start + chair_rest.stop - 1) // 2,
+        "gets up": gets_up,
+        "walks on": (chair_rest.stop - 1 + last.start) // 2 + 5,
         "sits on the stool": last.stop - 11,
     }
 
