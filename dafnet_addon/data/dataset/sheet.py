@@ -7,7 +7,6 @@ matplotlib, which is imported when a sheet is drawn.
 """
 
 from collections.abc import Sequence
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,7 +22,6 @@ from .picture import picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 __all__ = ["Row", "sheet"]
 
@@ -219,7 +217,7 @@ def sheet(
 
     across, down = columns * _WIDTH + _HEIGHT, len(rows) * _HEIGHT
     figure = Figure(figsize=(across * _INCHES, down * _INCHES), dpi=120)
-    FigureCanvasAgg(figure)
+    canvas = FigureCanvasAgg(figure)
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     ax.set(xlim=(0, across), ylim=(-down, 0), aspect="equal")
     ax.axis("off")
@@ -258,17 +256,16 @@ def sheet(
 
     with whole_file(file) as part:
         if file.suffix == ".png":
-            _save_picture(figure, part)
+            canvas.draw()
+            _save_picture(np.asarray(canvas.buffer_rgba()), part)
         else:
             figure.savefig(part, format=file.suffix[1:])
 
 
-def _save_picture(figure: "Figure", part: Path) -> None:
-    """In few colours, which a sheet has anyway: a fifth of the bytes."""
+def _save_picture(pixels: np.ndarray, file: Path) -> None:
+    """Save pixels (H, W, 4) in few colours, which a sheet has anyway: a fifth of the bytes."""
     from PIL import Image
 
-    data = BytesIO()
-    figure.savefig(data, format="png")
-    with Image.open(data) as picture:
-        few = picture.convert("RGB").quantize(_COLOURS_KEPT, dither=Image.Dither.NONE)
-        few.save(part, format="PNG", optimize=True)
+    picture = Image.fromarray(pixels).convert("RGB")
+    few = picture.quantize(_COLOURS_KEPT, dither=Image.Dither.NONE)
+    few.save(file, format="PNG", optimize=True)
