@@ -145,11 +145,12 @@ def _bed(fps: float) -> Plan:
     """Sits down on the edge, swings the legs up and lies down, the head on the pillow, led by
     targets of head and hands.
     """
-    turn, inward, lasts, stays = 0.5 * np.pi, 0.30, 3.5, 4.0
+    turn, inward, lasts, stays = 0.5 * np.pi, 0.34, 3.5, 4.0
+    edge = 0.04  # metres ahead of the origin: so near the edge shins pass beside the bed
     sits = route(
         Stop((-1.6, 1.6), facing((0.6, -0.4)), 0.3),
         (-0.9, 1.1),
-        Stop((0.0, 0.0), 0.0, 0.7, seated=True),
+        Stop((0.0, edge), 0.0, 0.7, seated=True),
         fps=fps,
     )
 
@@ -193,7 +194,7 @@ def _bed(fps: float) -> Plan:
     rests = (
         sits.rests[0],
         sits.rests[1],
-        Rest(Stop((0.0, -inward), turn), frames - round(stays * fps), frames),
+        Rest(Stop((0.0, edge - inward), turn), frames - round(stays * fps), frames),
     )
 
     return Plan(Route(path, rests), targets, (start, frames))
