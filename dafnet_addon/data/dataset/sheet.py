@@ -33,7 +33,7 @@ _LEFT, _RIGHT, _TRUNK = "#1f6fb4", "#e0701a", "#3a3a3a"
 _CONTACT, _FACING, _FAINT = "#1e9e3e", "#a01860", "#d4d4d4"
 # a cell, and how much of it lies under the floor line; metres
 _WIDTH, _HEIGHT, _BELOW = 1.8, 2.35, 0.32
-_COLOURS_KEPT = 48
+_COLOURS_KEPT = 128
 _INCHES, _DOTS = 0.68, 82.0  # a metre on paper, and in pictures of furniture
 # the camera: from straight ahead towards the body's right side, and up
 _TURN, _TILT = np.radians(60), np.radians(12)
@@ -267,5 +267,8 @@ def _save_picture(pixels: np.ndarray, file: Path) -> None:
     from PIL import Image
 
     picture = Image.fromarray(pixels).convert("RGB")
-    few = picture.quantize(_COLOURS_KEPT, dither=Image.Dither.NONE)
+    # An octree keeps the few vivid colours as they are, a median cut those of large areas.
+    few = picture.quantize(
+        _COLOURS_KEPT, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE
+    )
     few.save(file, format="PNG", optimize=True)
