@@ -14,8 +14,27 @@ from .errors import InputError
 from .grid import DistanceGrid
 from .text import printable
 
-__all__ = ["SOFTEST", "Box", "Mesh", "Scene", "box_distance"]
+__all__ = ["BOX_CORNERS", "BOX_TRIANGLES", "SOFTEST", "Box", "Mesh", "Scene", "box_distance"]
 
+BOX_CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+"""(8, 3) of a box whose half sizes are 1."""
+BOX_TRIANGLES = np.array(
+    [
+        (0, 1, 3),
+        (0, 3, 2),
+        (4, 6, 7),
+        (4, 7, 5),
+        (0, 4, 5),
+        (0, 5, 1),
+        (2, 3, 7),
+        (2, 7, 6),
+        (0, 2, 6),
+        (0, 6, 4),
+        (1, 5, 7),
+        (1, 7, 3),
+    ]
+)
+"""(12, 3): the numbers of the corners, seen from outside counter-clockwise."""
 SOFTEST = 0.3
 """Metres by which furniture gives way at most."""
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..core.nearby import bounds
 from ..core.progress import run_to_end, stepwise, within
 from ..core.rotations import rotate
-from ..core.solids import Box, Mesh
+from ..core.solids import BOX_CORNERS, BOX_TRIANGLES, Box, Mesh
 
 __all__ = ["HeightField", "boxes_of", "height_field", "parts_of_surfaces", "surface_points"]
 
@@ -20,29 +20,12 @@ _AT_ONCE = 100_000
 """Points that are made between two steps of a job."""
 _SOLIDS_AT_ONCE = 100
 """Solids that are looked at between two steps of a job."""
-_CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-_FACES = np.array(
-    [
-        (0, 1, 3),
-        (0, 3, 2),
-        (4, 6, 7),
-        (4, 7, 5),
-        (0, 4, 5),
-        (0, 5, 1),
-        (2, 3, 7),
-        (2, 7, 6),
-        (0, 2, 6),
-        (0, 6, 4),
-        (1, 5, 7),
-        (1, 7, 3),
-    ]
-)
 
 
 def _corners(solid: Box | Mesh) -> np.ndarray:
     """World corners (F, 3, 3) of a solid's triangles, where it is at the first frame."""
     if isinstance(solid, Box):
-        vertices, triangles, matrix = _CORNERS * solid.half_size, _FACES, solid.matrices()
+        vertices, triangles, matrix = BOX_CORNERS * solid.half_size, BOX_TRIANGLES, solid.matrices()
     else:
         vertices, triangles, matrix = (
             np.asarray(solid.vertices, float),

@@ -10,7 +10,7 @@ from dafnet_addon.core import distance
 from dafnet_addon.core.distance import build_grid, grid_of, prepared, rigid_split, scaled
 from dafnet_addon.core.grid import BAND
 from dafnet_addon.core.rotations import matrix_from_quaternion, yaw_matrix
-from dafnet_addon.core.solids import Box, Mesh, Scene, box_distance
+from dafnet_addon.core.solids import BOX_TRIANGLES, Box, Mesh, Scene, box_distance
 
 GROUND = np.array([0.0, 0.0, 1.0, 0.0])
 
@@ -349,23 +349,9 @@ def test_scaled_scene_keeps_its_grids():
 @pytest.mark.parametrize("side", [100.0, 4000.0])
 def test_a_huge_slab_is_measured_coarsely_and_within_memory(side: float) -> None:
     corners = np.array([(x, y, z) for x in (0.0, side) for y in (0.0, side) for z in (0.0, 0.5)])
-    sides = [
-        (0, 1, 3),
-        (0, 3, 2),
-        (4, 6, 7),
-        (4, 7, 5),
-        (0, 4, 5),
-        (0, 5, 1),
-        (2, 3, 7),
-        (2, 7, 6),
-        (0, 2, 6),
-        (0, 6, 4),
-        (1, 5, 7),
-        (1, 7, 3),
-    ]
     tracemalloc.start()
     try:
-        grid = build_grid(corners, np.array(sides))
+        grid = build_grid(corners, BOX_TRIANGLES)
         assert tracemalloc.get_traced_memory()[1] < 200e6
     finally:
         tracemalloc.stop()

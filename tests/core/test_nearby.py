@@ -8,30 +8,13 @@ from dafnet_addon.core import conditions, distance
 from dafnet_addon.core.nearby import bounds, extent, solids_near
 from dafnet_addon.core.paths import Stop, route
 from dafnet_addon.core.rotations import yaw_matrix
-
-CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-FACES = np.array(
-    [
-        (0, 1, 3),
-        (0, 3, 2),
-        (4, 6, 7),
-        (4, 7, 5),
-        (0, 4, 5),
-        (0, 5, 1),
-        (2, 3, 7),
-        (2, 7, 6),
-        (0, 2, 6),
-        (0, 6, 4),
-        (1, 5, 7),
-        (1, 7, 3),
-    ]
-)
+from dafnet_addon.core.solids import BOX_CORNERS, BOX_TRIANGLES
 
 
 def cube(place: tuple[float, float, float], half: float = 0.3, name: str = "cube") -> Mesh:
     matrix = np.eye(4)
     matrix[:3, 3] = place
-    return Mesh(half * CORNERS, FACES, matrix, name)
+    return Mesh(half * BOX_CORNERS, BOX_TRIANGLES, matrix, name)
 
 
 def names(scene: Scene) -> list[str]:
@@ -65,7 +48,7 @@ def test_what_moves_is_near_only_while_the_body_is_there() -> None:
     apart[:, 1, 3] = np.where(np.abs(t - 5.0) < 2.0, 5.0, 0.0)
     scene = Scene(
         [
-            Mesh(0.3 * CORNERS, FACES, m, n)
+            Mesh(0.3 * BOX_CORNERS, BOX_TRIANGLES, m, n)
             for m, n in ((along, "along"), (against, "against"), (apart, "apart"))
         ]
     )
@@ -96,7 +79,9 @@ def test_boxes_hold_their_solids() -> None:
 def test_takes_are_the_same_to_the_last_bit_and_far_grids_are_not_built(
     monkeypatch, scale: float
 ) -> None:
-    seat = Mesh(np.array([0.22, 0.22, 0.225]) * CORNERS + [0.0, 0.0, 0.225], FACES, name="seat")
+    seat = Mesh(
+        np.array([0.22, 0.22, 0.225]) * BOX_CORNERS + [0.0, 0.0, 0.225], BOX_TRIANGLES, name="seat"
+    )
     random = np.random.default_rng(1)
     crowd = [
         cube((*(random.uniform(-12.0, 12.0, 2)), 0.3), random.uniform(0.05, 0.3), f"cube {k}")

@@ -14,24 +14,10 @@ from dafnet_addon.core.passage import met_along, passages, seats_along
 from dafnet_addon.core.paths import Route, Stop, facing, route
 from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.root import RootPath
+from dafnet_addon.core.solids import BOX_TRIANGLES
 from dafnet_addon.director.seats import seat_of
 from dafnet_addon.director.walks import walk_to
 from kit.places import LIBRARY
-
-FACES = (
-    (0, 1, 3),
-    (0, 3, 2),
-    (4, 6, 7),
-    (4, 7, 5),
-    (0, 4, 5),
-    (0, 5, 1),
-    (2, 3, 7),
-    (2, 7, 6),
-    (0, 2, 6),
-    (0, 6, 4),
-    (1, 5, 7),
-    (1, 7, 3),
-)
 
 
 def block(name: str, low: tuple[float, float, float], high: tuple[float, float, float]) -> Box:
@@ -44,7 +30,7 @@ def as_mesh(box: Box) -> Mesh:
         np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * box.half_size
         + box.center
     )
-    return Mesh(corners, np.array(FACES), name=box.name)
+    return Mesh(corners, BOX_TRIANGLES, name=box.name)
 
 
 def chair(height: float = 0.45, arms: bool = False) -> list[Box]:

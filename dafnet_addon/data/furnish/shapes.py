@@ -19,7 +19,7 @@ from ...core.grid import BAND, DistanceGrid
 from ...core.root import RootPath
 from ...core.rotations import rotate, yaw_matrix
 from ...core.sensor import RADIUS, REACH, SPHERES, occupancy_of_distance
-from ...core.solids import Mesh
+from ...core.solids import BOX_CORNERS, BOX_TRIANGLES, Mesh
 from ...director.seats import seat_of
 from .library import Piece
 
@@ -78,24 +78,6 @@ _SAME_WAY = np.cos(np.radians(20.0))
 _PATCH, _UNDER_IT, _CARRIED = (0.1, 0.08), 0.03, 0.5
 _ASTRAY = np.cos(np.radians(60.0))
 _FRAMES_AT_ONCE = 16
-_CORNERS = np.array([(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
-_SIDES = np.array(
-    [
-        (0, 1, 3),
-        (0, 3, 2),
-        (4, 6, 7),
-        (4, 7, 5),
-        (0, 4, 5),
-        (0, 5, 1),
-        (2, 3, 7),
-        (2, 7, 6),
-        (0, 2, 6),
-        (0, 6, 4),
-        (1, 5, 7),
-        (1, 7, 3),
-    ]
-)
-"""A box: its corners from 0 to 1, and their numbers in the triangles of its sides."""
 
 
 @dataclass(frozen=True)
@@ -198,8 +180,9 @@ class ShapeBank:
             matrix = np.eye(4)
             matrix[:3, :3], matrix[:2, 3] = yaw_matrix(np.array(yaw)), (x, y)
             grid = shape.grid if stretch == 1.0 else _stretched(shape, float(stretch))
-            corners = grid.origin + grid.spacing * (np.array(grid.values.shape) - 1) * _CORNERS
-            solids.append(Mesh(corners, _SIDES, matrix, name or shape.name, grid))
+            size = grid.spacing * (np.array(grid.values.shape) - 1)
+            corners = grid.origin + size * (BOX_CORNERS + 1.0) / 2.0
+            solids.append(Mesh(corners, BOX_TRIANGLES, matrix, name or shape.name, grid))
 
         return solids
 
