@@ -22,6 +22,7 @@ from ..character.armature import metres_per_unit
 from ..character.settings import Settings
 from ..compat import action_curves
 from ..pipeline.baker import has_bone_overrides, require_bakeable
+from ..rig.maps import RigMap
 from ..rig.reading import pose_matrices
 from .dependencies import Dependencies, Simulation
 from .furniture import Furniture, array, furniture_of
@@ -83,18 +84,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     ``InputError``: something that is needed is missing, gone, linked, empty or not a number, or
     follows the character itself.
     """
-    scene = find_scene(settings)
-    if context.scene != scene:
-        raise InputError(
-            f"The scene '{settings.scene}' is not the active one; make it active and generate "
-            "again."
-        )
-
-    if scene.render.frame_map_old != scene.render.frame_map_new:
-        raise InputError(
-            f"The scene '{settings.scene}' uses time stretching; set it back to 100 : 100."
-        )
-
+    scene = _require_scene(context, settings)
     unit = metres_per_unit(scene)
     armature = find_object(settings, settings.armature, "character")
     size = require_bakeable(armature, unit)
@@ -143,51 +133,20 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     fps = scene.render.fps / scene.render.fps_base
     root_matrices = rigid_matrices(np.array(tracks.root), unit, f"root '{root.name}'")
 
-    given: dict[str, Any] = {}
-    for role, target in targets.items():
-        matrices = rigid_matrices(
-            np.array(tracks.targets[role]), unit, f"{_TARGETS[role]} '{target.name}'"
-        )
-        given[role] = matrices[:, :3, 3]
-        if _is_turned(target, np.array(tracks.local[role])):
-            given[f"{role}_rotation"] = matrices[:, :3, :3]
-
-    if source and "FULL" in modes:
-        if dependencies.follows(source, armature):
-            raise InputError(
-                f"The upper body's source '{source.name}' follows the character itself; mute what "
-                "links the two."
-            )
-
-        bones, bodies = np.array(tracks.bones), np.array(tracks.bodies)
-        given["upper_body"], off = upper_body_of_source(
-            source,
-            source_map,
-            bones=bones,
-            bodies=bodies,
-            unit=unit,
-            root=root_matrices,
-            size=size,
-            fps=fps,
-        )
-        if off:
-            warnings += (f"'{source.name}' is copied, but {off}; check its bones in Your Rig.",)
-    elif settings.upper_body_take and "FULL" in modes:
-        given["upper_body"] = upper_body_of_take(
+    given: dict[str, Any] = tracks.given(unit)
+    if "FULL" in modes:
+        given["upper_body"], wrong = _upper_body(
             settings,
-            full=np.array([mode == "FULL" for mode in modes]),
+            tracks,
+            dependencies,
+            source_map=source_map,
+            modes=modes,
             root=root_matrices,
+            unit=unit,
             size=size,
             fps=fps,
         )
-    elif "FULL" in modes:
-        raise InputError(
-            f"The mode of '{armature.name}' is FULL but no source is set; choose one to copy from."
-        )
-
-    for role in targets:
-        if min(tracks.influences[role]) < 1.0:
-            given[f"{role}_influence"] = np.array(tracks.influences[role])
+        warnings += wrong
 
     mode = modes[0] if len(set(modes)) == 1 else tuple(modes)
     controls = Controls(
@@ -204,6 +163,25 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     return ReadScene(Scene(solids), controls, warnings)
 
 
+def _require_scene(context: bpy.types.Context, settings: Settings) -> bpy.types.Scene:
+    """The scene that the settings are of; ``InputError`` where it is not the one that plays, or its
+    time is stretched.
+    """
+    scene = find_scene(settings)
+    if context.scene != scene:
+        raise InputError(
+            f"The scene '{settings.scene}' is not the active one; make it active and generate "
+            "again."
+        )
+
+    if scene.render.frame_map_old != scene.render.frame_map_new:
+        raise InputError(
+            f"The scene '{settings.scene}' uses time stretching; set it back to 100 : 100."
+        )
+
+    return scene
+
+
 class _Tracks:
     """What is read, frame by frame, about a character and about what leads it; matrices (4, 4) in
     Blender units.
@@ -217,10 +195,10 @@ class _Tracks:
         source: bpy.types.Object | None,
         places: list[str | None],
     ) -> None:
-        self._armature = armature
+        self.armature = armature
+        self.source = source
         self._root = root
         self._targets = targets
-        self._source = source
         self._places = places
 
         self.modes: list[str] = []
@@ -233,7 +211,7 @@ class _Tracks:
 
     def add(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Note the frame that the scene shows now."""
-        own = self._armature.dafnet
+        own = self.armature.dafnet
         self.modes.append(own.mode)
         self.root.append(array(self._root.evaluated_get(depsgraph).matrix_world))
         for role, target in self._targets.items():
@@ -242,10 +220,72 @@ class _Tracks:
             self.targets[role].append(array(evaluated.matrix_world))
             self.local[role].append(array(evaluated.matrix_local))
 
-        if self._source:
-            evaluated = self._source.evaluated_get(depsgraph)
+        if self.source:
+            evaluated = self.source.evaluated_get(depsgraph)
             self.bodies.append(array(evaluated.matrix_world))
             self.bones.append(pose_matrices(evaluated, self._places))
+
+    def given(self, unit: float) -> dict[str, np.ndarray]:
+        """The targets as ``Controls`` takes them, in metres: places, rotations where they count,
+        and influences where they are ever less than 1.
+        """
+        given = {}
+        for role, target in self._targets.items():
+            matrices = rigid_matrices(
+                np.array(self.targets[role]), unit, f"{_TARGETS[role]} '{target.name}'"
+            )
+            given[role] = matrices[:, :3, 3]
+            if _is_turned(target, np.array(self.local[role])):
+                given[f"{role}_rotation"] = matrices[:, :3, :3]
+            if min(self.influences[role]) < 1.0:
+                given[f"{role}_influence"] = np.array(self.influences[role])
+
+        return given
+
+
+def _upper_body(
+    settings: Settings,
+    tracks: _Tracks,
+    dependencies: Dependencies,
+    *,
+    source_map: RigMap | None,
+    modes: list[str],
+    root: np.ndarray,
+    unit: float,
+    size: float,
+    fps: float,
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """The joints that FULL copies (T, 14, 3), world metres, and what is wrong with them;
+    ``InputError`` where there is nothing to copy, or it follows the character.
+    """
+    armature, source = tracks.armature, tracks.source
+    if source is None and settings.upper_body_take:
+        full = np.array([mode == "FULL" for mode in modes])
+        return upper_body_of_take(settings, full=full, root=root, size=size, fps=fps), ()
+
+    if source is None:
+        raise InputError(
+            f"The mode of '{armature.name}' is FULL but no source is set; choose one to copy from."
+        )
+
+    if dependencies.follows(source, armature):
+        raise InputError(
+            f"The upper body's source '{source.name}' follows the character itself; mute what "
+            "links the two."
+        )
+
+    joints, off = upper_body_of_source(
+        source,
+        source_map,
+        bones=np.array(tracks.bones),
+        bodies=np.array(tracks.bodies),
+        unit=unit,
+        root=root,
+        size=size,
+        fps=fps,
+    )
+    wrong = f"'{source.name}' is copied, but {off}; check its bones in Your Rig."
+    return joints, (wrong,) if off else ()
 
 
 def _require_independent(
