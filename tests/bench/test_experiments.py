@@ -19,22 +19,12 @@ from dafnet_addon.core.skeleton import REST  # noqa: E402
 from dafnet_addon.data.furnish.boxes import box  # noqa: E402
 from dafnet_addon.data.held_out.captured import HeldClip  # noqa: E402
 from dafnet_addon.data.motion.rests import Rest  # noqa: E402
-from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training.config import TrainingConfig  # noqa: E402
 from dafnet_addon.training.parts import load_run  # noqa: E402
+from kit.networks import TINY  # noqa: E402
 
 pytestmark = pytest.mark.torch
 
-TINY = ModelConfig(
-    predictor_code=8,
-    predictor_width=16,
-    width=16,
-    code=8,
-    shared_encoder=True,
-    mask=True,
-    steps_upper=1,
-    steps_lower=1,
-)
 TINY_SAMP = SampConfig(width=16, code=8, experts=2, latent=4, frames=10)
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kit.networks import TINY
 from kit.places import ROOT
 
 torch = pytest.importorskip("torch", reason="training needs torch")
@@ -66,17 +67,6 @@ from dafnet_addon.training.run import Run  # noqa: E402
 from dafnet_addon.training.train import train_part  # noqa: E402
 
 pytestmark = pytest.mark.torch
-
-TINY = ModelConfig(
-    predictor_code=8,
-    predictor_width=16,
-    width=16,
-    code=8,
-    shared_encoder=True,
-    mask=True,
-    steps_upper=1,
-    steps_lower=1,
-)
 
 
 def _config(steps: int) -> TrainingConfig:

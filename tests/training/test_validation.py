@@ -22,7 +22,6 @@ from dafnet_addon.core.weights import load_weights  # noqa: E402
 from dafnet_addon.data.furnish.boxes import box  # noqa: E402
 from dafnet_addon.data.held_out.captured import HeldClip  # noqa: E402
 from dafnet_addon.data.motion.rests import Rest  # noqa: E402
-from dafnet_addon.model.config import ModelConfig  # noqa: E402
 from dafnet_addon.training import candidates, validation  # noqa: E402
 from dafnet_addon.training.config import TrainingConfig  # noqa: E402
 from dafnet_addon.training.evaluation.clips import MeasuredClip, measure_takes  # noqa: E402
@@ -30,19 +29,9 @@ from dafnet_addon.training.evaluation.real_report import real_report  # noqa: E4
 from dafnet_addon.training.parts import load_run  # noqa: E402
 from dafnet_addon.training.train import train_part  # noqa: E402
 from dafnet_addon.training.validation import held_out_losses, read_record, score, validate_steps  # noqa: E402
+from kit.networks import TINY  # noqa: E402
 
 pytestmark = pytest.mark.torch
-
-TINY = ModelConfig(
-    predictor_code=8,
-    predictor_width=16,
-    width=16,
-    code=8,
-    shared_encoder=True,
-    mask=True,
-    steps_upper=1,
-    steps_lower=1,
-)
 
 
 def _clip(name: str, maker: str = "maker", body: str = "no/body") -> HeldClip:
