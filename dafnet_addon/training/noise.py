@@ -170,7 +170,8 @@ def kept_of_noise(
     power adds, so that between them lies the captured motion's.
     """
     powers: dict[str, np.ndarray] = {}
-    with torch.random.fork_rng(devices=[]):
+    # All devices' generators come back as they were: a run draws on from where it was.
+    with torch.random.fork_rng(devices=range(torch.cuda.device_count())):
         torch.manual_seed(0)
         for batch in batches:
             for name, power in _powers(flow, predictor, batch, statistics, noise).items():
