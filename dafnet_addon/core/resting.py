@@ -12,7 +12,7 @@ import numpy as np
 from .kinematics import two_bone
 from .root import gaussian
 from .rotations import matrix_from_vector, normalised
-from .series import MODEL_FPS, runs, smoothstep
+from .series import MODEL_FPS, minimum_jerk, runs, smoothstep
 from .skeleton import (
     ANKLES,
     FEET,
@@ -142,8 +142,8 @@ def _lift(joints: np.ndarray, carried: np.ndarray, rests: Sequence[tuple[int, in
         if up + down > frames and up and down:
             up = down = frames
         t = np.arange(1, frames + 1)
-        out[last:start] = before * (1.0 - _eased(t / max(up + 1, 1))) + after * (
-            1.0 - _eased((frames + 1 - t) / max(down + 1, 1))
+        out[last:start] = before * (1.0 - minimum_jerk(t / max(up + 1, 1))) + after * (
+            1.0 - minimum_jerk((frames + 1 - t) / max(down + 1, 1))
         )
     return out
 
@@ -154,12 +154,6 @@ def _way(height: np.ndarray, lift: float) -> int:
     rise = look.max() - look[0]
     upright = np.flatnonzero(look >= look[0] + (1.0 - _UPRIGHT) * rise)
     return max(int(upright[0]), round(_COMES * MODEL_FPS), round(abs(lift) * _PACE * MODEL_FPS))
-
-
-def _eased(x: np.ndarray) -> np.ndarray:
-    """From 0 to 1 as ``x`` goes there, with no sudden force at either end."""
-    x = np.clip(x, 0.0, 1.0)
-    return x**3 * (10.0 + x * (6.0 * x - 15.0))
 
 
 def _lifted(joints: np.ndarray, lift: np.ndarray, top: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-__all__ = ["MODEL_FPS", "runs", "smoothstep"]
+__all__ = ["MODEL_FPS", "minimum_jerk", "runs", "smoothstep"]
 
 MODEL_FPS = 30.0
 """Frames a second inside the model."""
@@ -12,6 +12,14 @@ def smoothstep(x: np.ndarray) -> np.ndarray:
     """From 0 to 1 as ``x`` goes there, beginning and ending softly."""
     x = np.clip(x, 0.0, 1.0)
     return x * x * (3.0 - 2.0 * x)
+
+
+def minimum_jerk(share: np.ndarray) -> np.ndarray:
+    """Way done, from 0 to 1, as ``share`` of the time goes there: that of unhurried reaches (Flash
+    and Hogan 1985), with no sudden force at either end; its peak is 1.875 times the mean.
+    """
+    s = np.clip(share, 0.0, 1.0)
+    return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
 
 
 def runs(flags: np.ndarray, at_least: float = 1, gap: float = 0) -> list[tuple[int, int]]:

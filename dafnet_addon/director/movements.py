@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.root import forward_of, gaussian, yaw_of
 from ..core.rotations import normalised
+from ..core.series import minimum_jerk
 
 __all__ = [
     "HAND",
@@ -17,7 +18,6 @@ __all__ = [
     "handling",
     "look_matrices",
     "look_seconds",
-    "minimum_jerk",
     "reach_seconds",
     "strokes",
     "typing",
@@ -39,14 +39,6 @@ _PEN_LIFT = 0.05  # metres
 _LETTER_RATE = 1.7  # up and down strokes a second, on a board
 _PEN_RATE = 2.4  # the same on paper
 _BACK = 0.15  # of a line's time, in which the hand goes back to the next one
-
-
-def minimum_jerk(share: np.ndarray) -> np.ndarray:
-    """Way done, from 0 to 1, as ``share`` of the time goes there: that of unhurried reaches (Flash
-    and Hogan 1985); its peak is 1.875 times the mean.
-    """
-    s = np.clip(share, 0.0, 1.0)
-    return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
 
 
 def reach_seconds(metres: float) -> float:

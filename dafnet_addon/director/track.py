@@ -11,9 +11,9 @@ import numpy as np
 
 from ..core.paths import turn_seconds
 from ..core.root import RootPath
-from ..core.series import runs, smoothstep
+from ..core.series import minimum_jerk, runs, smoothstep
 from ..core.skeleton import END_EFFECTORS
-from .movements import look_matrices, minimum_jerk
+from .movements import look_matrices
 
 __all__ = ["Targets", "Track"]
 

@@ -35,6 +35,7 @@ from dafnet_addon.core.generate import Draw, clean_again_steps, takes_steps
 from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.sampler import Sampler
 from dafnet_addon.core.skeleton import END_EFFECTORS, OFFSETS, UPPER
+from dafnet_addon.core.solids import BOX_TRIANGLES
 from dafnet_addon.core.storage import packed, unpacked
 from dafnet_addon.core.take import MODES
 from dafnet_addon.core.weights import FORMAT, Weights, read_safetensors, write_safetensors
@@ -170,20 +171,7 @@ def asked() -> dict[str, Any]:
 
 SEAT = Box([0.0, 0.5, 0.2], [0.2, 0.2, 0.2])
 CORNERS = np.array([(x, y, z) for x in (-0.2, 0.2) for y in (0.3, 0.7) for z in (0.0, 0.45)])
-SIDES = np.array(
-    [
-        (0, 1, 3),
-        (0, 3, 2),
-        (4, 6, 7),
-        (4, 7, 5),
-        (0, 4, 5),
-        (0, 5, 1),
-        (2, 3, 7),
-        (2, 7, 6),
-        (1, 5, 7),
-        (1, 7, 3),
-    ]
-)
+SIDES = np.delete(BOX_TRIANGLES, [8, 9], axis=0)  # without a bottom
 
 
 # Mutations.

@@ -5,6 +5,7 @@ import pytest
 
 from dafnet_addon import Controls, InputError
 from dafnet_addon.core.rotations import rotate
+from dafnet_addon.core.series import minimum_jerk
 from dafnet_addon.core.skeleton import STATURE
 from dafnet_addon.director import movements
 from dafnet_addon.director.places import REACH, Place, seated_pelvis, shoulder
@@ -297,7 +298,7 @@ def test_paths_of_hands_are_those_of_people() -> None:
     stroked = movements.strokes(20.0, 30.0, -0.2, 0.2)
     assert stroked[:, 2].min() >= -0.2 and stroked[:, 2].max() <= 0.2
     assert np.linalg.norm(np.diff(stroked, axis=0), axis=1).max() * 30.0 < 1.5
-    share = movements.minimum_jerk(np.linspace(0, 1, 101))
+    share = minimum_jerk(np.linspace(0, 1, 101))
     assert share[0] == 0.0 and share[-1] == 1.0 and abs(np.diff(share).max() * 100 - 1.875) < 0.01
     for length in (0.2, 0.5, 0.8):
         assert 1.875 * length / movements.reach_seconds(length) < 1.5
