@@ -11,7 +11,13 @@ import pytest
 
 from dafnet_addon.core import files
 from dafnet_addon.core.errors import InputError
-from dafnet_addon.core.files import require_writable, save_text, whole_file
+from dafnet_addon.core.files import (
+    require_replaceable,
+    require_writable,
+    save_text,
+    whole_file,
+    whole_folder,
+)
 from dafnet_addon.core.stopping import Stop
 from kit.places import ROOT
 
@@ -181,3 +187,80 @@ def test_signals_that_are_ignored_stay_ignored() -> None:
 
 def test_the_hosts_name_is_part_of_what_is_left() -> None:
     assert all(each.isalnum() for each in files._HOST) and (files._HOST or not socket.gethostname())
+
+
+def _folder(tmp_path: Path, content: str) -> Path:
+    """An output whose marker says ``content``."""
+    folder = tmp_path / "shot"
+    with whole_folder(folder, "mark") as part:
+        (part / "deeper").mkdir()
+        (part / "deeper" / "a.txt").write_text(content, encoding="utf-8")
+        (part / "mark").write_text(content, encoding="utf-8")
+    return folder
+
+
+def test_a_folder_is_replaced_as_a_whole(tmp_path: Path) -> None:
+    folder = _folder(tmp_path, "old")
+    (folder / "left over").write_bytes(b"")
+    with whole_folder(folder, "mark") as part:
+        assert part.parent == tmp_path and names(part) == [] and (folder / "mark").exists()
+        (part / "mark").write_bytes(b"new")
+    assert names(folder) == ["mark"] and names(tmp_path) == ["shot"]
+
+
+@pytest.mark.parametrize("failure", [RuntimeError, KeyboardInterrupt, OSError])
+def test_a_folder_that_fails_leaves_the_old_one(
+    tmp_path: Path, failure: type[BaseException]
+) -> None:
+    folder = _folder(tmp_path, "old")
+    expected = InputError if failure is OSError else failure
+    with pytest.raises(expected), whole_folder(folder, "mark") as part:
+        (part / "half").write_bytes(b"half")
+        raise failure(28, "No space left on device")
+    assert (folder / "mark").read_text(encoding="utf-8") == "old" and names(tmp_path) == ["shot"]
+    with pytest.raises(expected), whole_folder(tmp_path / "a" / "b", "mark"):
+        raise failure(28, "No space left on device")
+    assert names(tmp_path) == ["shot"]
+
+
+def test_a_folder_of_somebody_elses_is_never_replaced(tmp_path: Path) -> None:
+    (tmp_path / "shot").mkdir()
+    _folder(tmp_path, "in an empty one")
+    other, file = tmp_path / "other", tmp_path / "file"
+    other.mkdir()
+    (other / "thesis.txt").write_bytes(b"")
+    file.write_bytes(b"")
+    for taken, words in ((other, "holds something else"), (file, "is not a folder")):
+        with pytest.raises(InputError, match=words):
+            require_replaceable(taken, "mark")
+        with pytest.raises(InputError, match=words), whole_folder(taken, "mark"):
+            pytest.fail("it began")
+    # It came while the output was being made.
+    with (
+        pytest.raises(InputError, match="holds something else"),
+        whole_folder(tmp_path / "late", "mark"),
+    ):
+        (tmp_path / "late").mkdir()
+        (tmp_path / "late" / "thesis.txt").write_bytes(b"")
+    assert names(tmp_path) == ["file", "late", "other", "shot"]
+    assert names(other) == ["thesis.txt"] == names(tmp_path / "late")
+
+
+def test_two_folders_at_once_leave_one_or_the_other(tmp_path: Path) -> None:
+    with whole_folder(tmp_path / "shot", "mark") as first:
+        (first / "mark").write_bytes(b"first")
+        _folder(tmp_path, "second")
+    assert names(tmp_path / "shot") == ["mark"] and names(tmp_path) == ["shot"]
+
+
+def test_folders_that_killed_runs_left_are_removed(tmp_path: Path) -> None:
+    code = (
+        "import os, signal, sys; from pathlib import Path; from dafnet_addon.core.files import "
+        "whole_folder\n"
+        "with whole_folder(Path(sys.argv[1]), 'mark') as part:\n"
+        "    (part / 'half').mkdir(); os.kill(os.getpid(), signal.SIGTERM)\n"
+    )
+    killed = subprocess.run([sys.executable, "-c", code, str(tmp_path / "shot")], cwd=ROOT)
+    assert killed.returncode != 0 and len(names(tmp_path)) == 1
+    _folder(tmp_path, "whole")
+    assert names(tmp_path) == ["shot"]
