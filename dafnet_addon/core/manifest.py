@@ -27,6 +27,17 @@ _LARGEST = 1 << 26  # bytes
 _TEXTS = ("words", "weights", "version")
 
 
+@cache
+def current_version() -> str:
+    """The project's version, as the extension's manifest says it; as pip knows it where that does
+    not lie beside the package.
+    """
+    beside = Path(__file__).absolute().parents[2] / "blender_manifest.toml"
+    if beside.is_file():
+        return str(tomllib.loads(beside.read_text(encoding="utf-8"))["version"])
+    return metadata.version("dafnet-addon")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
     """How a shot was made.
@@ -97,17 +108,6 @@ def read_manifest(folder: Path) -> Manifest | None:
     whole = isinstance(found.seed, int) and isinstance(found.takes, int)
     listed = isinstance(found.warnings, list | tuple) and isinstance(found.people, list | tuple)
     return found if whole and listed and all(isinstance(each, dict) for each in tables) else None
-
-
-@cache
-def current_version() -> str:
-    """The project's version, as the extension's manifest says it; as pip knows it where that does
-    not lie beside the package.
-    """
-    beside = Path(__file__).absolute().parents[2] / "blender_manifest.toml"
-    if beside.is_file():
-        return str(tomllib.loads(beside.read_text(encoding="utf-8"))["version"])
-    return metadata.version("dafnet-addon")
 
 
 def words_hash(words: Mapping[str, Any]) -> str:
