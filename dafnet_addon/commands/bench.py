@@ -1,18 +1,33 @@
-"""``dafnet bench``: the measurements in the folder of benchmarks."""
+"""``dafnet bench``: the measurements in the folder of benchmarks, each with options of its own."""
 
 import argparse
 import importlib
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
-from ..core.errors import InputError
 from .command import Command, Progress, Result, add_weights
 
 __all__ = ["COMMAND", "benchmark"]
 
-_MEASURES = ("rest", "seats", "speed")
-"""Measurements of weights."""
+_MEASURES = {
+    "life": "whether people sway as they walk, sit down as slowly as asked, and move as they rest",
+    "rest": "clean up bodies that hover over seats or sink into them",
+    "seats": "sit on ten heights from three sides",
+    "speed": "time every system",
+}
+"""Measurements of weights, and what they do."""
+
+_DATA = {
+    "life": ("--motion", "FOLDER", "beside what the unseen people of these motion files do"),
+    "rest": (
+        "--furniture",
+        "LIBRARY",
+        "on these real pieces instead of seats made of boxes",
+    ),
+}
+"""What a measurement may be given besides: the option, what it takes, and its effect."""
 
 _RESEARCH = {"ablation": "ablation", "canonical": "canonical", "tables": "experiments"}
 """What docs/training.md and docs/experiments.md were made with, and the scripts that do it."""
@@ -28,46 +43,47 @@ def benchmark(name: str) -> ModuleType:
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", choices=[*_MEASURES, *_RESEARCH])
-    add_weights(parser)
-    parser.add_argument(
-        "--furniture",
-        type=Path,
-        metavar="LIBRARY",
-        help="with 'rest': on these real pieces instead of seats made of boxes",
-    )
     parser.add_argument(
         "arguments",
         nargs=argparse.REMAINDER,
-        help="for 'ablation', 'canonical' and 'tables'; '-- --help' lists them",
+        help="what that one wants; '-- --help' after its name lists it",
     )
 
 
+def _measured_with(name: str, arguments: Sequence[str]) -> argparse.Namespace:
+    """What a measurement is asked with: ``weights``, ``json``, and ``data`` where it takes some."""
+    parser = argparse.ArgumentParser(f"dafnet bench {name}", description=_MEASURES[name])
+    add_weights(parser)
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    if name in _DATA:
+        option, metavar, effect = _DATA[name]
+        parser.add_argument(option, dest="data", type=Path, metavar=metavar, help=effect)
+    return parser.parse_args(arguments)
+
+
 def _run(options: argparse.Namespace, progress: Progress) -> Result:
-    module = benchmark(_RESEARCH.get(options.name, options.name))
+    arguments = options.arguments[options.arguments[:1] == ["--"] :]
     if options.name in _MEASURES:
-        if options.furniture and options.name != "rest":
-            raise InputError(
-                f"'{options.name}' does not use a furniture library; leave --furniture out, or "
-                "measure 'rest'."
-            )
-        among = {"library": options.furniture} if options.furniture else {}
-        found: Result = module.measure(options.weights, progress, **among)
+        asked = _measured_with(options.name, arguments)
+        options.json = options.json or asked.json
+        data = [asked.data] if options.name in _DATA else []
+        found: Result = benchmark(options.name).measure(asked.weights, progress, *data)
         return found
 
-    arguments = options.arguments[options.arguments[:1] == ["--"] :]
-    text: str = module.main(arguments)
+    text: str = benchmark(_RESEARCH[options.name]).main(arguments)
     return text, text
 
 
 COMMAND = Command(
     name="bench",
     summary=(
-        "measure: 'rest' cleans up bodies that hover over seats or sink into them; 'seats' sits on "
-        "ten heights from three sides; 'speed' times every system; 'canonical' fits bodies to the "
-        "skeleton; 'ablation' and 'tables' train and compare"
+        f"measure: {'; '.join(f'{name!r}: {does}' for name, does in _MEASURES.items())}; "
+        "'canonical' fits bodies to the skeleton; 'ablation' and 'tables' train and compare"
     ),
     add_arguments=_add_arguments,
     run=_run,
-    needs=lambda options: () if options.name in ("rest", "seats", "canonical") else ("torch",),
+    needs=lambda options: (
+        () if options.name in ("life", "rest", "seats", "canonical") else ("torch",)
+    ),
     folder="benchmarks",
 )

@@ -36,9 +36,11 @@ def speed(joints: np.ndarray, fps: float, which: tuple[int, ...]) -> float:
     return float(np.linalg.norm(np.diff(joints[:, list(which)], axis=0), axis=-1).mean() * fps)
 
 
-def band_speeds(joints: np.ndarray, fps: float, which: tuple[int, ...]) -> dict[str, float]:
+def band_speeds(
+    joints: np.ndarray, fps: float, which: tuple[int, ...], periods: float = 2.0
+) -> dict[str, float]:
     """Root mean square speed of some joints in each of ``BANDS``, metres a second; NaN where the
-    motion is too short for it.
+    motion is shorter than so many ``periods`` of the band's slowest.
     """
     frames = len(joints)
     frequency = np.fft.rfftfreq(max(frames, 1), 1.0 / fps)
@@ -52,7 +54,7 @@ def band_speeds(joints: np.ndarray, fps: float, which: tuple[int, ...]) -> dict[
     found = {}
     for name, (low, high) in BANDS.items():
         inside = (frequency >= low) & (frequency < high)
-        long_enough = frames / fps >= 2.0 / low
+        long_enough = frames / fps >= periods / low
         found[name] = (
             float(np.sqrt(2.0 * power[inside].sum() / (weight * max(frames, 1))))
             if long_enough
@@ -89,11 +91,11 @@ def sway(joints: np.ndarray, fps: float) -> float:
     return float(np.median(np.ptp(views(aside, second), axis=-1)[whole]))
 
 
-def descent(joints: np.ndarray, fps: float, seated: int) -> float:
-    """Seconds from 10 to 90 % of the pelvis' way down to where it rests from frame ``seated`` on;
-    NaN where it came from no higher.
+def descent(joints: np.ndarray, fps: float, seated: int, before: float = _BEFORE) -> float:
+    """Seconds from 10 to 90 % of the pelvis' way down to where it rests from frame ``seated`` on,
+    begun within so many seconds ``before``; NaN where it came from no higher.
     """
-    start = max(0, seated - round(_BEFORE * fps))
+    start = max(0, seated - round(before * fps))
     height = joints[start : seated + 1, PELVIS, 2]
     resting, highest = height[-1], height.max()
     if highest - resting < 0.15:

@@ -9,7 +9,9 @@ from dafnet_addon.cli import main
 pytestmark = pytest.mark.torch
 
 
-@pytest.mark.parametrize("name", ["ablation", "canonical", "tables"])
+@pytest.mark.parametrize(
+    "name", ["ablation", "canonical", "tables", "life", "rest", "seats", "speed"]
+)
 def test_each_says_what_it_wants(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", name, "--", "--help"]) == 0
     assert f"dafnet bench {name}" in "".join(capsys.readouterr())
