@@ -179,14 +179,16 @@ def prepare_without_pieces(dataset: Path, folder: Path, out: Path) -> None:
     prepare(folder, out, described["windows"], cores(), described["seed"])
 
 
-def train_on(dataset: Path, folder: Path, minutes: float, begin_with: Weights) -> Path:
-    """Train (or go on with) a run in ``folder`` as ``small.toml`` trains, predictor and flow, for
-    ``minutes`` a part (the predictor for a fifth of that), from these weights on: its weights file.
+def train_on(
+    dataset: Path, folder: Path, minutes: float, begin_with: Weights, **changes: Any
+) -> Path:
+    """Train (or go on with) a run in ``folder`` as ``small.toml`` trains but for ``changes``,
+    predictor and flow, for ``minutes`` a part (the predictor for a fifth of that), from these
+    weights on: its weights file.
     """
     model = ModelConfig(**begin_with.config["model"])
-    training = replace(
-        TRAINING, batch=40, peak=1e-3, minutes_predictor=minutes / 5, minutes_flow=minutes
-    )
+    budget = {"minutes_predictor": minutes / 5, "minutes_flow": minutes}
+    training = replace(TRAINING, **{"batch": 40, "peak": 1e-3, **budget, **changes})
     train(dataset, folder, model, training, begin_with=begin_with)
     file = folder / "weights.safetensors"
     export(file, *trained_networks(folder), {})

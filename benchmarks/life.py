@@ -29,7 +29,7 @@ from dafnet_addon.core.skeleton import ANKLES, FEET, PELVIS, TARGETS
 from dafnet_addon.core.weights import Weights
 from dafnet_addon.data.held_out.captured import HeldClip, held_out
 
-__all__ = ["ASKED", "LIMITS", "led_by", "measure"]
+__all__ = ["ASKED", "LIMITS", "feet", "led_by", "measure"]
 
 Noise = Sequence[tuple[float, int]]
 
@@ -178,7 +178,7 @@ def _lives(
     return {state: dict(rows) for state, rows in found.items()}
 
 
-def _feet(
+def feet(
     weights: Weights, clips: Sequence[HeldClip], progress: Callable[[float], None]
 ) -> Iterator[dict[str, Any]]:
     """How far feet are from where captured ones were, asked for with head and hands, and without
@@ -226,7 +226,7 @@ def measure(
             for joints in _straight(clip)
         ]
         report["life"] = _lives(weights, clips, noise, partial(share, 0.35, 0.8))
-        report["feet"] = list(_feet(weights, clips[::every], partial(share, 0.8, 1.0)))
+        report["feet"] = list(feet(weights, clips[::every], partial(share, 0.8, 1.0)))
 
     progress(1.0)
     return report, "\n".join(_summary(report))
@@ -262,8 +262,8 @@ def _summary(report: dict[str, Any]) -> Iterator[str]:
             cells = ", ".join(f"{band} {shares[band]:.2f}" for band in BANDS)
             yield f"  life over the captured one, {state}: {cells}"
 
-    if feet := report.get("feet"):
-        asked, free = (np.mean([each[run] for each in feet]) for run in ("asked", "not asked"))
+    if led := report.get("feet"):
+        asked, free = (np.mean([each[run] for each in led]) for run in ("asked", "not asked"))
         yield (
             f"Feet are {asked:.1f} cm from where they are asked for with head and hands, "
             f"{free:.1f} without being asked for"

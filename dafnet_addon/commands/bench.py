@@ -29,7 +29,12 @@ _DATA = {
 }
 """What a measurement may be given besides: the option, what it takes, and its effect."""
 
-_RESEARCH = {"ablation": "ablation", "canonical": "canonical", "tables": "experiments"}
+_RESEARCH = {
+    "ablation": "ablation",
+    "canonical": "canonical",
+    "life-ablation": "life_ablation",
+    "tables": "experiments",
+}
 """What docs/training.md and docs/experiments.md were made with, and the scripts that do it."""
 
 
@@ -78,7 +83,8 @@ COMMAND = Command(
     name="bench",
     summary=(
         f"measure: {'; '.join(f'{name!r}: {does}' for name, does in _MEASURES.items())}; "
-        "'canonical' fits bodies to the skeleton; 'ablation' and 'tables' train and compare"
+        "'canonical' fits bodies to the skeleton; 'ablation', 'life-ablation' and 'tables' "
+        "train and compare"
     ),
     add_arguments=_add_arguments,
     run=_run,

@@ -17,7 +17,7 @@ from ..motion.motion import Motion
 from ..synthesis.compose import composed
 from .motions import Draws
 from .usable import AT_BENCHES, AT_BOARDS, SITS, STANDS, WALKS
-from .windows import Window, draw_window
+from .windows import AS_PEOPLE_DO, Augmentation, Window, draw_window
 
 __all__ = ["SHARES", "moments_of", "sample"]
 
@@ -141,7 +141,11 @@ def _without(why: str, motions: list[Motion]) -> str:
 
 
 def sample(
-    rng: np.random.Generator, motions: list[Motion], draws: Draws, bank: ShapeBank = NO_BANK
+    rng: np.random.Generator,
+    motions: list[Motion],
+    draws: Draws,
+    bank: ShapeBank = NO_BANK,
+    augmentation: Augmentation = AS_PEOPLE_DO,
 ) -> tuple[str, Window]:
     """A kind of moment by its share, a moment of that kind, and a window around it.
 
@@ -153,7 +157,7 @@ def sample(
         kind = kinds[rng.choice(len(kinds), p=share / share.sum())]
         rows, weight = draws[kind]
         motion, frame = rows[rng.choice(len(rows), p=weight)]
-        window = draw_window(rng, motions[motion], int(frame), bank)
+        window = draw_window(rng, motions[motion], int(frame), bank, augmentation)
         if window is not None:
             return kind, window
 

@@ -12,7 +12,7 @@ and left out), ``fits.txt`` (how often furniture fits), ``preview.png``, ``postu
 import json
 import multiprocessing
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,7 @@ from .motions import Draws, read_motions, write_motions
 from .preview import by_posture, by_source, preview
 from .splits import role_of_clip, role_of_maker
 from .usable import calibrated, motions_of, not_used
+from .windows import AS_PEOPLE_DO, Augmentation
 
 __all__ = ["bank_in", "prepare", "load_pool", "FURNITURE", "POSE_UNIT"]
 
@@ -58,10 +59,13 @@ POSE_UNIT = 1e-4
 """Poses are stored as whole numbers of these (metres)."""
 
 
-_known: tuple[list[Motion], Draws, ShapeBank]
+Known = tuple[list[Motion], Draws, ShapeBank, Augmentation]
+"""What every window is drawn from."""
+
+_known: Known
 
 
-def _start(known: tuple[list[Motion], Draws, ShapeBank]) -> None:
+def _start(known: Known) -> None:
     global _known
     _known = known
 
@@ -86,7 +90,7 @@ def _written(file: Path, text: Callable[[], str]) -> None:
         save_text(file, text())
 
 
-def _read(folder: Path, out: Path) -> dict[str, Any]:
+def _read(folder: Path, out: Path, leave_out: Collection[str]) -> dict[str, Any]:
     """Read the motion files; write the training's motions, those that choose weights, and the
     summary.
 
@@ -94,7 +98,7 @@ def _read(folder: Path, out: Path) -> dict[str, Any]:
     known of the training set.
     """
     left_out: list[str] = []
-    clips = list(read_clips(folder, left_out))
+    clips = [clip for clip in read_clips(folder, left_out) if clip.source not in leave_out]
     chooses = "choose" if any(role_of_clip(clip) == "choose" for clip in clips) else "tell"
     found = calibrated(clips, (chooses, "train"), left_out)
     licence_of = {(clip.source, clip.name): clip.licence for clip, _ in found}
@@ -170,14 +174,17 @@ def prepare(
     seed: int = 0,
     progress: Callable[[float], None] = lambda _: None,
     furniture: Path | None = None,
+    augmentation: Augmentation = AS_PEOPLE_DO,
+    leave_out: Collection[str] = (),
 ) -> None:
     """Make (or go on making) the dataset ``out`` from the motion files in ``folder``. What is
     finished is kept.
 
     Real pieces of the library in the folder ``furniture`` stand among the furniture, where one is
-    given. Files, bodies and clips that cannot be used are left out, which ``summary.txt`` says.
-    Raises InputError where the folder holds no motion files, or none to train on or none that are
-    held out, and where ``out`` holds another dataset.
+    given. ``leave_out``: sources whose clips are not used. Files, bodies and clips that cannot be
+    used are left out, which ``summary.txt`` says. Raises InputError where the folder holds no
+    motion files, or none to train on or none that are held out, and where ``out`` holds another
+    dataset.
     """
     record = out / "dataset.json"
     described = json.loads(record.read_text(encoding="utf-8")) if record.exists() else {}
@@ -187,7 +194,7 @@ def prepare(
         left.unlink()
 
     if not described:
-        described = _read(folder, out)
+        described = _read(folder, out, leave_out)
         if furniture:
             described["furniture"] = _furniture(furniture, out)
 
@@ -210,7 +217,7 @@ def prepare(
         missing = [task for task in tasks if _windows_in(task[0]) != task[2]]
         # Forked: the motions are read once and shared by all.
         with multiprocessing.get_context("fork").Pool(
-            max(processes, 1), _start, ((*known, shapes),)
+            max(processes, 1), _start, ((*known, shapes, augmentation),)
         ) as pool:
             for k, _ in enumerate(pool.imap_unordered(_shard, missing)):
                 progress((done + k + 1) / (1 + len(train)))

@@ -39,6 +39,8 @@ from ..motion.timing import (
 )
 
 __all__ = [
+    "AS_PEOPLE_DO",
+    "Augmentation",
     "HIGHEST",
     "HISTORY",
     "LENGTH",
@@ -68,6 +70,22 @@ _LOWERED = 0.3  # metres; from a high stool further down, every wave of the pelv
 
 
 @dataclass(frozen=True)
+class Augmentation:
+    """What is done to captured motion so that it is as people and animators are; all of it, but
+    where it is measured what each gives.
+
+    ``paths_by_hand``: root paths are smoothed, as drawn curves are. ``retimed``: ways to seats and
+    from them take other times.
+    """
+
+    paths_by_hand: bool = True
+    retimed: bool = True
+
+
+AS_PEOPLE_DO = Augmentation()
+
+
+@dataclass(frozen=True)
 class Window:
     """``poses`` (80, 66) in each frame's root, ``velocity`` (80, 3); of the last 70 frames:
     ``ahead`` (70, 18) and ``root`` (70, 3), its place x, y and yaw in the world of ``boxes``
@@ -83,13 +101,14 @@ class Window:
 
 
 def _animated_by_hand(
-    rng: np.random.Generator, path: RootPath, ways: Sequence[Transition]
+    rng: np.random.Generator, path: RootPath, ways: Sequence[Transition], smooth: bool
 ) -> RootPath:
-    """The root as an animator's curves give it: without the gait's sway, and now and then smoothly
-    a little wrong.
+    """The root as an animator's curves give it: without the gait's sway where it is to be
+    ``smooth``, and now and then smoothly a little wrong.
     """
     wanted = rng.uniform(*_SMOOTHING)
-    path = smoothed_by_hand(path, np.sqrt(wanted**2 - _SMOOTHING[0] ** 2), ways)
+    if smooth:
+        path = smoothed_by_hand(path, np.sqrt(wanted**2 - _SMOOTHING[0] ** 2), ways)
     if rng.random() < _WRONG:
         wobble = smoothed(
             RootPath(rng.normal(size=path.position.shape), rng.normal(size=len(path))), 12.0, 12.0
@@ -161,7 +180,11 @@ def _near_shapes(placed: np.ndarray, path: RootPath) -> np.ndarray:
 
 
 def draw_window(
-    rng: np.random.Generator, motion: Motion, focus: int | None = None, bank: ShapeBank = NO_BANK
+    rng: np.random.Generator,
+    motion: Motion,
+    focus: int | None = None,
+    bank: ShapeBank = NO_BANK,
+    augmentation: Augmentation = AS_PEOPLE_DO,
 ) -> Window | None:
     """One augmented, furnished window, around frame ``focus`` where given; None where this draw
     cannot be used.
@@ -187,11 +210,15 @@ def draw_window(
     speed = rng.uniform(0.85, 1.2) if rng.random() < 0.4 else 1.0
     ways = transitions(joints, [replace(r, start=r.start - low, end=r.end - low) for r in rests])
     stretches = stretches_of(rng, ways, backward)
+    if not augmentation.retimed:
+        stretches = [1.0] * len(ways)
     clock = clock_of(len(joints), ways, stretches, speed)
     if len(clock) < _FRAMES:
         return None
 
-    joints = at_clock(braced(joints, ways, stretches), clock)
+    if augmentation.retimed:
+        joints = braced(joints, ways, stretches)
+    joints = at_clock(joints, clock)
     frame = int(np.searchsorted(clock, focus - low))
     if backward:
         joints, frame = joints[::-1], len(joints) - 1 - frame
@@ -213,7 +240,7 @@ def draw_window(
     room, _ = furnished(rng, joints, path, bank, seen)
     if room is None:
         return None
-    path = _animated_by_hand(rng, path, ways)
+    path = _animated_by_hand(rng, path, ways, augmentation.paths_by_hand)
 
     cut = slice(first, first + _FRAMES)
     poses = to_root(path, joints)[cut].reshape(_FRAMES, -1)
