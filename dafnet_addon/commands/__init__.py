@@ -11,6 +11,7 @@ from . import (
     evaluate,
     figures,
     info,
+    populate,
     prepare,
     train,
     validate,
@@ -22,6 +23,7 @@ __all__ = ["COMMANDS", "Command"]
 COMMANDS = (
     demo.COMMAND,
     bake.COMMAND,
+    populate.COMMAND,
     info.COMMAND,
     prepare.COMMAND,
     train.COMMAND,

@@ -43,6 +43,7 @@ __all__ = [
     "targets_of",
     "turns_of",
     "PREROLL",
+    "STAYS",
 ]
 
 PREROLL = 70
@@ -64,6 +65,10 @@ _REACH = 1.25
 _FEET_REACH_FROM = np.array([0.0, 0.0, 0.7])
 _FEET_REACH = 1.1
 
+STAYS = (
+    "The root does not move, so the character stays where it is; animate the root to make it walk."
+)
+"""What is said of a root that does not move in the whole shot."""
 _STILL = 0.02  # metres or radians in the whole shot, under which a root does not move
 _CROWDED = 0.35  # share of the sensor that furniture fills, above which the user is told
 _AROUND = 6  # spheres of the sensor's innermost ring
@@ -141,10 +146,7 @@ def _path_of(
             "There is only one frame, so the result is a pose; widen the frame range to get motion."
         )
     elif moved < _STILL and np.ptp(raw.yaw) < _STILL:
-        warnings.append(
-            "The root does not move, so the character stays where it is; animate the root to make "
-            "it walk."
-        )
+        warnings.append(STAYS)
 
     step = np.linalg.norm(np.diff(raw.position, axis=0), axis=1) / controls.scale
     if len(step) and step.max() > _SPRINT / controls.fps:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.paths import facing
+from .others import Occupied
 from .person import SPEED, Person
 from .places import Place, has_room
 from .room import Piece
@@ -21,7 +22,7 @@ Job = Generator[float, None, _T]
 _FREE = "all places there are taken; choose another, or send fewer people."
 
 
-class Taken(InputError):
+class Taken(Occupied):
     """Somebody else keeps the place."""
 
     def __init__(self) -> None:

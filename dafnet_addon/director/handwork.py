@@ -22,7 +22,7 @@ from .places import (
     standing_pelvis,
 )
 from .room import Piece
-from .seats import SeatPlace
+from .seats import NoSeat, SeatPlace
 from .tasks import LookAt, Reach, WorkAt, WriteOn
 from .tops import Top, beside_top, surface_before, top_of
 
@@ -33,6 +33,7 @@ _TRIED = 5  # places at one thing that are tried before another is
 _AT_A_WALL = 0.15  # metres around who stands close to what he uses
 _STANDING_TOP = 0.84  # metres over the floor, of a top that one works at standing
 _LOW_TOP = 0.68  # metres over the floor, of a top on which one handles things standing
+_BY = 1.0  # metres from the place that is named within which a seat is there
 _AT_DESK = 0.9  # metres between a desk and the seats that stand at it
 _SEAT_SIZES = (0.2, 3.0)  # metres across, of what stands at a desk to sit on
 _RINGS = ((0.34, 0.46), (0.46, 0.58), (0.58, 0.72))  # metres from what is reached
@@ -84,10 +85,10 @@ def _come_to(
         return _in_reach(top, Place(seat.position, seat.yaw), seated_pelvis(seat)) is not None
 
     middle = middle_of(piece)[:2]
-    for seat in chooser.by_choice(_seats_at(person, piece), middle_of, "nearest", near):
+    for seat in chooser.by_choice(_seats_at(person, piece, near), middle_of, "nearest", near):
         try:
             yield from take_seat(chooser, seat, middle, task.choose, fits=fits)
-        except Taken:
+        except (Taken, NoSeat):  # somebody's, or a plant beside the desk
             continue
         except InputError as error:
             refused = refused or error
@@ -127,8 +128,10 @@ def _reached(top: Top, person: Person) -> Surface:
     return surface
 
 
-def _seats_at(person: Person, desk: Piece) -> list[Piece]:
-    """Furniture beside a desk that may be sat on."""
+def _seats_at(person: Person, desk: Piece, near: np.ndarray | None) -> list[Piece]:
+    """Furniture beside a desk that may be sat on, where a place (2,) to work by is named only what
+    stands there.
+    """
     low, high = desk.box()
     found = []
     for piece in person.room.pieces().values():
@@ -136,6 +139,8 @@ def _seats_at(person: Person, desk: Piece) -> list[Piece]:
         gap = np.maximum(np.maximum(box[0] - high, low - box[1]), 0.0)[:2]
         across = float((box[1] - box[0])[:2].max())
         is_near = float(np.linalg.norm(gap)) < _AT_DESK
+        if near is not None and np.linalg.norm(box.mean(axis=0)[:2] - near) > _BY:
+            continue
         if piece.name != desk.name and is_near and _SEAT_SIZES[0] < across < _SEAT_SIZES[1]:
             found.append(piece)
     return found

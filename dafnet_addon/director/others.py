@@ -8,10 +8,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..core.errors import InputError
 from ..core.solids import Box
 from .plans import Plan
 
-__all__ = ["APART", "Others"]
+__all__ = ["APART", "Occupied", "Others"]
 
 APART = 0.5
 """Metres between two people's roots; a body's capsule has half of it as its radius."""
@@ -20,6 +21,10 @@ _STAYS = 0.15  # metres within which somebody counts as standing still
 _WATCHED = 15.0  # seconds for which he has to
 _TALL = 0.85  # metres; half the height of one who is walked round
 _WIDE = 0.34  # metres; half the width of one, since ways cut corners
+
+
+class Occupied(InputError):
+    """Others are where somebody is to be, or in the way there."""
 
 
 class Others:

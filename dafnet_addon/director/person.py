@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.errors import InputError
 from ..core.paths import Stop, facing, route
 from ..core.progress import within
 from ..core.root import RootPath, forward_of
@@ -20,7 +19,7 @@ from ..core.solids import Box
 from ..core.trails import trail
 from .approach import pair, way_in
 from .beds import Bed
-from .others import APART, Others
+from .others import APART, Occupied, Others
 from .places import Place, seated_pelvis, standing_pelvis
 from .plans import Hold
 from .room import Piece, Room
@@ -344,7 +343,7 @@ class Person:
             if (gap >= wanted - _BRUSHES).all():
                 return float(delay)
 
-        raise InputError(
+        raise Occupied(
             "Somebody else stays in the way, or comes there later; begin at another time, or go "
             "elsewhere."
         )

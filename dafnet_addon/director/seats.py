@@ -14,7 +14,7 @@ from ..core.solids import Box, Mesh
 from ..core.text import metres
 from .surfaces import HeightField, height_field, parts_of_surfaces
 
-__all__ = ["SeatPlace", "on_a_seat", "rectangle_axes", "seat_of"]
+__all__ = ["NoSeat", "SeatPlace", "on_a_seat", "rectangle_axes", "seat_of"]
 
 _CELL = 0.03
 """Metres; of the cells in which furniture is looked at from above."""
@@ -289,6 +289,10 @@ def on_a_seat(
     return False
 
 
+class NoSeat(InputError):
+    """There is nothing to sit on."""
+
+
 @stepwise
 def seat_of(
     solids: Sequence[Box | Mesh],
@@ -303,14 +307,14 @@ def seat_of(
     In front of a back, facing away from it. Without a back, facing along the seat's shorter side,
     to where ``towards`` (2,) lies; on what is as deep as a bed, on an edge towards there, at which
     nothing stands up. On a wide seat in the middle, or beside ``near`` (2,) where given. Raises
-    InputError where there is nothing to sit on, which is a level surface between 22 and 85 cm over
+    NoSeat where there is nothing to sit on, which is a level surface between 22 and 85 cm over
     ``floor``. ``size``: of the character, over 1.75 m, by which messages give lengths.
     """
     parts = yield from within(parts_of_surfaces.steps(solids, 0.6 * _CELL), 0.0, 0.5)
     field = yield from within(_field_of(parts, floor), 0.5, 0.6)
     found = (yield from within(_seat_level(field, floor), 0.6, 1.0)) if field else None
     if field is None or found is None:
-        raise InputError(_why_not_a_seat(solids, name, size))
+        raise NoSeat(_why_not_a_seat(solids, name, size))
 
     level, cells = found
     places = field.middles(cells)

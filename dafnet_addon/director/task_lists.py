@@ -9,18 +9,16 @@ A task is a table whose one verb says what is done, and to what; the other words
     ]
 """
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError
-from ..core.text import nearest_known, printable, read_json
+from ..core.tables import read_tables, require_known
+from ..core.text import nearest_known, printable
 from .tasks import VERBS, Task, options, verb
 
 __all__ = ["plain_tasks", "read_task_file", "tasks_from"]
-
-_LARGEST = 1 << 20  # bytes of a file of tasks
 
 
 def tasks_from(data: object, whose: str = "") -> tuple[Task, ...]:
@@ -102,23 +100,8 @@ def read_task_file(file: Path) -> tuple[Task, ...]:
 
     Raises InputError where it cannot be read, is neither, or holds something else as well.
     """
-    try:
-        if file.stat().st_size > _LARGEST:
-            raise InputError(
-                f"'{file}' is larger than a file of tasks; give the one that you mean."
-            )
-        text = file.read_text(encoding="utf-8")
-        data = read_json(text) if file.suffix.lower() == ".json" else tomllib.loads(text)
-    except OSError as error:
-        raise InputError(f"'{file}' cannot be read: {error.strerror}.") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"'{file}' is not TOML: {error}; mend it there.") from error
-    except ValueError as error:
-        raise InputError(f"'{file}' {error}; write the tasks as UTF-8, TOML or JSON.") from error
-
-    if not isinstance(data, dict) or "tasks" not in data:
+    data = read_tables(file, "tasks")
+    if "tasks" not in data:
         raise InputError(f"'{file}' has no 'tasks'; write them as a list of tables with that name.")
-    for key in data:
-        if key != "tasks":
-            raise InputError(f"'{file}' does not know '{key}'; {nearest_known(key, ['tasks'])}")
+    require_known(data, ["tasks"], f"'{file}'")
     return tasks_from(data["tasks"])

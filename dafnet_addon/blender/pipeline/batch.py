@@ -21,7 +21,7 @@ from . import job
 if TYPE_CHECKING:
     from ...core.weights import Weights
 
-__all__ = ["bake_takes", "save_scene"]
+__all__ = ["bake_takes", "open_file", "save_scene"]
 
 
 def bake_takes(
@@ -107,6 +107,12 @@ def _same(one: Path, other: Path) -> bool:
         return one.samefile(other)
     except OSError:
         return os.path.realpath(one) == os.path.realpath(other)
+
+
+def open_file(file: Path) -> tuple[str, ...]:
+    """Open a file, and say what is wrong with it. ``InputError`` where it cannot be opened."""
+    _open(file)
+    return tuple(_warnings_about_file(in_place=False))
 
 
 def _open(file: Path) -> None:

@@ -22,7 +22,7 @@ from .dependencies import Dependencies
 from .lookup import find_collection, find_object, find_scene
 from .playback import play_steps
 
-__all__ = ["Furniture", "array", "furniture_at", "furniture_now", "furniture_of"]
+__all__ = ["Furniture", "array", "furniture_at", "furniture_now", "furniture_of", "meshes_in"]
 
 _DRAWN_THROUGH = {"WIRE", "BOUNDS"}
 """Display types that do not look solid."""
@@ -111,6 +111,31 @@ def furniture_at(
 
     yield from play_steps(context, [frame], simulations, begin)
     return furniture.solids(metres_per_unit(scene)) if furniture else ()
+
+
+def meshes_in(
+    depsgraph: bpy.types.Depsgraph, members: set[bpy.types.Object], unit: float
+) -> Iterator[Mesh]:
+    """The evaluated meshes of some objects, what they instance included, that have faces, by their
+    objects' names; world, metres (``unit``: of a Blender unit). Those of one mesh share its arrays.
+    """
+    shapes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+    for instance in depsgraph.object_instances:
+        owner = _owner(instance)
+        if owner not in members or instance.object.type != "MESH":
+            continue
+        if not (instance.is_instance or instance.show_self):
+            continue
+        pointer = instance.object.data.as_pointer()
+        if pointer not in shapes:
+            shapes[pointer] = _geometry(instance.object)
+        vertices, triangles = shapes[pointer]
+        if len(triangles):
+            piece = _Piece(
+                _key(instance), owner.name, None, vertices, triangles, _softness(instance)
+            )
+            piece.matrices.append(array(instance.matrix_world))
+            yield _solid(piece, unit)
 
 
 class Furniture:

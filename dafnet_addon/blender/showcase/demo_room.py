@@ -32,8 +32,10 @@ __all__ = [
     "FURNITURE",
     "Part",
     "Room",
+    "Triple",
     "add_piece",
     "build_room",
+    "four_legs",
     "key_channels",
     "new_collection",
     "run_demo",
@@ -58,7 +60,7 @@ class Part:
     round: bool = False
 
 
-def _four(
+def four_legs(
     material: str,
     x: float,
     y: float,
@@ -92,11 +94,11 @@ FURNITURE: dict[str, tuple[Part, ...]] = {
         Part("Oak", (0.43, 0.024, 0.20), (0, -0.245, 0.76), (8, 0, 0), 0.010),
         Part("Oak", (0.034, 0.034, 0.46), (-0.185, -0.222, 0.635), (8, 0, 0), 0.008, True),
         Part("Oak", (0.034, 0.034, 0.46), (0.185, -0.222, 0.635), (8, 0, 0), 0.008, True),
-        *_four("Oak", 0.165, 0.155, 0.425, 0.036, 5.0, 0.015),
+        *four_legs("Oak", 0.165, 0.155, 0.425, 0.036, 5.0, 0.015),
     ),
     "Stool": (
         Part("Teal", (0.37, 0.37, 0.050), (0, 0, 0.605), bevel=0.016, round=True),
-        *_four("Oak", 0.105, 0.105, 0.595, 0.032, 7.0),
+        *four_legs("Oak", 0.105, 0.105, 0.595, 0.032, 7.0),
         Part("Oak", (0.30, 0.020, 0.020), (0, 0.150, 0.22), bevel=0.005),
         Part("Oak", (0.30, 0.020, 0.020), (0, -0.150, 0.22), bevel=0.005),
         Part("Oak", (0.020, 0.30, 0.020), (0.150, 0, 0.22), bevel=0.005),
@@ -104,7 +106,7 @@ FURNITURE: dict[str, tuple[Part, ...]] = {
     ),
     "Desk": (
         Part("Oak", (1.40, 0.68, 0.032), (0, 0, 0.724), bevel=0.010),
-        *_four("Graphite", 0.60, 0.26, 0.71, 0.036, 2.5),
+        *four_legs("Graphite", 0.60, 0.26, 0.71, 0.036, 2.5),
         Part("Paper", (0.42, 0.50, 0.30), (0.40, 0.02, 0.555), bevel=0.010),
         Part("Graphite", (0.12, 0.012, 0.014), (0.40, 0.277, 0.61), bevel=0.003),
         Part("Graphite", (0.12, 0.012, 0.014), (0.40, 0.277, 0.49), bevel=0.003),
@@ -135,7 +137,7 @@ FURNITURE: dict[str, tuple[Part, ...]] = {
         Part("Slate", (1.95, 0.16, 0.62), (0, -0.40, 0.40), bevel=0.050),
         Part("Slate", (0.18, 0.86, 0.50), (-0.895, 0.01, 0.34), bevel=0.055),
         Part("Slate", (0.18, 0.86, 0.50), (0.895, 0.01, 0.34), bevel=0.055),
-        *_four("Oak", 0.86, 0.32, 0.085, 0.040, 0.0),
+        *four_legs("Oak", 0.86, 0.32, 0.085, 0.040, 0.0),
         Part("Coral", (0.42, 0.14, 0.40), (-0.58, -0.06, 0.63), (20, 12, 8), 0.060),
     ),
     "Bed": (  # one lies down along it with the head to +x, from where one sat on its edge
@@ -175,6 +177,13 @@ _COLOURS = {
     "Wall": (0.60, 0.67, 0.69),
     "Rug": (0.74, 0.68, 0.58),
     "Rug Border": (0.30, 0.40, 0.46),
+    "Walnut": (0.33, 0.20, 0.12),
+    "Brass": (0.78, 0.60, 0.28),
+    "Leaf": (0.22, 0.42, 0.22),
+    "Concrete": (0.52, 0.53, 0.54),
+    "Velvet": (0.55, 0.10, 0.13),
+    "Carpet": (0.24, 0.20, 0.26),
+    "Night": (0.16, 0.17, 0.24),
 }
 
 

@@ -1,0 +1,116 @@
+"""A scene of Blender's as the director's room: what stands in it, what has a name, where the floor
+is.
+"""
+
+from collections.abc import Iterator
+
+import bpy
+import numpy as np
+
+from ...core.solids import Mesh
+from ...director.room import Room
+from ..character.armature import is_character, metres_per_unit
+from ..scene.furniture import meshes_in
+
+__all__ = ["room_of", "standing_objects"]
+
+
+def standing_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
+    """The visible objects that may be furniture: all but armatures, and what is parented to them,
+    follows or is deformed by them.
+    """
+    bodies: set[bpy.types.Object] = set()
+    for each in scene.objects:
+        if each.type == "ARMATURE":
+            bodies |= {each, *each.children_recursive}
+            bodies.add(each.dafnet.root if is_character(each) else None)
+        elif any(m.type == "ARMATURE" and m.object is not None for m in each.modifiers):
+            bodies.add(each)
+    return {each for each in scene.objects if each.visible_get()} - bodies
+
+
+def room_of(context: bpy.types.Context) -> Room:
+    """The scene in its present frame; world, metres.
+
+    Meshes are furniture by the names of their objects, those parented to another mesh parts of it;
+    collections are groups; empties, cameras and lights can be looked at or walked to, and curves
+    walked along.
+    """
+    scene = context.scene
+    unit = metres_per_unit(scene)
+    members = standing_objects(scene)
+    solids = tuple(meshes_in(context.evaluated_depsgraph_get(), members, unit))
+    named = {solid.name for solid in solids}
+    others = [each for each in scene.objects if each in members and each.name not in named]
+    return Room(
+        solids=solids,
+        parts={
+            each.name: _whole(each, named)
+            for each in members
+            if each.name in named and _whole(each, named) != each.name
+        },
+        groups=dict(_groups(scene, named)),
+        points={
+            each.name: np.array(each.matrix_world.translation) * unit
+            for each in others
+            if each.type in {"EMPTY", "CAMERA", "LIGHT"}
+        },
+        lines={each.name: line for each in others if (line := _line(each, unit)) is not None},
+        floor=_floor(solids),
+    )
+
+
+def _whole(part: bpy.types.Object, named: set[str]) -> str:
+    """The name of the uppermost mesh that an object is parented to."""
+    while part.parent is not None and part.parent.name in named:
+        part = part.parent
+    return str(part.name)
+
+
+def _groups(scene: bpy.types.Scene, named: set[str]) -> Iterator[tuple[str, list[str]]]:
+    for collection in scene.collection.children_recursive:
+        members = [each.name for each in collection.all_objects if each.name in named]
+        if members:
+            yield collection.name, members
+
+
+def _line(curve: bpy.types.Object, unit: float) -> np.ndarray | None:
+    """Points (N, 3) along a curve without a body."""
+    if curve.type != "CURVE" or not curve.data.splines:
+        return None
+    made = curve.to_mesh()
+    try:
+        local = np.array([vertex.co for vertex in made.vertices], float).reshape(-1, 3)
+    finally:
+        curve.to_mesh_clear()
+    if len(local) < 2:
+        return None
+    matrix = np.array(curve.matrix_world)
+    return np.asarray((local @ matrix[:3, :3].T + matrix[:3, 3]) * unit)
+
+
+_LEVEL = 0.02
+"""Metres of height that count as one level."""
+
+
+def _floor(solids: tuple[Mesh, ...]) -> float:
+    """The height of the floor: the lowest level at which surfaces that look up are at least half as
+    large as at any other; 0 where there are none.
+    """
+    levels, areas = [np.zeros(0, int)], [np.zeros(0)]
+    for solid in solids:
+        matrix = np.asarray(solid.matrix, float).reshape(-1, 4, 4)[0]
+        world = np.asarray(solid.vertices) @ matrix[:3, :3].T + matrix[:3, 3]
+        corners = world[np.asarray(solid.triangles)]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(normal, axis=1)
+        up = normal[:, 2] > 0.99 * area
+        levels.append(np.rint(corners[up, :, 2].mean(axis=1) / _LEVEL).astype(int))
+        areas.append(area[up])
+
+    level = np.concatenate(levels)
+    if not len(level):
+        return 0.0
+    known, which = np.unique(level, return_inverse=True)
+    total = np.bincount(which.reshape(-1), np.concatenate(areas))
+    return float(known[total >= 0.5 * total.max()][0]) * _LEVEL

@@ -1,0 +1,84 @@
+"""Rooms filled with people: the café from its file to the folder, and what is said of what cannot
+be.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender.populating.populate import SCENE, populate
+from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+from bl_ext.user_default.dafnet.dafnet_addon.core.manifest import MANIFEST, read_manifest
+
+from kit.places import ROOT
+from kit.stage import bone_heads
+
+SITS = {"sit_on": "Chair.*", "seconds": 1}
+
+
+def cafe(*people: dict[str, Any], **words: Any) -> dict[str, Any]:
+    return {"room": "cafe", "seconds": 1, "people": list(people) or [{"tasks": [SITS]}], **words}
+
+
+def test_people_sit_on_seats_of_their_own(blender: Any, tmp_path: Path) -> None:
+    group = {"count": 3, "height": [1.55, 1.9], "tasks": [{**SITS, "choose": "random"}]}
+    made = populate(cafe(group, seed=2), tmp_path / "out")
+
+    blender.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / SCENE))
+    assert (blender.context.scene.frame_start, blender.context.scene.frame_end) == (1, 30)
+    seats = [person["tasks"][0]["seat"] for person in made.people]
+    assert len(set(seats)) == 3 and all(seat.startswith("Chair") for seat in seats)
+    for person, seat in zip(made.people, seats, strict=True):
+        armature = blender.data.objects[person["armature"]]
+        place = np.array(blender.data.objects[seat].location)
+        pelvis = bone_heads(armature, 30, ["pelvis"])[0]
+        assert np.linalg.norm(pelvis[:2] - place[:2]) < 0.15
+        assert abs(pelvis[2] - 0.57) < 0.06
+
+
+def test_the_same_shot_is_made_twice_and_another_seed_makes_another(
+    blender: Any, tmp_path: Path
+) -> None:
+    made = [populate(cafe(seed=seed), tmp_path / name) for name, seed in (("a", 1), ("b", 1))]
+    assert made[0].content == made[1].content and made[0].words == made[1].words
+    assert read_manifest(tmp_path / "a").content == made[0].content
+    other = populate(cafe(seed=2), tmp_path / "a")
+    assert other.content != made[0].content and read_manifest(tmp_path / "a") == other
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ({"room": "caffe"}, "no room 'caffe'.*did you mean 'cafe'"),
+        ({"people": [{"tasks": [{"sit_on": "Chiar"}]}]}, "Person: Task 1.*did you mean"),
+        ({"people": [{"tasks": [{"stand_up": 1}]}]}, "nobody sits or lies there"),
+        ({"people": [{"count": 9, "tasks": [SITS]}]}, "Person 9: .*are taken.*or write fewer"),
+    ],
+)
+def test_what_cannot_be_leaves_nothing(
+    blender: Any, tmp_path: Path, words: dict[str, Any], says: str
+) -> None:
+    with pytest.raises(InputError, match=says):
+        populate(cafe(**words), tmp_path / "out")
+    assert not list(tmp_path.iterdir())
+
+
+def test_fewer_leaves_out_who_finds_no_place(blender: Any, tmp_path: Path) -> None:
+    made = populate(cafe({"count": 9, "tasks": [SITS]}, fewer=True), tmp_path / "out")
+    assert len(made.people) == 8
+    assert any("Person 9" in warning and "taken" in warning for warning in made.warnings)
+
+
+def test_what_is_not_ours_stays(blender: Any, tmp_path: Path) -> None:
+    (tmp_path / "letter.txt").write_text("Dear", encoding="utf-8")
+    with pytest.raises(InputError):
+        populate(cafe(), tmp_path)
+    assert [each.name for each in tmp_path.iterdir()] == ["letter.txt"]
+
+
+@pytest.mark.slow
+def test_the_example_of_the_cafe(blender: Any, tmp_path: Path) -> None:
+    made = populate(ROOT / "examples/cafe.toml", tmp_path / "out")
+    assert {each.name for each in (tmp_path / "out").iterdir()} == {SCENE, MANIFEST}
+    assert len(made.people) == 10 and not made.warnings
