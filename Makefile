@@ -47,7 +47,7 @@ system:
 	@touch $@
 
 .venv/.test: pyproject.toml .venv/.demo
-	.venv/$(PIP) '$(TORCH)' 'numpy>=1.26,<2' matplotlib pytest trimesh rtree scipy safetensors tensorboard ruff mypy hypothesis
+	.venv/$(PIP) '$(TORCH)' 'numpy>=1.26,<2' matplotlib pytest trimesh rtree scipy safetensors tensorboard ruff mypy hypothesis distributed openjd-cli
 	@touch $@
 
 # Both generations of NumPy are in use: 4.2 takes either.

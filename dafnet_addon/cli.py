@@ -27,7 +27,7 @@ from .commands.console import (
     stdout_kept_clean,
 )
 from .core.errors import DafnetError, InputError
-from .core.stopping import Stop
+from .core.stopping import Stop, end_with_stdin
 
 __all__ = ["main", "run"]
 
@@ -44,6 +44,7 @@ def main(
     was requested while the program was being loaded.
     """
     escape_unprintable()
+    end_with_stdin()
     try:
         if loading:
             loading.now()

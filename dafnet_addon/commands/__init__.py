@@ -4,6 +4,7 @@ runs.
 
 from . import (
     bake,
+    batch,
     bench,
     carry,
     cool,
@@ -24,6 +25,7 @@ COMMANDS = (
     demo.COMMAND,
     bake.COMMAND,
     populate.COMMAND,
+    batch.COMMAND,
     info.COMMAND,
     prepare.COMMAND,
     train.COMMAND,

@@ -18,7 +18,14 @@ from pathlib import Path
 
 from .errors import InputError
 
-__all__ = ["require_replaceable", "require_writable", "save_text", "whole_file", "whole_folder"]
+__all__ = [
+    "remove_abandoned",
+    "require_replaceable",
+    "require_writable",
+    "save_text",
+    "whole_file",
+    "whole_folder",
+]
 
 _HOST = re.sub(r"[^0-9A-Za-z]", "", socket.gethostname())[:32]
 _PART = re.compile(r"\.dafnet-(?P<host>\w*)-(?P<process>\d+)-(?P<name>[0-9a-f]{16})\.part")
@@ -124,7 +131,7 @@ def _beside(path: Path) -> Iterator[tuple[Path, Path]]:
     _ours.add(name)
     try:
         made = _make(path.parent)
-        _remove_abandoned(path.parent)
+        remove_abandoned(path.parent)
         yield part, path
     except OSError as error:
         raise InputError(
@@ -209,7 +216,7 @@ def _make(folder: Path) -> list[Path]:
     return missing[::-1]
 
 
-def _remove_abandoned(folder: Path) -> None:
+def remove_abandoned(folder: Path) -> None:
     """Remove what killed runs of this machine left in a folder."""
     for each in os.scandir(folder):
         found = _PART.match(each.name)

@@ -5,12 +5,18 @@ a driver, a handler or its own start, which print the exception and go on: the s
 it fell into is broken. A real Blender without a window takes Ctrl-C for itself.
 """
 
+import os
 import signal
 import threading
 from collections.abc import Callable
 from types import FrameType, TracebackType
 
-__all__ = ["Stop"]
+__all__ = ["ENDS_WITH_STDIN", "Stop", "end_with_stdin"]
+
+ENDS_WITH_STDIN = "DAFNET_ENDS_WITH_STDIN"
+"""The variable of the environment that tells a process that its standard input is held open by
+whoever started it.
+"""
 
 _SIGNALS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name)
@@ -58,3 +64,18 @@ class Stop:
     def _give_back(self, number: int) -> None:
         before = self._before.pop(number, None)
         signal.signal(number, signal.SIG_DFL if before is None else before)
+
+
+def end_with_stdin() -> None:
+    """End this process, wherever it is, as soon as its standard input is closed: whoever started it
+    is gone, be it killed. Only where ``ENDS_WITH_STDIN`` asks for that; processes that this one
+    starts are not asked.
+    """
+    if os.environ.pop(ENDS_WITH_STDIN, None):
+        threading.Thread(target=_end_with_stdin, daemon=True).start()
+
+
+def _end_with_stdin() -> None:
+    while os.read(0, 1024):
+        pass
+    os._exit(128 + signal.SIGTERM)

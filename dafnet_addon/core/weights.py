@@ -24,6 +24,7 @@ __all__ = [
     "Weights",
     "load_weights",
     "read_safetensors",
+    "shipped_weights",
     "write_safetensors",
     "quantised",
 ]
@@ -264,7 +265,7 @@ def load_weights(path: str | Path | None = None) -> Weights:
     Raises WeightsError where the file is missing, damaged (see ``read_safetensors``), or made for
     another version.
     """
-    path = _shipped() if path is None else Path(path)
+    path = shipped_weights() if path is None else Path(path)
     stored, metadata = read_safetensors(path)
     if metadata.get("format") != FORMAT:
         said = printable(metadata.get("format", "unknown"), _SHOWN)
@@ -305,7 +306,10 @@ def _row_scales(path: Path, stored: dict[str, np.ndarray], name: str) -> np.ndar
     return scale.astype(np.float32).reshape(-1, *[1] * (rows.ndim - 1))
 
 
-def _shipped() -> Path:
+def shipped_weights() -> Path:
+    """The weights file that ships in ``weights_stub`` beside the package. Raises WeightsError where
+    there is none.
+    """
     folder = Path(__file__).parents[2] / "weights_stub"
     found = sorted(folder.glob("*.safetensors"))
     if len(found) != 1:

@@ -32,7 +32,7 @@ SHIPPED = {
     "docs",
 }
 LEFT_OUT = {"model", "data", "training", "baselines"}
-PACKAGES = ("core", "director", "blender", "commands")
+PACKAGES = ("core", "director", "batch", "blender", "commands")
 
 LIFE = """
 import os, sys, bpy, addon_utils
