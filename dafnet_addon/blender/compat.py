@@ -15,7 +15,9 @@ __all__ = [
     "action_curves",
     "animated_paths",
     "shares_curves",
+    "node_tree_of",
     "output_image",
+    "output_numbers",
     "output_video",
 ]
 
@@ -138,12 +140,26 @@ def shares_curves(owner: bpy.types.ID, other: bpy.types.ID) -> bool:
     return not _SLOTS or theirs.action_slot_handle == mine.action_slot_handle
 
 
+def node_tree_of(material: bpy.types.Material) -> bpy.types.NodeTree:
+    """The nodes of a new material, which is there by itself from 5.0 on."""
+    if material.node_tree is None:
+        material.use_nodes = True
+    return material.node_tree
+
+
 def output_image(scene: bpy.types.Scene) -> None:
     """Let the scene render to a PNG file."""
     image = scene.render.image_settings
     if hasattr(image, "media_type"):
         image.media_type = "IMAGE"
     image.file_format = "PNG"
+
+
+def output_numbers(scene: bpy.types.Scene) -> None:
+    """Let the scene render to an OpenEXR file whose pixels are numbers in single precision."""
+    output_image(scene)
+    image = scene.render.image_settings
+    image.file_format, image.color_mode, image.color_depth = "OPEN_EXR", "RGBA", "32"
 
 
 def output_video(scene: bpy.types.Scene) -> None:

@@ -23,6 +23,7 @@ __all__ = [
     "joints_of",
     "motion_of",
     "pose_matrices",
+    "rest_matrices",
     "rigid_parts",
     "shape_of",
 ]
@@ -50,6 +51,17 @@ def pose_matrices(evaluated: bpy.types.Object, bones: list[str | None]) -> np.nd
     return np.array(
         [
             np.full((4, 4), np.nan) if name is None else np.array(pose[name].matrix, float)
+            for name in bones
+        ]
+    )
+
+
+def rest_matrices(armature: bpy.types.Object, bones: list[str | None]) -> np.ndarray:
+    """Matrices (N, 4, 4) of bones at rest, in the armature's space; NaN for None."""
+    rest = armature.data.bones
+    return np.array(
+        [
+            np.full((4, 4), np.nan) if name is None else np.array(rest[name].matrix_local, float)
             for name in bones
         ]
     )
@@ -208,16 +220,8 @@ def joints_of(
     the joints, in its space, NaN where there is none.
     """
     _, scale = rigid_parts(bodies, f"armature '{armature.name}'")
-    rest = [rig_map.place(name) for name in JOINTS]
-    matrices = np.array(
-        [
-            np.full((4, 4), np.nan)
-            if name is None
-            else np.array(armature.data.bones[name].matrix_local, float)
-            for name in rest
-        ]
-    )
-    shape = shape_of(armature, rig_map, matrices, scale)
+    rest = rest_matrices(armature, [rig_map.place(name) for name in JOINTS])
+    shape = shape_of(armature, rig_map, rest, scale)
     motion = motion_of(shape, bodies, poses)
     floor = motion.joints[:, PELVIS] * (1.0, 1.0, 0.0) + (0.0, 0.0, bodies[0, 2, 3])
     joints = retarget(motion, shape.body, canonical_body(size), floor, landing=False).motion.joints

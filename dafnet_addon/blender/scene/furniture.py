@@ -22,7 +22,15 @@ from .dependencies import Dependencies
 from .lookup import find_collection, find_object, find_scene
 from .playback import play_steps
 
-__all__ = ["Furniture", "array", "furniture_at", "furniture_now", "furniture_of", "meshes_in"]
+__all__ = [
+    "Furniture",
+    "array",
+    "furniture_at",
+    "furniture_now",
+    "furniture_of",
+    "meshes_in",
+    "rendered",
+]
 
 _DRAWN_THROUGH = {"WIRE", "BOUNDS"}
 """Display types that do not look solid."""
@@ -162,7 +170,7 @@ class Furniture:
         candidates = [o for o in collection.all_objects if o not in own]
         self._carried = {o for o in candidates if dependencies.follows(o, armature)}
         drawn_through = {o for o in candidates if o.display_type in _DRAWN_THROUGH}
-        unrendered = set(candidates) - _rendered(scene.collection)
+        unrendered = set(candidates) - rendered(scene.collection)
         self._helpers = (drawn_through & unrendered) | (
             (drawn_through | unrendered) & _cutters(scene)
         ) - self._carried
@@ -337,11 +345,11 @@ def _may_have_faces(member: bpy.types.Object) -> bool:
     return member.type == "MESH" or member.is_instancer
 
 
-def _rendered(collection: bpy.types.Collection) -> set[bpy.types.Object]:
+def rendered(collection: bpy.types.Collection) -> set[bpy.types.Object]:
     """The objects of a collection and of those in it that a render shows."""
     if collection.hide_render:
         return set()
-    inner = (_rendered(child) for child in collection.children)
+    inner = (rendered(child) for child in collection.children)
     return {o for o in collection.objects if not o.hide_render}.union(*inner)
 
 
