@@ -36,8 +36,8 @@ class Played:
     """Somebody of a shot: the ``armature``, a character of ours or a rig that is mapped, with
     ``actions`` of hers, one for each of ``takes``, and the ``plan`` of her tasks, if she has any.
 
-    Her furniture is the collection of ``armature.dafnet.furniture``. An action's first frame is
-    that of its take and of the plan.
+    Her furniture is the collection of ``armature.dafnet.furniture``, or all that stands in the
+    scene. An action's first frame is that of its take and of the plan.
     """
 
     armature: bpy.types.Object

@@ -26,8 +26,9 @@ from ...core.solids import Box, Mesh, Scene
 from ...core.take import Take
 from ...director.task_lists import plain_tasks
 from ..character.armature import metres_per_unit
+from ..populating.surroundings import standing_objects
 from ..scene.dependencies import Dependencies
-from ..scene.furniture import Furniture, rendered
+from ..scene.furniture import Furniture, meshes_in, rendered
 from .cameras import DEPTHS, Sights, View, cameras_of, view_of
 from .people import Body, Played, file_names, playing
 
@@ -173,14 +174,14 @@ def _points(take: Take, body: Body, unit: float) -> tuple[np.ndarray, np.ndarray
 
 class _Furnished:
     """The furniture of all people, read frame by frame; those who share a collection share what is
-    read.
+    read. For who has no collection it is all that stands in the scene in the first frame.
     """
 
     def __init__(self, scene: bpy.types.Scene, people: Sequence[Played]) -> None:
-        self._unit = metres_per_unit(scene)
+        self._scene, self._unit = scene, metres_per_unit(scene)
         self._collections = [person.armature.dafnet.furniture for person in people]
         self._read: dict[bpy.types.Collection, Furniture] = {}
-        self._solids: dict[bpy.types.Collection, tuple[Mesh, ...]] = {}
+        self._solids: dict[bpy.types.Collection | None, tuple[Mesh, ...]] = {}
         self._begun = False
         bodies = {each for person in people for each in person.meshes()}
         dependencies = Dependencies(scene)
@@ -201,13 +202,14 @@ class _Furnished:
                 furniture.add(depsgraph, set())
             else:
                 furniture.begin(depsgraph)
+        if not self._begun and None in self._collections:
+            members = standing_objects(self._scene)
+            self._solids[None] = tuple(meshes_in(depsgraph, members, self._unit))
         self._begun = True
 
     def solids(self, k: int, frames: slice) -> list[Mesh]:
         """The furniture of the person ``k`` in these frames of all; world, metres."""
         collection = self._collections[k]
-        if collection is None:
-            return []
         if collection not in self._solids:
             self._solids[collection] = self._read[collection].solids(self._unit)
         return [
