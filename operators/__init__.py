@@ -17,6 +17,7 @@ from .generate import DAFNET_OT_cancel, DAFNET_OT_generate
 from .map_rig import DAFNET_OT_detect_rig, DAFNET_OT_load_rig_map, DAFNET_OT_save_rig_map
 from .mark_frames import DAFNET_OT_mark_frames
 from .presets import DAFNET_OT_add_preset
+from .size_as_rig import DAFNET_OT_size_as_rig
 from .takes import (
     DAFNET_OT_clean_again,
     DAFNET_OT_keep_accepted,
@@ -49,5 +50,6 @@ CLASSES = (
     DAFNET_OT_detect_rig,
     DAFNET_OT_load_rig_map,
     DAFNET_OT_save_rig_map,
+    DAFNET_OT_size_as_rig,
     DAFNET_OT_bake_to_rig,
 )

@@ -47,6 +47,14 @@ class DAFNET_OT_bake_to_rig(DafnetOperator, bpy.types.Operator):
             limbs=own.limbs,
         )
 
+        if baked.ratio != 1.0:
+            self.report(
+                {"WARNING"},
+                f"The motion was made for a body of another size, and scaled by {baked.ratio:.2f}: "
+                "it may miss seats, tables and targets; press Size Character as Rig, and generate "
+                "it again",
+            )
+
         if off := _deviations(baked):
             bones = ", ".join(f"'{bone}'" for bone in baked.overruled[:3])
 
@@ -64,8 +72,7 @@ class DAFNET_OT_bake_to_rig(DafnetOperator, bpy.types.Operator):
         limbs = ", ".join(
             f"{limb} {mean:.0f} ({most:.0f})" for limb, (mean, most) in baked.angles.items()
         )
-        size = "" if baked.ratio == 1.0 else f", motion scaled by {baked.ratio:.2f}"
-        errors = f"mean (largest) error in cm: {places}; in degrees: {limbs}{size}"
+        errors = f"mean (largest) error in cm: {places}; in degrees: {limbs}"
         self.report({"INFO"}, f"'{baked.action.name}': {errors}")
 
 

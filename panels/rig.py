@@ -9,6 +9,7 @@ from ..dafnet_addon.blender.rig.maps import NEEDED
 from ..dafnet_addon.blender.rig.properties import rig_of
 from ..operators.bake_to_rig import DAFNET_OT_bake_to_rig
 from ..operators.map_rig import DAFNET_OT_detect_rig, DAFNET_OT_load_rig_map, DAFNET_OT_save_rig_map
+from ..operators.size_as_rig import DAFNET_OT_size_as_rig
 
 __all__ = ["DAFNET_PT_rig", "DAFNET_UL_rig"]
 
@@ -84,6 +85,7 @@ class DAFNET_PT_rig(bpy.types.Panel):
 
         column.prop(own, "limbs")
 
+        layout.operator(DAFNET_OT_size_as_rig.bl_idname, icon="FULLSCREEN_ENTER")
         row = layout.row()
         row.scale_y = 1.5
         row.operator(DAFNET_OT_bake_to_rig.bl_idname, icon="ACTION")

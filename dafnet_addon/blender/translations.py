@@ -92,6 +92,7 @@ _GERMAN = {
     "Sit on Selected": "Auf Gewähltes setzen",
     "Sliding": "Rutschen",
     "Sliding feet": "Rutschende Füße",
+    "Size Character as Rig": "Figur so groß wie das Rig",
     "Smooth": "Glätten",
     "Softness": "Weichheit",
     "Softness, cm": "Weichheit, cm",

@@ -34,6 +34,7 @@ from .skeleton import UPPER, model_order
 from .softness import support_under
 from .solids import Scene
 from .take import Controls, Take
+from .touching import touches
 from .weights import Weights
 
 __all__ = [
@@ -255,10 +256,11 @@ def _finished_steps(
             local=continuous_signs(quaternion_from_matrix(local_from_global(frames)))
         )
 
+    joints = _joints(own)
     root = RootPath(shot.own_path.position * controls.scale, shot.own_path.yaw)
     return Take(
         fps=controls.fps,
-        joints=_joints(own) * controls.scale,
+        joints=joints * controls.scale,
         rotations=own.local,
         root=root.matrices(),
         action=action,
@@ -266,6 +268,7 @@ def _finished_steps(
         poses=poses,
         path=shot.path,
         unchanged=unchanged,
+        touches=touches(joints, controls.fps, floor, reach, targets),
         log_likelihood=log_likelihood,
         raw_metrics=raw,
         metrics=metrics,

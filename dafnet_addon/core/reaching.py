@@ -14,7 +14,7 @@ from .rotations import (
 )
 from .skeleton import HEAD, LIMBS, NECK, PARENTS, PELVIS, SPINE
 
-__all__ = ["REACH", "SHRUG", "Pose", "bring_head", "lean", "limited", "shrug"]
+__all__ = ["REACH", "SHRUG", "Pose", "bring_head", "lean", "limited", "partly", "shrug"]
 
 REACH = 1.0 - 1e-5
 """Of a limb's length: the most that it reaches, so that it always has a plane to bend in."""
@@ -59,6 +59,18 @@ class Pose:
 
 def limited(turn: np.ndarray, limit: float) -> np.ndarray:
     """Rotations (T, 3, 3), none by more than ``limit`` radians (which is under half a circle)."""
+    axis, angle = _axis_angle(turn)
+    return matrix_from_vector(axis * np.minimum(angle, limit)[:, None])
+
+
+def partly(turn: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Rotations (T, 3, 3), each by a ``share`` (T,) of it."""
+    axis, angle = _axis_angle(turn)
+    return matrix_from_vector(axis * (share * angle)[:, None])
+
+
+def _axis_angle(turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Axes (T, 3) and angles (T,) of rotations by less than half a circle."""
     vector = 0.5 * np.stack(
         [
             turn[:, 2, 1] - turn[:, 1, 2],
@@ -70,7 +82,7 @@ def limited(turn: np.ndarray, limit: float) -> np.ndarray:
     angle = np.arctan2(
         np.linalg.norm(vector, axis=-1), 0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0)
     )
-    return matrix_from_vector(normalised(vector) * np.minimum(angle, limit)[:, None])
+    return normalised(vector), angle
 
 
 def bring_head(pose: Pose, head: np.ndarray, fixed: tuple[int, ...] = ()) -> None:
@@ -92,9 +104,9 @@ def bring_head(pose: Pose, head: np.ndarray, fixed: tuple[int, ...] = ()) -> Non
             pose.place(*_TRUNK, HEAD)
 
 
-def lean(pose: Pose, targets: np.ndarray, chest: int) -> None:
+def lean(pose: Pose, targets: np.ndarray, chest: int, share: np.ndarray) -> None:
     """On a body without collars: turn the chest towards the wrists' ``targets`` (T, 22, 3) that the
-    arms are too short for.
+    arms are too short for; by a ``share`` (T,) of it.
     """
     joints, body = pose.joints, pose.body
     meant, center = pose.frames[:, chest].copy(), joints[:, chest]
@@ -114,12 +126,13 @@ def lean(pose: Pose, targets: np.ndarray, chest: int) -> None:
             )
         turn = limited(matrix_from_vector(pull) @ turn, _TRUNK_TURN)
 
-    pose.frames[:, chest] = turn @ meant
+    pose.frames[:, chest] = partly(turn, share) @ meant
 
 
-def shrug(pose: Pose, arm: str, wrist: np.ndarray, meant: np.ndarray) -> None:
+def shrug(pose: Pose, arm: str, wrist: np.ndarray, meant: np.ndarray, share: np.ndarray) -> None:
     """Turn the collar of an ``arm`` (of ``LIMBS``) until its wrist's place ``wrist`` (T, 3) is as
-    far from the shoulder as it is ``meant`` to be (T, 1), which leaves the elbow as bent as it was.
+    far from the shoulder as it is ``meant`` to be (T, 1), which leaves the elbow as bent as it was;
+    by a ``share`` (T,) of that turn.
 
     By a little only; by more where the arm is too short.
     """
@@ -148,4 +161,4 @@ def shrug(pose: Pose, arm: str, wrist: np.ndarray, meant: np.ndarray) -> None:
         missing = np.maximum(away - reach, 0.0)
         turn = np.where(missing[..., None] > 0.0, asked(missing, place, SHRUG), turn)
 
-    pose.frames[:, collar] = turn @ own
+    pose.frames[:, collar] = partly(turn, share) @ own

@@ -88,16 +88,22 @@ class RetargetedMotion:
 
 
 def retarget(
-    source: Motion, source_body: Body, body: Body, root: np.ndarray, landing: bool = True
+    source: Motion,
+    source_body: Body,
+    body: Body,
+    root: np.ndarray,
+    landing: bool = True,
+    held: np.ndarray | None = None,
 ) -> RetargetedMotion:
     """The motion on another body. ``root`` (T, 3): the place on the floor under the source, about
     which it is scaled.
 
     Trunk, limbs, hands, feet and head lie in the world as the source's do. ``landing``: besides,
-    hands, feet and head come where the source's came, at the price of its limbs' directions where
-    the proportions differ; but arms keep their directions on a body of another size and build,
-    whose hands would miss what they touch anyway (``_arms_land``). Without it all limbs keep their
-    directions, and head and shoulders lie as the source's do from the hips.
+    hips and head come where the source's came, and so do hands and feet by how far they are
+    ``held`` (T, 4; see ``touching.touches``; None: all the time), at the price of its limbs'
+    directions where the proportions differ; but arms keep their directions on a body of another
+    size and build, whose hands would miss what they touch anyway (``_arms_land``). Without it all
+    limbs keep their directions, and head and shoulders lie as the source's do from the hips.
 
     Where the sizes differ (``size_ratio``), the source's joints are scaled about the root, except
     that steps keep their length, since the root's path keeps its own and feet would slide
@@ -111,7 +117,12 @@ def retarget(
     the body that stands on it.
     """
     targets = _targets(source, source_body, body, root, landing)
+    shares = dict(zip(LIMBS, np.ones((4, len(root))) if held is None else held.T, strict=True))
     arms_land = landing and _arms_land(source_body, body)
+    for limb in shares:
+        if not (landing if limb in _LEGS else arms_land):
+            shares[limb] = np.zeros(len(root))
+
     pose = Pose(body, joints=targets.copy(), frames=source.frames.copy())
 
     spine = pose.bones(*SPINE)
@@ -123,17 +134,16 @@ def retarget(
     bring_head(pose, targets[:, HEAD])
     pose.place(*COLLARS, *SHOULDERS)
     if arms_land and spine and not pose.bones(*COLLARS):
-        lean(pose, targets, spine[-1])
+        lean(pose, targets, spine[-1], np.maximum(*(shares[arm] for arm in _ARMS)))
         bring_head(pose, targets[:, HEAD], fixed=(spine[-1],))
         pose.place(*COLLARS, *SHOULDERS)
 
     for arm in _ARMS:
-        _place_shoulder(pose, arm, source, targets, landing=landing, arm_lands=arms_land)
+        _place_shoulder(
+            pose, arm, source, targets, landing=landing, arms_land=arms_land, share=shares[arm]
+        )
 
-    bends = []
-    for limb in LIMBS:
-        lands = landing if limb in _LEGS else arms_land
-        bends.append(_place_limb(pose, limb, source, targets, lands))
+    bends = [_place_limb(pose, limb, source, targets, share) for limb, share in shares.items()]
 
     pose.place(*FEET)
     for j in range(1, len(JOINTS)):
@@ -246,9 +256,18 @@ def _too_high(pose: Pose, targets: np.ndarray) -> np.ndarray:
 
 
 def _place_shoulder(
-    pose: Pose, arm: str, source: Motion, targets: np.ndarray, *, landing: bool, arm_lands: bool
+    pose: Pose,
+    arm: str,
+    source: Motion,
+    targets: np.ndarray,
+    *,
+    landing: bool,
+    arms_land: bool,
+    share: np.ndarray,
 ) -> None:
-    """Turn an arm's collar, where there is one, and put its shoulder."""
+    """Turn an arm's collar, where there is one, and put its shoulder; towards what its hand holds
+    on to by the ``share`` (T,) to which it does.
+    """
     shoulder, elbow, wrist = LIMBS[arm]
     collar = PARENTS[shoulder]
     meant = sum(
@@ -256,8 +275,8 @@ def _place_shoulder(
         for j in (elbow, wrist)
     )
 
-    if pose.body.present[collar] and arm_lands:
-        shrug(pose, arm, targets[:, wrist], np.linalg.norm(meant, axis=-1, keepdims=True))
+    if pose.body.present[collar] and arms_land:
+        shrug(pose, arm, targets[:, wrist], np.linalg.norm(meant, axis=-1, keepdims=True), share)
     elif pose.body.present[collar] and not landing:
         # The shoulder to its place, then a little to where the wrist would come to its own.
         for place, limit in (
@@ -273,32 +292,31 @@ def _place_shoulder(
 
 
 def _place_limb(
-    pose: Pose, limb: str, source: Motion, targets: np.ndarray, lands: bool
+    pose: Pose, limb: str, source: Motion, targets: np.ndarray, share: np.ndarray
 ) -> np.ndarray:
     """Put a limb's joints and turn its frames; the directions (T, 3) in which it bends.
 
-    Its end comes to its target where it ``lands``; else its bones lie as the source's do, and
-    ``targets`` say where that has brought its end.
+    By the ``share`` (T,) to which it is held its end comes to its target; else its bones lie as the
+    source's do, and ``targets`` say where that has brought its end.
     """
     joints, body = pose.joints, pose.body
     first, middle, end = LIMBS[limb]
     bones = (first, middle), (middle, end)
-    if not lands:
-        for start, child in bones:
-            along = normalised(source.joints[:, child] - source.joints[:, start])
-            joints[:, child] = joints[:, start] + body.length(child) * along
-        targets[:, end] = joints[:, end]
+    for start, child in bones:
+        along = normalised(source.joints[:, child] - source.joints[:, start])
+        joints[:, child] = joints[:, start] + body.length(child) * along
 
+    targets[:, end] = joints[:, end] + share[:, None] * (targets[:, end] - joints[:, end])
     bend = _bend(source, limb, joints[:, first], targets[:, end])
-    if lands:
-        joints[:, middle], joints[:, end] = two_bone(
-            joints[:, first],
-            targets[:, end],
-            joints[:, first] + bend,
-            body.length(middle),
-            body.length(end),
-            bend,
-        )
+    held = share > 0.0
+    joints[held, middle], joints[held, end] = two_bone(
+        joints[held, first],
+        targets[held, end],
+        joints[held, first] + bend[held],
+        body.length(middle),
+        body.length(end),
+        bend[held],
+    )
 
     axis = np.array(LIMB_AXES[limb])
     for start, child in bones:

@@ -43,10 +43,11 @@ _ROWS: dict[str, tuple[int, ...]] = {
     "take.joints": (22, 3),
     "take.rotations": (22, 4),
     "take.root": (4, 4),
+    "take.touches": (4,),
 }
 """The arrays that have a row for each frame of the controls, and the shape of a row."""
 _FREE = {name for name in _ROWS if name.startswith("controls.") and name != "controls.root"}
-_LATER = {"take.unchanged"}
+_LATER = {"take.unchanged", "take.touches"}
 """What takes that were packed before it was needed lack."""
 _MAX_HEADER = 256  # bytes
 _HEADER = re.compile(
@@ -231,6 +232,7 @@ def _take(said: dict[str, Any], arrays: dict[str, np.ndarray], fps: float) -> Ta
         poses=arrays["take.poses"],
         path=RootPath(arrays["take.path.position"], arrays["take.path.yaw"]),
         unchanged=arrays.get("take.unchanged", np.zeros((0, 66))),
+        touches=arrays.get("take.touches", np.zeros((0, 4))),
         log_likelihood=math.nan
         if likelihood is None
         else number(likelihood, "'take.log_likelihood'", -_MAX_FIGURE, _MAX_FIGURE),

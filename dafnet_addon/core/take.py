@@ -173,7 +173,9 @@ class Take:
     ``scale``: the character's size. ``poses`` (70 + N, 66) and ``path`` (N): the model's own poses
     at 30 fps, canonical size, in the frames of ``path``, after 70 of standing in its first one;
     ``unchanged`` (M, 66): those that it would have gone on with over each change of mode, one after
-    another, if there had been none: what resuming and cleaning again need. ``log_likelihood``: of a
+    another, if there had been none: what resuming and cleaning again need. ``touches`` (T, 4): how
+    far hands and feet hold on to something (``touching.touches``), what another body's have to keep
+    to. ``log_likelihood``: of a
     standardised pose after those before it, mean over the frames, nats. ``raw_metrics``,
     ``metrics``: ``metrics.motion_metrics`` of the model's own motion and of this one after the
     clean-up, at these frames and canonical size. ``seconds``: time spent by stage. ``warnings``:
@@ -189,6 +191,7 @@ class Take:
     poses: np.ndarray
     path: RootPath
     unchanged: np.ndarray = field(default_factory=lambda: np.zeros((0, 66)))
+    touches: np.ndarray = field(default_factory=lambda: np.zeros((0, 4)))
     log_likelihood: float = float("nan")
     raw_metrics: dict[str, float | None] = field(default_factory=dict)
     metrics: dict[str, float | None] = field(default_factory=dict)

@@ -5,9 +5,11 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.takes import add_take
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, detection, maps
-from bl_ext.user_default.dafnet.dafnet_addon.core.generate import generate
+from bl_ext.user_default.dafnet.dafnet_addon.blender.rig.sizing import size_as_rig
+from bl_ext.user_default.dafnet.dafnet_addon.core.generate import Draw, generate
 from bl_ext.user_default.dafnet.dafnet_addon.core.paths import Route, Stop, route
 from bl_ext.user_default.dafnet.dafnet_addon.core.solids import Box, Scene
 from bl_ext.user_default.dafnet.dafnet_addon.core.take import Controls, Take
@@ -73,15 +75,17 @@ MEASURED: dict[str, dict[str, list[str]]] = {
 _AT = {"wrists": (20, 21), "ankles": (7, 8), "head": (15,), "pelvis": (1, 2)}
 
 
-def made_takes() -> dict[str, Take]:
-    """A walk, a sitting down on a box and a writing on a board, by the weights that ship."""
+def made_takes(size: float = 1.0) -> dict[str, Take]:
+    """A walk, a sitting down on a box and a writing on a board, by the weights that ship, of a body
+    of this ``size``.
+    """
     weights = load_weights()
 
     def box(center: tuple[float, ...], half_size: tuple[float, ...]) -> Scene:
         return Scene((Box(np.array(center), np.array(half_size), np.eye(3)),))
 
     def made(scene: Scene, root: Route, **given: Any) -> Take:
-        controls = Controls(fps=30, root=root.path.matrices(), **given)
+        controls = Controls(fps=30, root=root.path.matrices(), scale=size, **given)
         return generate(scene, controls, weights, seed=0)
 
     walk = route(Stop((0, 0), 0.0, 0.2), (0.5, 0.9), Stop((1.2, 1.4), -1.2, 0.2))
@@ -89,6 +93,7 @@ def made_takes() -> dict[str, Take]:
     write = route(Stop((0, -0.7), 0.0, 0.1), Stop((0, 0), 0.0, 1.2))
     t = np.arange(len(write.path)) / 30
     hand = np.stack([0.2 + 0.15 * np.sin(2 * t), 0 * t + 0.45, 1.35 + 0.08 * np.cos(3 * t)], axis=1)
+    hand *= size
     return {
         "walk": made(Scene(()), walk),
         "sit": made(box((0, 0.1, 0.22), (0.25, 0.25, 0.22)), sit),
@@ -107,7 +112,14 @@ class RigStage(Stage):
     def play(self, kind: str) -> None:
         """Let her play a take."""
         self.take = self.takes[kind]
-        bake(self.take, self.ann, 1, kind)
+        action = bake(self.take, self.ann, 1, kind)
+        controls = Controls(self.take.fps, self.take.root, scale=self.take.scale)
+        add_take(self.ann, action, self.take, controls, Draw(), 1)
+
+    def size_as(self, rig: Any) -> None:
+        """Make her as large as the rig, and her takes anew."""
+        size_as_rig(bpy.context, self.ann, rig, detection.detect_map(rig))
+        self.takes = made_takes(self.ann.scale[0])
 
     def build(self, kind: str, **body: Any) -> Any:
         """A rig of this convention."""
@@ -137,7 +149,10 @@ class RigStage(Stage):
     def errors(
         self, kind: str, rig: Any, source: np.ndarray | None = None, step: int = 9
     ) -> dict[str, np.ndarray]:
-        """Distances in every ``step``-th frame between the rig's bones and the source's joints."""
+        """Distances in every ``step``-th frame between the rig's bones and the source's joints; of
+        wrists only where hands hold on to something, and none where they never do.
+        """
+        held = self.take.touches[::step, :2] > 0.99
         source = (self.take.joints if source is None else source)[::step]
         found = {}
         for part, names in MEASURED[kind].items():
@@ -145,4 +160,6 @@ class RigStage(Stage):
             found[part] = np.linalg.norm(
                 off.mean(axis=1, keepdims=True) if part == "pelvis" else off, axis=-1
             )
-        return found
+
+        found["wrists"] = found["wrists"][held]
+        return {part: distances for part, distances in found.items() if distances.size}

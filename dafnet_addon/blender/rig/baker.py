@@ -13,8 +13,10 @@ from ...core.limb_errors import limb_errors
 from ...core.retargeting import retarget
 from ...core.root import root_from_matrices
 from ...core.skeleton import ANKLES, HEAD, HIPS, JOINTS, WRISTS
+from ...core.touching import touches
 from ..character.armature import character_scale, metres_per_unit
 from ..character.mannequin import FACING
+from ..character.takes import played_take, stored_take
 from ..pipeline.baker import TRANSFORMS, has_drivers
 from ..pipeline.rollback import undone_on_failure
 from ..scene.playback import frame_kept
@@ -36,16 +38,18 @@ __all__ = ["Baked", "bake_onto_rig", "frames_played"]
 
 _MEASURED_FRAMES = 24
 """How many frames the result is measured in."""
+_HOLDS = 0.99
+"""How far a hand holds on to something where it is judged by its place."""
 
 
 @dataclass(frozen=True)
 class Baked:
-    """The new ``action``; ``errors``: mean and largest distance (metres) of wrists, ankles, head
-    and pelvis (the middle of the hip joints) from where they were to lie. ``angles``: mean and
-    largest angle (degrees) between the limbs and trunk and the character's
-    (``limb_errors``). Both are measured on the rig as Blender plays it. ``ratio``: the rig's size
-    over the character's, by which the motion was scaled. ``overruled``: keyed bones that
-    constraints or drivers of their own move, too.
+    """The new ``action``; ``errors``: mean and largest distance (metres) of ankles, head and pelvis
+    (the middle of the hip joints) from where they were to lie, and of wrists, in frames in which
+    hands hold on to something, from the character's. ``angles``: mean and largest angle (degrees)
+    between the limbs and trunk and the character's (``limb_errors``). Both are measured on the rig
+    as Blender plays it. ``ratio``: the rig's size over the character's, by which the motion was
+    scaled. ``overruled``: keyed bones that constraints or drivers of their own move, too.
     """
 
     action: bpy.types.Action
@@ -181,7 +185,14 @@ def _bake(
 
     path, _ = root_from_matrices(_facing(recording.bodies))
     motion = character_motion(character, recording.bodies, recording.poses)
-    retargeted = retarget(motion, canonical_body(options.size), shape.body, path.position)
+    held = _held(context.scene, character, motion.joints, path.position, options)
+    retargeted = retarget(
+        motion,
+        canonical_body(options.size),
+        shape.body,
+        root=path.position,
+        held=held,
+    )
 
     carrier = path.matrices()
     carrier[:, :3, :3] = scale * carrier[:, :3, :3] @ shape.axes.T
@@ -228,6 +239,7 @@ def _bake(
         rig_map,
         targets=retargeted.targets,
         source=motion.joints,
+        held=held,
         options=options,
     )
 
@@ -238,6 +250,34 @@ def _bake(
         ratio=retargeted.ratio,
         overruled=overruled(rig, controls),
     )
+
+
+def _held(
+    scene: bpy.types.Scene,
+    character: bpy.types.Object,
+    joints: np.ndarray,
+    floor: np.ndarray,
+    options: _BakeOptions,
+) -> np.ndarray:
+    """How far hands and feet of joints (T, 22, 3), Blender units, hold on to something (T, 4): to
+    what the take that the character plays knows of, and to what an edit since has brought them to.
+
+    ``floor`` (T, 3): under the character.
+    """
+    rate = scene.render.fps / scene.render.fps_base
+    now = touches(joints / options.size, rate, floor[:, 2] / options.size)
+    action = played_take(character)
+    if action is None:
+        return now
+
+    try:
+        known = stored_take(action)[0].touches
+    except InputError:
+        return now
+    if len(known):
+        at = options.frames.astype(int) - action.dafnet.frame_start
+        now = np.maximum(now, known[np.clip(at, 0, len(known) - 1)])
+    return now
 
 
 def _facing(bodies: np.ndarray) -> np.ndarray:
@@ -348,10 +388,11 @@ def _measure(
     *,
     targets: np.ndarray,
     source: np.ndarray,
+    held: np.ndarray,
     options: _BakeOptions,
 ) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[float, float]]]:
     """Errors and angles as in ``Baked``, measured against the joints' targets and the source's
-    joints (T, 22, 3).
+    joints (T, 22, 3); ``held`` (T, 4): see ``touches``.
     """
     count = len(options.frames)
     chosen = np.unique(np.linspace(0, count - 1, _MEASURED_FRAMES).astype(int))
@@ -368,7 +409,7 @@ def _measure(
 
     off = played - targets[chosen]
     parts = {
-        "wrists": off[:, WRISTS],
+        "wrists": (played - source[chosen])[:, WRISTS][held[chosen, :2] >= _HOLDS],
         "ankles": off[:, ANKLES],
         "head": off[:, [HEAD]],
         "pelvis": off[:, HIPS].mean(axis=1, keepdims=True),
@@ -377,6 +418,7 @@ def _measure(
     errors = {
         part: mean_and_largest(options.unit * np.linalg.norm(values, axis=-1))
         for part, values in parts.items()
+        if values.size
     }
     angles = {
         limb: mean_and_largest(values)

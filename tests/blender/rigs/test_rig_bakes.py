@@ -12,7 +12,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.operators.bake_to_rig import DAFNET_OT_bake_to_rig
 from bl_ext.user_default.dafnet.panels.rig import DAFNET_PT_rig
 
-from kit.rig_stage import RigStage
+from kit.rig_stage import RigStage, made_takes
 
 CENTIMETRE = 0.01
 
@@ -35,9 +35,11 @@ def test_hand_edits_are_baked(stage: RigStage) -> None:
             curve.update()
     rig = stage.build("mixamo")
     stage.bake("mixamo", rig)
-    wrist = stage.heads(stage.ann, ["right_wrist"], 20)
+    shoulder, wrist = stage.heads(stage.ann, ["right_shoulder", "right_wrist"], 20)
     assert np.linalg.norm(wrist - stage.take.joints[19, 21]) > 0.2
-    assert np.abs(stage.heads(rig, ["mixamorig:RightHand"], 20) - wrist).max() < CENTIMETRE
+    theirs = np.subtract(*stage.heads(rig, ["mixamorig:RightHand", "mixamorig:RightArm"], 20))
+    along = (wrist - shoulder) @ theirs / np.linalg.norm(wrist - shoulder) / np.linalg.norm(theirs)
+    assert along > np.cos(np.radians(1.0)), "a free arm lies as it was edited"
 
 
 def test_controls_that_are_turned_by_several_are_found_frame_by_frame(stage: RigStage) -> None:
@@ -209,11 +211,11 @@ def test_the_panel_and_the_button(stage: RigStage) -> None:
 
 
 def test_a_bake_that_is_off_is_warned_about(stage: RigStage) -> None:
-    """Long arms: the hands land, so the elbows are bent, and the report names the arms in
-    degrees.
+    """Long arms whose hand is held at a board: it stays there, so the elbow is bent, and the report
+    names the arm in degrees.
     """
-    stage.play("walk")
-    rig = stage.build("mixamo", arms=1.2)
+    stage.play("write")
+    rig = stage.build("mixamo", arms=1.25)
     bpy.context.view_layer.objects.active = rig
     messages: list[tuple[set[str], str]] = []
 
@@ -223,11 +225,42 @@ def test_a_bake_that_is_off_is_warned_about(stage: RigStage) -> None:
 
     DAFNET_OT_bake_to_rig.run(Reporter(), bpy.context)
     warned = [message for kind, message in messages if kind == {"WARNING"}]
-    assert len(warned) == 1 and "left arm by" in warned[0] and "degrees" in warned[0]
-    assert "wrists 0.0" in messages[-1][1] and "left arm" in messages[-1][1], (
+    assert len(warned) == 1 and "right arm by" in warned[0] and "degrees" in warned[0]
+    assert "wrists 0.0" in messages[-1][1] and "right arm" in messages[-1][1], (
         "places and angles are told together"
     )
+
+    messages.clear()
+    rig = bpy.context.view_layer.objects.active = stage.build("mixamo", legs=0.8)
+    DAFNET_OT_bake_to_rig.run(Reporter(), bpy.context)
+    warned = [message for kind, message in messages if kind == {"WARNING"}]
+    assert "another size, and scaled by 0.8" in warned[0], (
+        "what misses its seat is not called right"
+    )
+
+    stage.play("walk")
     messages.clear()
     bpy.context.view_layer.objects.active = stage.build("mixamo")
     DAFNET_OT_bake_to_rig.run(Reporter(), bpy.context)
     assert [kind for kind, _ in messages] == [{"INFO"}]
+
+
+def test_the_character_is_made_as_large_as_the_rig(stage: RigStage) -> None:
+    """Whatever their objects' scales; then nothing is scaled any more. A locked scale is left."""
+    rig = stage.build("mixamo", legs=0.8)
+    rig.scale = rig.scale * 1.1
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.objects.active = rig
+    assert bpy.ops.dafnet.size_as_rig() == {"FINISHED"}
+    assert stage.ann.scale[0] == pytest.approx(0.88, abs=0.02)
+    stage.takes = made_takes(stage.ann.scale[0])
+    stage.play("walk")
+    assert stage.bake("mixamo", rig).ratio == 1.0
+
+    stage.ann.lock_scale = (True, False, False)
+    before = tuple(stage.ann.scale)
+    rig.scale = rig.scale * 1.2
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError, match="locked or driven"):
+        bpy.ops.dafnet.size_as_rig()
+    assert tuple(stage.ann.scale) == before

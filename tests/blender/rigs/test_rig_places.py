@@ -109,7 +109,9 @@ def test_limbs_of_other_lengths_still_reach(
         errors = stage.errors(kind, rig, source)
         assert errors["ankles"].mean() < CENTIMETRE
         assert errors["head"].mean() < CENTIMETRE, "these trunks are of the character's size"
-        assert errors["wrists"].mean() < CENTIMETRE
+        assert ("wrists" in errors) == (take == "write")
+        if take == "write":
+            assert errors["wrists"].mean() < CENTIMETRE
 
 
 def test_a_small_rig_plays_the_motion_at_its_size(stage: RigStage) -> None:
@@ -296,5 +298,5 @@ def test_hips_beside_the_trunk_do_not_tear_it(stage: RigStage) -> None:
     baker.bake_onto_rig(bpy.context, stage.ann, rig, found)
     assert (
         np.abs(stage.heads(rig, ["Head", "LeftHand"], 30) - stage.take.joints[29, [15, 20]]).max()
-        < CENTIMETRE
+        < 3 * CENTIMETRE
     )

@@ -231,50 +231,67 @@ def test_full_mode_reads_real_imports_as_they_are_seen(stage: RigStage, name: st
     )
 
 
-# mean degrees of arms, legs and trunk that the bakes may be off; proportions that differ are all
-# that is left
-REAL = {
-    "mixamo_gltf_woman": (1.0, 4.0, 4.0),
-    "mixamo_gltf_soldier": (1.0, 6.0, 4.0),
-    "vrm_b": (1.0, 20.0, 5.0),
-    "robot_gltf": (1.0, 13.0, 5.0),
-    "chibi_gltf": (1.0, 28.0, 6.0),
+# Mean degrees that legs may be off, whose feet stand where the character's do; what is left comes
+# from thighs and shins of other proportions, most of all where they sit.
+LEGS = {
+    "mixamo_gltf_woman": 3.0,
+    "mixamo_gltf_soldier": 7.0,
+    "vrm_b": 13.0,
+    "robot_gltf": 26.0,
+    "chibi_gltf": 13.0,
 }
 
 
-@pytest.mark.parametrize("name", REAL)
-@pytest.mark.parametrize("take", ["walk", "sit", "write"])
-def test_real_characters_keep_the_motions_shape(stage: RigStage, name: str, take: str) -> None:
-    """And the report says what an eye sees."""
+@pytest.mark.parametrize("name", LEGS)
+@pytest.mark.parametrize("what", ["walk", "sit", "write"])
+def test_real_characters_keep_the_motions_shape(stage: RigStage, name: str, what: str) -> None:
+    """The character is made as large as the rig first: then free arms lie as its own do, hands that
+    hold on to something are there, as far as arms reach, and feet stand on the floor.
+    """
     file = SHARED / "rigs" / f"{name}.json"
     if not file.is_file():
         pytest.skip(f"needs the rest pose {file}")
     rig = humanoids.of_file(bpy, file)
-    stage.play(take)
+    stage.size_as(rig)
+    stage.play(what)
     baked = stage.bake(name, rig)
+    assert baked.ratio == 1.0
     assert baked.errors["ankles"][0] < CENTIMETRE, (
         "feet are on the floor, also those that hang on no leg"
     )
+
     step = 3
-    off = seen_off(
-        World(stage, rig).played(range(1, len(stage.take) + 1, step)), stage.take.joints[::step]
-    )
-    arms, legs, trunk = REAL[name]
-    for parts, most in (
-        (("upper arms", "forearms", "elbows"), arms),
-        (("thighs", "shins", "knees"), legs),
-        (("trunk", "head"), trunk),
-    ):
-        for part in parts:
-            assert off[part].mean() < most, f"{part} {off[part].mean():.1f} ({off[part].max():.1f})"
-    for limb, parts in (
-        ("arm", ("upper arms", "forearms", "elbows")),
-        ("leg", ("thighs", "shins", "knees")),
-    ):
-        told = max(baked.angles[f"{side} {limb}"][0] for side in ("left", "right"))
-        assert told > max(off[part].mean() for part in parts) - 2.5, (
+    played = World(stage, rig).played(range(1, len(stage.take) + 1, step))
+    source, held = stage.take.joints[::step], stage.take.touches[::step]
+    for side, arm in enumerate(((16, 18, 20), (17, 19, 21))):
+        off = limb_off(played, source, arm)
+        if (free := held[:, side] == 0.0).any():
+            assert off[free].max() < 6.0, "a free arm"
+        if (holds := held[:, side] > 0.99).any() and name in ("mixamo_gltf_woman", "vrm_b"):
+            assert (
+                np.linalg.norm(played[holds, arm[2]] - source[holds, arm[2]], axis=-1).mean()
+                < 2 * CENTIMETRE
+            ), "a hand that holds on to something"
+
+    for leg in ((1, 4, 7), (2, 5, 8)):
+        assert limb_off(played, source, leg).mean() < LEGS[name]
+    seen = seen_off(played, source)
+    assert max(seen["trunk"].mean(), seen["head"].mean()) < 6.0
+    for limb, joints in (("left arm", (16, 18, 20)), ("left leg", (1, 4, 7))):
+        assert baked.angles[limb][0] > limb_off(played, source, joints).mean() - 2.5, (
             "the report is no better than what is seen"
         )
+
+
+def limb_off(joints: np.ndarray, source: np.ndarray, limb: tuple[int, int, int]) -> np.ndarray:
+    """By how many degrees (T,) a limb's bones lie otherwise, or it is bent otherwise, the most."""
+    first, middle, end = limb
+    ours, theirs = (
+        (each[:, middle] - each[:, first], each[:, end] - each[:, middle])
+        for each in (joints, source)
+    )
+    bends = between(-ours[0], ours[1]) - between(-theirs[0], theirs[1])
+    return np.max([between(ours[0], theirs[0]), between(ours[1], theirs[1]), np.abs(bends)], axis=0)
 
 
 @pytest.mark.parametrize("rest", humanoids.RESTS)

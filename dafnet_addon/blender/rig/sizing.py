@@ -1,0 +1,57 @@
+"""A character as large as the animator's own rig: its motion then needs no scaling, and it walks
+with that rig's stride and sits on its thighs.
+"""
+
+import bpy
+import numpy as np
+
+from ...core.body import canonical_body
+from ...core.errors import InputError
+from ...core.skeleton import JOINTS, STATURE
+from ..character.armature import character_scale, metres_per_unit
+from .maps import RigMap, require_usable, with_bone_names_of
+from .reading import rigid_parts, shape_of
+
+__all__ = ["leg_ratio", "size_as_rig"]
+
+
+def leg_ratio(rig: bpy.types.Object, rig_map: RigMap) -> float:
+    """The rig's size over the canonical body, by its legs, in Blender units for a canonical metre.
+
+    ``InputError``: the map lacks joints, or the rig is scaled unevenly.
+    """
+    rig_map = with_bone_names_of(rig_map, rig.data.bones.keys())
+    require_usable(rig, rig_map)
+    world = np.array(rig.matrix_world, float)[None]
+    _, scale = rigid_parts(world, f"armature '{rig.name}'")
+    bones = [rig.data.bones.get(rig_map.place(name) or "") for name in JOINTS]
+    rest = np.array(
+        [np.full((4, 4), np.nan) if bone is None else bone.matrix_local for bone in bones], float
+    )
+    return shape_of(rig, rig_map, rest, scale).body.leg() / canonical_body(1.0).leg()
+
+
+def size_as_rig(
+    context: bpy.types.Context,
+    character: bpy.types.Object,
+    rig: bpy.types.Object,
+    rig_map: RigMap,
+) -> float:
+    """Scale the character so that its legs are as long as the rig's: the height (metres) of a
+    person with such legs.
+
+    ``InputError``: the character or the rig cannot be measured, or the character's scale is locked,
+    keyed or driven.
+    """
+    wanted = leg_ratio(rig, rig_map)
+    factor = wanted / character_scale(character)
+    data = character.animation_data
+    curves = list(data.drivers) if data else []
+    if any(character.lock_scale) or any(curve.data_path == "scale" for curve in curves):
+        raise InputError(
+            f"The scale of '{character.name}' is locked or driven; unlock it, and try again."
+        )
+
+    character.scale = [each * factor for each in character.scale]
+    context.view_layer.update()
+    return wanted * metres_per_unit(context.scene) * STATURE
