@@ -120,11 +120,11 @@ def animated_paths(owner: bpy.types.ID) -> set[str]:
         data.action,
         *(strip.action for track in data.nla_tracks for strip in track.strips),
     } - {None}
-    paths = {curve.data_path for action in actions for curve in _all_curves(action)}
+    paths = {curve.data_path for action in actions for curve in all_curves(action)}
     return paths | {driver.data_path for driver in data.drivers}
 
 
-def _all_curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:
+def all_curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:
     """The curves of all slots."""
     if not _SLOTS:
         return list(action.fcurves)

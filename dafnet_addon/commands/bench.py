@@ -33,9 +33,20 @@ _RESEARCH = {
     "ablation": "ablation",
     "canonical": "canonical",
     "life-ablation": "life_ablation",
+    "scale": "scale",
     "tables": "experiments",
 }
-"""What docs/training.md and docs/experiments.md were made with, and the scripts that do it."""
+"""What docs/training.md, docs/experiments.md and docs/batch.md were made with, and the scripts that
+do it.
+"""
+
+_NEEDS = {
+    "ablation": ("torch",),
+    "life-ablation": ("torch",),
+    "scale": ("bpy",),
+    "speed": ("torch",),
+    "tables": ("torch",),
+}
 
 
 def benchmark(name: str) -> ModuleType:
@@ -84,12 +95,10 @@ COMMAND = Command(
     summary=(
         f"measure: {'; '.join(f'{name!r}: {does}' for name, does in _MEASURES.items())}; "
         "'canonical' fits bodies to the skeleton; 'ablation', 'life-ablation' and 'tables' "
-        "train and compare"
+        "train and compare; 'scale' makes batches and kills them"
     ),
     add_arguments=_add_arguments,
     run=_run,
-    needs=lambda options: (
-        () if options.name in ("life", "rest", "seats", "canonical") else ("torch",)
-    ),
+    needs=lambda options: _NEEDS.get(options.name, ()),
     folder="benchmarks",
 )
