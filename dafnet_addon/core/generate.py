@@ -28,7 +28,7 @@ from .progress import stepwise, within
 from .resampling import covering_frames, frame_times, resample_positions, resample_rotations
 from .root import RootPath, to_root, to_world
 from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix
-from .sampler import Sampler, Unchanged
+from .sampler import Conditions, Run, Sampler, Samples, Unchanged
 from .series import MODEL_FPS
 from .skeleton import UPPER, model_order
 from .softness import support_under
@@ -39,9 +39,11 @@ from .weights import Weights
 
 __all__ = [
     "RAW",
+    "Asked",
     "Draw",
     "clean_again_steps",
     "cleaned_up",
+    "crowd_steps",
     "generate",
     "generate_steps",
     "takes_steps",
@@ -53,6 +55,7 @@ _HOTTEST = 10.0
 _HAIR = 1e-3  # metres, radians, fractions: what comes back from single precision is the same
 _LEAD = 30  # frames before a change of mode that tell how straight limbs were twisted
 _CONDITIONED = 0.15  # progress when the conditions are known
+_FRAMES_AT_ONCE = 12_000  # of all people who are made side by side
 _SAMPLED = 0.85  # progress when the poses are made
 _LEGS = slice(len(UPPER), None)  # joints in the model's order
 _LEGS_UNHEARD = (
@@ -277,6 +280,89 @@ def _finished_steps(
     )
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of one person: his ``controls``, and what each of his takes is drawn with."""
+
+    controls: Controls
+    draws: tuple[Draw, ...]
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """A shot that is to be sampled, and what it is to be sampled from: ``conditions``, ``changes``
+    of mode with what counts of them for the weights, ``share`` (PREROLL + N, 22) of the joints that
+    are given, and the noise ``z`` (PREROLL + N, B, 66) of its takes.
+    """
+
+    shot: Shot
+    conditions: Conditions
+    changes: tuple[Change, ...]
+    share: np.ndarray
+    z: np.ndarray
+
+    @property
+    def in_part(self) -> bool:
+        """Whether any target counts in part."""
+        shares = (self.share, *(change.share for change in self.changes))
+        return any(((each > 0.0) & (each < 1.0)).any() for each in shares)
+
+    def without(self) -> Conditions:
+        """Those without the targets that count in part."""
+        return replace(self.conditions, given=(self.share >= 1.0).astype(float))
+
+    def led_from(self, free: np.ndarray) -> "_Wanted":
+        """The same with targets that count in part led from the joints of a calm take (PREROLL + N,
+        66), in the model's order.
+        """
+        changes = tuple(
+            replace(
+                each,
+                observation=_led_over(each.observation, each.share, free[PREROLL:][each.frames]),
+            )
+            for each in self.changes
+        )
+        observation = _led_over(self.conditions.observation, self.share, free)
+        return replace(
+            self, conditions=replace(self.conditions, observation=observation), changes=changes
+        )
+
+    def run(self) -> Run:
+        """As the sampler takes it."""
+        unchanged = [
+            Unchanged(PREROLL + each.start, each.observation, (each.share > 0.0).astype(float))
+            for each in self.changes
+        ]
+        return Run(self.conditions, self.z, unchanged)
+
+
+def _wanted(
+    scene: Scene, asked: Asked, weights: Weights, sampler: Sampler
+) -> Generator[float, None, _Wanted]:
+    shot = yield from shot_steps(scene, asked.controls)
+    if not weights.heeds_legs and shot.request.share[:, _LEGS].any():
+        shot = replace(shot, warnings=(*shot.warnings, _LEGS_UNHEARD))
+
+    frames = len(shot.conditions)
+    z = np.concatenate(
+        [
+            sampler.noise(frames, d.seed, d.lower_seed, d.temperature, d.lower_temperature, d.held)
+            for d in asked.draws
+        ],
+        axis=1,
+    )
+    share = rolled(_told(shot.request.share, weights))
+    return _Wanted(
+        shot=shot,
+        conditions=replace(shot.conditions, given=(share > 0.0).astype(float)),
+        changes=tuple(
+            replace(each, share=_told(each.share, weights)) for each in shot.request.changes
+        ),
+        share=share,
+        z=z,
+    )
+
+
 def takes_steps(
     scene: Scene,
     controls: Controls,
@@ -298,79 +384,126 @@ def takes_steps(
     first take as it is made: its index at 30 fps, and the joints (22, 3) in the world, metres.
     Raises InputError for what cannot be used, WeightsError for weights that do not fit.
     """
-    started = perf_counter()
-    yield 0.0
-    shot = yield from within(shot_steps(scene, controls), 0.0, _CONDITIONED)
-    if not weights.heeds_legs and shot.request.share[:, _LEGS].any():
-        shot = replace(shot, warnings=(*shot.warnings, _LEGS_UNHEARD))
-    conditioned = perf_counter()
-    sampler = Sampler(weights, device)
-    frames = len(shot.conditions)
-    z = np.concatenate(
-        [
-            sampler.noise(frames, d.seed, d.lower_seed, d.temperature, d.lower_temperature, d.held)
-            for d in draws
-        ],
-        axis=1,
-    )
-    kept = None
-    if resume is not None and resume_frame != 0:
-        kept = np.repeat(
-            _kept(resume, resume_frame, controls, shot.path)[:, None], len(draws), axis=1
-        )
 
-    def shown(frame: int, pose: np.ndarray) -> None:
+    def kept(path: RootPath) -> np.ndarray | None:
+        if resume is None or resume_frame == 0:
+            return None
+        poses = _kept(resume, resume_frame, controls, path)
+        return np.repeat(poses[:, None], len(draws), axis=1)
+
+    def shown(path: RootPath, frame: int, pose: np.ndarray) -> None:
         if watch is not None and frame >= PREROLL:
-            at = RootPath(
-                shot.path.position[frame - PREROLL, None], shot.path.yaw[frame - PREROLL, None]
-            )
+            at = RootPath(path.position[frame - PREROLL, None], path.yaw[frame - PREROLL, None])
             watch(frame - PREROLL, to_world(at, pose.reshape(1, 22, 3))[0] * controls.scale)
 
-    share, sampling = rolled(_told(shot.request.share, weights)), _CONDITIONED
-    conditions = replace(shot.conditions, given=(share > 0.0).astype(float))
-    changes = tuple(
-        replace(each, share=_told(each.share, weights)) for each in shot.request.changes
+    yield 0.0
+    job = _together(
+        scene,
+        [Asked(controls, tuple(draws))],
+        weights,
+        Sampler(weights, device),
+        clean_up=clean_up,
+        kept=kept,
+        shown=shown if watch is not None else None,
     )
-    if any(
-        ((each > 0.0) & (each < 1.0)).any()
-        for each in (share, *(change.share for change in changes))
-    ):
+    return (yield from job)[0]
+
+
+def crowd_steps(
+    scene: Scene,
+    people: Sequence[Asked],
+    weights: Weights,
+    *,
+    device: str | None = None,
+    clean_up: CleanUp = RAW,
+) -> Generator[float, None, list[list[Take]]]:
+    """The takes of each of some people in one scene, who go through the network side by side;
+    yields progress in [0, 1].
+
+    Each is as ``takes_steps`` makes him alone, but for rounding, whatever lengths and sizes the
+    others have. Raises as ``takes_steps`` does.
+    """
+    sampler = Sampler(weights, device)
+    found: list[list[Take]] = []
+    while len(found) < len(people):
+        group = people[len(found) : len(found) + _at_once(people[len(found) :])]
+        done = len(found) / len(people), (len(found) + len(group)) / len(people)
+        job = _together(scene, group, weights, sampler, clean_up=clean_up)
+        found += yield from within(job, *done)
+    return found
+
+
+def _at_once(people: Sequence[Asked]) -> int:
+    """How many of the first people are made side by side, so that memory suffices."""
+    frames = [covering_frames(len(each.controls), each.controls.fps) + PREROLL for each in people]
+    longest = np.maximum.accumulate(frames)
+    return max(1, int((longest * np.arange(1, len(frames) + 1) <= _FRAMES_AT_ONCE).sum()))
+
+
+def _together(
+    scene: Scene,
+    people: Sequence[Asked],
+    weights: Weights,
+    sampler: Sampler,
+    *,
+    clean_up: CleanUp,
+    kept: Callable[[RootPath], np.ndarray | None] = lambda path: None,
+    shown: Callable[[RootPath, int, np.ndarray], None] | None = None,
+) -> Generator[float, None, list[list[Take]]]:
+    """The takes of people who go through the network side by side. ``kept``, ``shown``: of one who
+    is alone, with his path: the poses that stay, and what is shown each frame.
+    """
+    started, count = perf_counter(), len(people)
+    wanted: list[_Wanted] = []
+    for k, asked in enumerate(people):
+        job = _wanted(scene, asked, weights, sampler)
+        low, high = _CONDITIONED * k / count, _CONDITIONED * (k + 1) / count
+        wanted.append((yield from within(job, low, high)))
+    conditioned, sampling = perf_counter(), _CONDITIONED
+
+    if partly := [k for k, each in enumerate(wanted) if each.in_part]:
         # Where a target counts in part, the calm take tells where the joint would be without it.
-        without = replace(conditions, given=(share >= 1.0).astype(float))
         sampling = (_CONDITIONED + _SAMPLED) / 2
-        calm = yield from within(sampler.run(without, np.zeros((1, 66))), _CONDITIONED, sampling)
-        free = model_order(calm.poses[:, 0])
-        conditions = replace(conditions, observation=_led_over(conditions.observation, share, free))
-        changes = tuple(
-            replace(
-                each,
-                observation=_led_over(each.observation, each.share, free[PREROLL:][each.frames]),
-            )
-            for each in changes
-        )
+        runs = [Run(wanted[k].without(), np.zeros((1, 66))) for k in partly]
+        calm = yield from within(sampler.run_several(runs), _CONDITIONED, sampling)
+        for k, each in zip(partly, calm, strict=True):
+            wanted[k] = wanted[k].led_from(model_order(each.poses[:, 0]))
 
-    unchanged = [
-        Unchanged(PREROLL + each.start, each.observation, (each.share > 0.0).astype(float))
-        for each in changes
-    ]
-    made = yield from within(sampler.run(conditions, z, kept, shown, unchanged), sampling, _SAMPLED)
-    seconds = {"conditions": conditioned - started, "sampling": perf_counter() - conditioned}
+    path = wanted[0].shot.path
+    watch = None if shown is None else partial(shown, path)
+    runs = [each.run() for each in wanted]
+    made = yield from within(sampler.run_several(runs, kept(path), watch), sampling, _SAMPLED)
+    now = perf_counter()
+    seconds = {
+        "conditions": (conditioned - started) / count,
+        "sampling": (now - conditioned) / count,
+    }
 
+    found: list[list[Take]] = []
+    for k, samples in enumerate(made):
+        low, one = _SAMPLED + (1.0 - _SAMPLED) * k / count, (1.0 - _SAMPLED) / count
+        finishing = _finished(people[k], wanted[k].shot, samples, clean_up, seconds)
+        found.append((yield from within(finishing, low, low + one)))
+    return found
+
+
+def _finished(
+    asked: Asked, shot: Shot, made: Samples, clean_up: CleanUp, seconds: dict[str, float]
+) -> Generator[float, None, list[Take]]:
+    """The takes of one person; ``seconds``: that were spent on him before."""
+    controls, count = asked.controls, len(asked.draws)
     source, target = (
         frame_times(len(shot.path), MODEL_FPS),
         frame_times(len(controls), controls.fps),
     )
     takes = []
-    for b in range(len(draws)):
+    for b in range(count):
         action = resample_positions(made.actions[PREROLL:, b], source, target)
         density = float(made.log_likelihood[PREROLL:, b].mean())
-        take = yield from within(
-            _finished_steps(
-                made.poses[:, b], made.unchanged[:, b], action, shot, controls, clean_up, density
-            ),
-            _SAMPLED + (1.0 - _SAMPLED) * b / len(draws),
-            _SAMPLED + (1.0 - _SAMPLED) * (b + 1) / len(draws),
+        job = _finished_steps(
+            made.poses[:, b], made.unchanged[:, b], action, shot, controls, clean_up, density
         )
+        take = yield from within(job, b / count, (b + 1) / count)
         takes.append(replace(take, seconds=seconds | take.seconds))
 
     return takes

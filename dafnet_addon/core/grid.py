@@ -1,6 +1,6 @@
 """A signed distance grid, and how it is sampled; ``core.distance`` makes them of meshes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,6 +23,9 @@ class DistanceGrid:
     spacing: float
     values: np.ndarray
     truncation: float = BAND
+    _bounds: dict[float, tuple[np.ndarray, np.ndarray]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def sample(self, points: np.ndarray) -> np.ndarray:
         """Trilinear distance (…) float32 at ``points`` (…, 3) in the rigid space; the truncation
@@ -51,6 +54,11 @@ class DistanceGrid:
         """Corners (3,), (3,) of the box outside which samples are at least ``reach``; turned inside
         out if empty.
         """
+        if reach not in self._bounds:  # a crowd asks for the same again and again
+            self._bounds[reach] = self._found_bounds(reach)
+        return self._bounds[reach]
+
+    def _found_bounds(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
         near = self.values < reach
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for axis in range(3):

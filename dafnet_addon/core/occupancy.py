@@ -23,6 +23,7 @@ from .solids import Box, Scene, box_distance
 __all__ = ["occupancy", "distance", "tops_under"]
 
 _FRAMES_AT_ONCE = 32
+_SKIN = 1e-6  # metres, for rounding
 # Tops are looked for between these heights over the floor, in such steps, metres.
 _LOWEST = 0.15
 _HIGHEST = 0.925
@@ -70,6 +71,24 @@ def _fields(scene: Scene, floor: np.ndarray, reach: float) -> Iterator[_Field]:
                 yield _Field(rotation, position, np.ones(frames, bool), low, high, grid.sample)
 
 
+def _once_each(scene: Scene, path: RootPath) -> tuple[np.ndarray, np.ndarray]:
+    """The first frame (N,) of every stretch in which the root and all solids stand still, and which
+    of them each frame (T,) is in: who sits sees the same again and again.
+    """
+    frames = len(path)
+    moving = any(rigid_frames(solid).reshape(-1, 4, 4).shape[0] > 1 for solid in scene.solids)
+    changes = np.ones(frames, bool)
+    if not moving:
+        moved = (path.position[1:] != path.position[:-1]).any(axis=1)
+        # of one frame alone, matrix products are rounded in another way than of several
+        changes[2:] = moved[1:] | (path.yaw[2:] != path.yaw[1:-1])
+    return np.flatnonzero(changes), np.cumsum(changes) - 1
+
+
+def _at(path: RootPath, frames: np.ndarray) -> RootPath:
+    return RootPath(path.position[frames], path.yaw[frames])
+
+
 @stepwise
 def occupancy(scene: Scene, path: RootPath) -> Generator[float, None, np.ndarray]:
     """Occupancy (T, 2640) float32 of the sensor on every frame of ``path``, the largest over all
@@ -80,6 +99,10 @@ def occupancy(scene: Scene, path: RootPath) -> Generator[float, None, np.ndarray
     5 cm of the floor are not seen (``distance.build_grid``). Yields progress. Raises InputError
     where a solid's frames are not the path's.
     """
+    first, which = _once_each(scene, path)
+    if len(first) < len(path):
+        return (yield from occupancy.steps(scene, _at(path, first)))[which]
+
     out = np.zeros((len(path), len(SPHERES)), np.float32)
     centres = SPHERES.T.astype(np.float32)
     for count, field in enumerate(_fields(scene, path.position[:, 2], RADIUS)):
@@ -112,10 +135,24 @@ def distance(scene: Scene, points: np.ndarray, floor: np.ndarray | float) -> np.
     ``floor``: height of the root's plane, one number or (T,). Solids as for ``occupancy``, metres.
     """
     out = np.full(points.shape[:2], BAND)
+    if not points.size:
+        return out
+
+    low, high = points.min(axis=1), points.max(axis=1)
+    middle, around = (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
     for field in _fields(scene, np.broadcast_to(np.asarray(floor, float), len(points)), BAND):
-        local = rotate(transpose(field.rotation)[:, None], points - field.position[:, None])
-        near = ((local > field.low) & (local < field.high)).all(axis=-1) & field.present[:, None]
-        out[near] = np.minimum(out[near], field.measure(local[near]))
+        inverse = transpose(field.rotation)
+        away = rotate(inverse, middle - field.position) - (field.low + field.high) / 2
+        gap = box_distance(away, (field.high - field.low) / 2)
+        frames = np.flatnonzero(field.present & (gap < around + _SKIN))
+        if not len(frames):
+            continue
+        shift = points[frames] - field.position[frames, None]
+        local = rotate(inverse[frames, None], shift)
+        near = ((local > field.low) & (local < field.high)).all(axis=-1)
+        row, point = np.nonzero(near)
+        at = frames[row], point
+        out[at] = np.minimum(out[at], field.measure(local[near]))
     return out
 
 
@@ -126,6 +163,10 @@ def tops_under(scene: Scene, path: RootPath) -> np.ndarray:
     """
     if not scene.solids:
         return np.full(len(path), np.nan)
+
+    first, which = _once_each(scene, path)
+    if len(first) < len(path):
+        return tops_under(scene, _at(path, first))[which]
 
     heights = np.arange(_LOWEST, _HIGHEST, _APART)
     spots = path.position[:, None] + rotate(path.rotation[:, None], _SPOTS)

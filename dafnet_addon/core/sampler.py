@@ -5,7 +5,7 @@ first layers for all frames at once; only the recurrent part and the action pred
 at the poses just made, are left per frame.
 """
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from copy import copy
 from dataclasses import dataclass, fields
 from typing import NamedTuple
@@ -22,7 +22,7 @@ from .skeleton import POSE_SIZE, model_order, smpl_order
 from .threads import one_thread
 from .weights import Weights
 
-__all__ = ["Conditions", "Frame", "Sampler", "Samples", "Unchanged"]
+__all__ = ["Conditions", "Frame", "Run", "Sampler", "Samples", "Unchanged"]
 
 _FARTHEST = 100.0  # metres from the root that a joint of a pose may be
 _LOG_TURN = float(np.log(2.0 * np.pi))
@@ -92,14 +92,36 @@ class Frame(NamedTuple):
     log_det: Array
 
 
+class Run(NamedTuple):
+    """One of several shots that are made side by side: its ``conditions``, the noise ``z`` of its
+    takes, as ``Sampler.run`` is given them, and the stretches ``unchanged``.
+    """
+
+    conditions: Conditions
+    z: np.ndarray
+    unchanged: Sequence[Unchanged] = ()
+
+
 @dataclass(frozen=True)
 class _InAdvance:
-    """What is known of all frames of a shot: the ``scene`` (T, m) of the inputs, and the share
-    (T, 4 · width) that each flow step's first layer has of it, by part and step.
+    """What is known of all frames of P shots: the ``scene`` (T, P, m) of the inputs, and the share
+    (T, P, 4 · width) that each flow step's first layer has of it, by part and step. ``of``: the
+    shot of each take, where there are several.
     """
 
     scene: Array
     shares: list[list[Array]]
+    of: tuple[int, ...] = ()
+
+    def by_take(self, values: Array, takes: int) -> Array:
+        """Values (P, n) of the shots for the first ``takes`` of all (B, n); one shot's as they
+        are.
+        """
+        if len(values) == 1:
+            return values
+        if len(values) == len(self.of):
+            return values[:takes]
+        return values[list(self.of[:takes])]
 
 
 @dataclass
@@ -111,8 +133,26 @@ class _Memory:
     past: Array
     states: list[list[LSTMState]]
 
-    def copy(self) -> "_Memory":
-        return _Memory(self.past, [list(steps) for steps in self.states])
+    def rows(self, which: slice) -> "_Memory":
+        """Of some of the takes only."""
+        return _Memory(
+            self.past[which],
+            [
+                [tuple((hidden[which], cell[which]) for hidden, cell in step) for step in steps]
+                for steps in self.states
+            ],
+        )
+
+
+class _Stretch(NamedTuple):
+    """A stretch ``Unchanged`` of one run that is still to be made: what is known in advance from
+    its first frame on, the memory there, the ``noise`` (M, B, 66), and whose it is.
+    """
+
+    known: _InAdvance
+    memory: _Memory
+    noise: Array
+    run: int
 
 
 class Sampler:
@@ -169,6 +209,20 @@ class Sampler:
         """Bring in the conditions of a whole shot and forget all memory; the past is the mean pose.
         Yields progress.
         """
+        self._shot = yield from self._in_advance(conditions)
+        self._memory = self._mean_past(takes)
+
+    def _mean_past(self, takes: int) -> _Memory:
+        sizes, array = self.network.sizes, self.backend.array
+        empty = array(np.zeros((takes, sizes.width)))
+        state = ((empty, empty),) * sizes.layers
+        return _Memory(
+            past=array(np.zeros((takes, sizes.history * POSE_SIZE))),
+            states=[[state] * len(part.steps) for part in self.network.parts],
+        )
+
+    def _in_advance(self, conditions: Conditions) -> Generator[float, None, _InAdvance]:
+        """What is known of one shot."""
         xp, array = self.backend.xp, self.backend.array
         sizes, known = self.network.sizes, self.network.normalisation
 
@@ -198,15 +252,32 @@ class Sampler:
             shares.append([])
             for k, step in enumerate(part.steps):
                 inputs = xp.concatenate([root, seen, codes[k % len(codes)], one], axis=-1)
-                shares[-1].append(inputs @ step.coupling.in_advance)
+                shares[-1].append((inputs @ step.coupling.in_advance)[:, None])
                 yield 1.0
 
-        empty = array(np.zeros((takes, sizes.width)))
-        state = ((empty, empty),) * sizes.layers
-        self._shot = _InAdvance(scene, shares)
-        self._memory = _Memory(
-            past=array(np.zeros((takes, sizes.history * POSE_SIZE))),
-            states=[[state] * len(part.steps) for part in self.network.parts],
+        return _InAdvance(scene[:, None], shares)
+
+    def _together(self, known: Sequence[_InAdvance], takes: Sequence[int]) -> _InAdvance:
+        """What is known of several shots, the longest first, with so many takes each."""
+        if len(known) == 1:
+            return known[0]
+
+        def stacked(arrays: Sequence[Array]) -> Array:
+            out = self.backend.array(np.zeros((len(arrays[0]), len(arrays), arrays[0].shape[-1])))
+            for k, each in enumerate(arrays):
+                out[: len(each), k] = each[:, 0]
+            return out
+
+        return _InAdvance(
+            scene=stacked([each.scene for each in known]),
+            shares=[
+                [
+                    stacked([each.shares[i][k] for each in known])
+                    for k in range(len(known[0].shares[i]))
+                ]
+                for i in range(len(known[0].shares))
+            ],
+            of=tuple(k for k, count in enumerate(takes) for _ in range(count)),
         )
 
     def _observed(self, part: Part, observation: np.ndarray, given: np.ndarray) -> np.ndarray:
@@ -243,7 +314,7 @@ class Sampler:
     def decode(self, index: int, noise: Array) -> Frame:
         """The next frame, made of ``noise`` (B, 66) part after part."""
         xp = self.backend.xp
-        inputs = self.inputs.at(self._shot.scene[index], self._memory.past)
+        inputs = self._inputs_at(index)
         made: list[Array] = []
         log_det = 0.0 * noise.sum(-1)
         for i, part in enumerate(self.network.parts):
@@ -269,7 +340,7 @@ class Sampler:
         """
         xp = self.backend.xp
         if inputs is None:
-            inputs = self.inputs.at(self._shot.scene[index], self._memory.past)
+            inputs = self._inputs_at(index)
 
         made: list[Array] = []
         log_det = 0.0 * pose.sum(-1)
@@ -288,6 +359,10 @@ class Sampler:
         noise = xp.concatenate([made[i] for i in self._as_pose], axis=-1)
         return Frame(pose, noise, inputs, log_det)
 
+    def _inputs_at(self, index: int) -> Array:
+        past = self._memory.past
+        return self.inputs.at(self._shot.by_take(self._shot.scene[index], len(past)), past)
+
     def _remember(self, pose: Array) -> None:
         past = self._memory.past[:, POSE_SIZE:]
         self._memory.past = self.backend.xp.concatenate([past, pose], axis=-1)
@@ -298,7 +373,7 @@ class Sampler:
         """
         net = self.network.parts[part].steps[step].coupling
         states = self._memory.states[part]
-        share = self._shot.shares[part][step][frame]
+        share = self._shot.by_take(self._shot.shares[part][step][frame], len(x))
         shift, scale, states[step] = self._run_net(net, share, x, states[step])
         return shift, scale
 
@@ -342,36 +417,69 @@ class Sampler:
         stretches to be made besides, as the run would go on. Raises WeightsError where the poses
         are not a body's.
         """
+        job = self.run_several([Run(conditions, z, unchanged)], kept, watch)
+        return (yield from job)[0]
+
+    def run_several(
+        self,
+        runs: Sequence[Run],
+        kept: np.ndarray | None = None,
+        watch: Callable[[int, np.ndarray], None] | None = None,
+    ) -> Generator[float, None, list[Samples]]:
+        """``run`` several shots side by side, each of its own length; their takes go through the
+        network together. ``kept`` and ``watch`` are for one shot alone.
+        """
         array, numpy = self.backend.array, self.backend.numpy
-        own_noise = array(np.broadcast_to(z, (len(conditions), *z.shape[-2:])))
-        takes = z.shape[-2]
-        yield from within(self.start_steps(conditions, takes), 0.0, 0.0)
-        nothing = np.zeros((0, takes, POSE_SIZE))
+        order = sorted(range(len(runs)), key=lambda i: -len(runs[i].conditions))
+        lengths = [len(runs[i].conditions) for i in order]
+        takes = [runs[i].z.shape[-2] for i in order]
+        stops = np.cumsum(takes)
+        rows = [
+            slice(int(stop) - count, int(stop)) for stop, count in zip(stops, takes, strict=True)
+        ]
+
+        drawn = np.zeros((lengths[0], int(stops[-1]), POSE_SIZE))
+        for i, length, own in zip(order, lengths, rows, strict=True):
+            drawn[:length, own] = np.broadcast_to(runs[i].z, (length, own.stop - own.start, 66))
+        own_noise = array(drawn)
+        advance = []
+        for i in order:
+            advance.append((yield from within(self._in_advance(runs[i].conditions), 0.0, 0.0)))
+        self._shot = self._together(advance, takes)
+        self._memory = self._mean_past(int(stops[-1]))
+        nothing = np.zeros((0, int(stops[-1]), POSE_SIZE))
         known = array(nothing if kept is None else self.standardised(kept))
 
-        noise = last_kept = own_noise[0]
+        last_kept = own_noise[0]
         frames: list[Frame] = []
-        aside: list[Array] = []
-        for t in range(len(conditions)):
-            if not len(known):
-                noise = own_noise[t]
-            elif t >= len(known):
+        aside: list[_Stretch] = []
+        for t in range(lengths[0]):
+            active = int(stops[sum(length > t for length in lengths) - 1])
+            if active < len(self._memory.past):
+                self._memory = self._memory.rows(slice(0, active))
+            if len(known) and t < len(known):
+                noise = last_kept
+            elif len(known):
                 share = float(smoothstep(np.array((t - len(known) + 1) / _PASSING)))
                 noise = own_noise[t] + (last_kept - own_noise[len(known) - 1]) * (1.0 - share)
+            else:
+                noise = own_noise[t, :active]
 
-            for stretch in unchanged:
-                if stretch.start == t:
-                    going_on = own_noise[t : t + len(stretch.given)] - own_noise[t] + noise
-                    for pose in self._as_before(conditions, stretch, going_on):
-                        aside.append(pose)
-                        yield t / len(conditions)
+            for k, i in enumerate(order):
+                for stretch in runs[i].unchanged:
+                    if stretch.start == t:
+                        own = rows[k]
+                        later = own_noise[t : t + len(stretch.given), own]
+                        going_on = later - own_noise[t, own] + noise[own]
+                        job = self._as_before(runs[i].conditions, stretch, going_on, own, i)
+                        aside.append((yield from within(job, t / lengths[0], t / lengths[0])))
 
             # Frame by frame: whoever runs this generator has the threads back in between. Poses are
             # checked below.
             with one_thread(), np.errstate(over="ignore", invalid="ignore"):
                 if t < len(known):
                     frame = self.encode(t, known[t])
-                    noise = last_kept = frame.noise
+                    last_kept = frame.noise
                 else:
                     frame = self.decode(t, noise)
 
@@ -379,37 +487,97 @@ class Sampler:
             if watch is not None:
                 watch(t, self._checked(numpy(frame.pose[:1]))[0])
 
-            yield (t + 1) / len(conditions)
+            yield (t + 1) / lengths[0]
 
+        unchanged = yield from within(self._made_aside(aside, len(runs)), 1.0, 1.0)
         with np.errstate(over="ignore", invalid="ignore"):
             densities = [_log_density(frame) for frame in frames]
 
-        return Samples(
-            poses=self._checked(self._stacked([frame.pose for frame in frames])),
-            actions=self._stacked([frame.inputs[:, : self.actions] for frame in frames]),
-            log_likelihood=self._stacked(densities),
-            unchanged=self._checked(self._stacked(aside) if aside else nothing),
-        )
+        found = {}
+        for i, length, own in zip(order, lengths, rows, strict=True):
+            poses = [frame.pose[own] for frame in frames[:length]]
+            actions = [frame.inputs[own, : self.actions] for frame in frames[:length]]
+            found[i] = Samples(
+                poses=self._checked(self._stacked(poses)),
+                actions=self._stacked(actions),
+                log_likelihood=self._stacked([each[own] for each in densities[:length]]),
+                unchanged=self._checked(
+                    self._stacked(unchanged[i]) if unchanged[i] else nothing[:, own]
+                ),
+            )
+        return [found[i] for i in range(len(runs))]
 
     def _as_before(
-        self, conditions: Conditions, stretch: Unchanged, noise: Array
-    ) -> Iterator[Array]:
-        """Standardised poses (B, 66) of the stretch, of its own ``noise`` (M, B, 66), from the
-        memory as it is now, which stays as it is.
+        self, conditions: Conditions, stretch: Unchanged, noise: Array, takes: slice, run: int
+    ) -> Generator[float, None, _Stretch]:
+        """A stretch as it is to be made of its own ``noise`` (M, B, 66), from the memory of these
+        ``takes`` as it is now, which stays as it is.
         """
         begin = max(0, stretch.start - self.network.sizes.history)
-        stop = stretch.start + len(stretch.given)
-        there = conditions.between(begin, stop)
+        there = conditions.between(begin, stretch.start + len(stretch.given))
         there.observation[stretch.start - begin :] = stretch.observation
         there.given[stretch.start - begin :] = stretch.given
+        known = yield from self._in_advance(there)
+        later = slice(stretch.start - begin, None)
+        return _Stretch(
+            _InAdvance(
+                known.scene[later], [[each[later] for each in part] for part in known.shares]
+            ),
+            self._memory.rows(takes),
+            noise,
+            run,
+        )
 
-        other = copy(self)
-        other.start(there, takes=noise.shape[1])
-        other._memory = self._memory.copy()
-        for t, own in zip(range(stretch.start, stop), noise, strict=True):
-            with one_thread(), np.errstate(over="ignore", invalid="ignore"):
-                pose = other.decode(t - begin, own).pose
-            yield pose
+    def _made_aside(
+        self, stretches: Sequence[_Stretch], runs: int
+    ) -> Generator[float, None, list[list[Array]]]:
+        """Standardised poses (B, 66) of the frames of all stretches, one after another, by run; all
+        are made side by side.
+        """
+        made: dict[int, list[Array]] = {}
+        order = sorted(range(len(stretches)), key=lambda j: -len(stretches[j].noise))
+        if order:
+            ordered = [stretches[j] for j in order]
+            takes = [each.noise.shape[1] for each in ordered]
+            stops = np.cumsum(takes)
+            other = copy(self)
+            other._shot = self._together([each.known for each in ordered], takes)
+            other._memory = self._joined([each.memory for each in ordered])
+            for t in range(len(ordered[0].noise)):
+                count = sum(len(each.noise) > t for each in ordered)
+                active = int(stops[count - 1])
+                other._memory = other._memory.rows(slice(0, active))
+                noise = self.backend.xp.concatenate([each.noise[t] for each in ordered[:count]])
+                with one_thread(), np.errstate(over="ignore", invalid="ignore"):
+                    pose = other.decode(t, noise).pose
+                for j, stop, own in zip(order[:count], stops, takes, strict=False):
+                    made.setdefault(j, []).append(pose[int(stop) - own : int(stop)])
+                yield t / len(ordered[0].noise)
+
+        return [
+            [pose for j, stretch in enumerate(stretches) if stretch.run == run for pose in made[j]]
+            for run in range(runs)
+        ]
+
+    def _joined(self, memories: Sequence[_Memory]) -> _Memory:
+        """The memory of the takes of all, one after another."""
+        joined = self.backend.xp.concatenate
+        return _Memory(
+            joined([each.past for each in memories]),
+            [
+                [
+                    tuple(
+                        (
+                            joined([each.states[i][k][layer][0] for each in memories]),
+                            joined([each.states[i][k][layer][1] for each in memories]),
+                        )
+                        for layer in range(len(memories[0].states[i][k]))
+                    )
+                    for k in range(len(memories[0].states[i]))
+                ]
+                for i in range(len(memories[0].states))
+            ],
+        )
 
     def _stacked(self, arrays: Sequence[Array]) -> np.ndarray:
         """Arrays of each frame as one of all, in double precision."""

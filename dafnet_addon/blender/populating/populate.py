@@ -13,10 +13,9 @@ import numpy as np
 from ... import load_weights
 from ...core.cleanup import CleanUp
 from ...core.conditions import STAYS
-from ...core.crowd import Asked, generate_crowd
 from ...core.distance import prepared
 from ...core.files import require_replaceable, whole_folder
-from ...core.generate import Draw
+from ...core.generate import Asked, Draw, crowd_steps
 from ...core.manifest import MANIFEST, Manifest, content_hash, words_hash
 from ...core.progress import run_to_end
 from ...core.skeleton import STATURE
@@ -108,7 +107,7 @@ def populate(
     solids, said_of_them = prepared(Scene(tuple(room.solids)), room.floor)
     clock.done("distances")
     takes = run_to_end(
-        generate_crowd.steps(
+        crowd_steps(
             solids,
             [
                 Asked(plan.controls(), _draws(each, shot))
