@@ -1,5 +1,6 @@
 """The character's takes: which there are, how good they are, and what can be done with them."""
 
+from textwrap import wrap
 from typing import Any
 
 import bpy
@@ -19,6 +20,10 @@ from .main import CharacterPanel
 __all__ = ["DAFNET_PT_clean_up", "DAFNET_PT_takes", "DAFNET_UL_takes"]
 
 
+_LETTER = 8.0
+"""Pixels of a letter, more or less."""
+_SHORTEST = 20
+"""Letters of the shortest line of a sentence."""
 _NAME_WIDTH = 0.45
 """Share of a row that the name of a figure takes."""
 
@@ -35,6 +40,18 @@ def _draw_figure(layout: bpy.types.UILayout, name: str, *values: str) -> None:
     row = split.row(align=True)
     for value in values:
         row.label(text=value)
+
+
+def _draw_finding(layout: bpy.types.UILayout, finding: Any, context: bpy.types.Context) -> None:
+    """Draw a sentence, broken into lines that fit the region."""
+    width = context.region.width if context.region else 0
+    letter = _LETTER * context.preferences.system.ui_scale
+    lines = wrap(finding.text, max(_SHORTEST, round(width / letter)))
+    for k, line in enumerate(lines):
+        row = layout.row()
+        row.alert = not finding.good
+        icon = "BLANK1" if k else "CHECKMARK" if finding.good else "ERROR"
+        row.label(text=line, icon=icon, translate=False)
 
 
 class DAFNET_UL_takes(bpy.types.UIList):
@@ -54,7 +71,7 @@ class DAFNET_UL_takes(bpy.types.UIList):
         index: int = 0,
         _flag: int = 0,
     ) -> None:
-        """A row: play, name, sliding feet and collisions a frame, ghost, accepted."""
+        """A row: play, name, what is most to be said of it, ghost, accepted."""
         action = item.action
         if action is None:
             layout.label(text="Deleted", icon="ERROR")
@@ -67,15 +84,15 @@ class DAFNET_UL_takes(bpy.types.UIList):
             DAFNET_OT_play_take.bl_idname, text="", icon="PAUSE" if plays else "PLAY", emboss=False
         ).index = index
 
+        own = action.dafnet
         split = row.split(factor=0.55, align=True)
         split.prop(action, "name", text="", emboss=False)
-        figures = split.row(align=True)
-        figures.label(text=f"{action.dafnet.sliding:.1f}")
-        figures.label(
-            text="–" if action.dafnet.collisions < 0 else f"{action.dafnet.collisions:.1f}"
-        )
+        said = split.row(align=True)
+        if len(own.verdict):
+            worst = own.verdict[0]
+            said.alert = not worst.good
+            said.label(text=worst.word, translate=False)
 
-        own = action.dafnet
         ghost = "GHOST_ENABLED" if own.ghost else "GHOST_DISABLED"
         row.prop(own, "ghost", text="", icon=ghost, emboss=False)
         accepted = "CHECKBOX_HLT" if own.accepted else "CHECKBOX_DEHLT"
@@ -112,6 +129,10 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
             return
 
         figures = take.dafnet
+        column = layout.column(align=True)
+        for finding in figures.verdict:
+            _draw_finding(column, finding, context)
+
         layout.label(
             text=(
                 f"Seed {figures.seed}, legs {figures.lower_seed}, temperature "

@@ -1,6 +1,7 @@
 """``dafnet bake``: motion for the character of a .blend file, without a window."""
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -135,6 +136,7 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
                 "log_likelihood": round(take.log_likelihood, 3),
                 "metrics": take.metrics,
                 "raw_metrics": take.raw_metrics,
+                "verdict": [asdict(finding) for finding in take.verdict],
             }
             for action, draw, take in zip(result.actions, result.draws, result.takes, strict=True)
         ],

@@ -150,7 +150,7 @@ def _between(offset: np.ndarray, asked: np.ndarray, fps: float = MODEL_FPS) -> n
 
 
 def standing_still(
-    joints: np.ndarray, floor: np.ndarray | float = 0.0
+    joints: np.ndarray, floor: np.ndarray | float = 0.0, fps: float = MODEL_FPS
 ) -> list[tuple[int, int, int]]:
     """Stands of both feet: (foot, start, end exclusive), foot 0 is the left one, of joints (T, 22,
     3).
@@ -162,7 +162,7 @@ def standing_still(
     for foot, toe in enumerate(FEET):
         place = joints[:, toe]
         speed = (
-            np.linalg.norm(np.gradient(place, axis=0), axis=-1) * MODEL_FPS
+            np.linalg.norm(np.gradient(place, axis=0), axis=-1) * fps
             if len(joints) > 1
             else np.zeros(len(joints))
         )

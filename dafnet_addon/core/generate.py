@@ -31,10 +31,11 @@ from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from
 from .sampler import Conditions, Run, Sampler, Samples, Unchanged
 from .series import MODEL_FPS
 from .skeleton import UPPER, model_order
-from .softness import support_under
+from .softness import Support, support_under
 from .solids import Scene
 from .take import Controls, Take
 from .touching import touches
+from .verdict import verdict
 from .weights import Weights
 
 __all__ = [
@@ -121,12 +122,13 @@ def _kept(resume: Take, frame: int, controls: Controls, path: RootPath) -> np.nd
 
 @stepwise
 def cleaned_up(
-    joints: np.ndarray, shot: Shot, settings: CleanUp
+    joints: np.ndarray, shot: Shot, settings: CleanUp, support: Support | None = None
 ) -> Generator[float, None, np.ndarray]:
     """Joints (N, 22, 3) of a shot, canonical metres, on constant bones, after all that ``settings``
-    ask for.
+    ask for; ``support``: what carries the body, where that is known already.
     """
-    support = support_under(shot.scene, shot.path) if settings.seat else None
+    if settings.seat and support is None:
+        support = support_under(shot.scene, shot.path)
     floor = shot.path.position[:, 2]
     reach = partial(distance, shot.scene, floor=floor) if shot.scene.solids else None
     yield 0.2
@@ -220,6 +222,7 @@ def _finished_steps(
     floor = shot.own_path.position[:, 2]
     reach = partial(distance, shot.own_scene, floor=floor) if shot.own_scene.solids else None
     targets = targets_of(shot.own_path, shot.own_request)
+    support = support_under(shot.own_scene, shot.own_path)
     judged = partial(motion_metrics, fps=controls.fps, floor=floor, targets=targets, distance=reach)
 
     def at_own_rate(motion: Bent) -> Bent:
@@ -239,7 +242,11 @@ def _finished_steps(
     yield 0.4
     if clean_up.asked:
         joints = yield from within(
-            cleaned_up.steps(_joints(motion), shot, replace(clean_up, reach=0.0)), 0.4, 0.6
+            cleaned_up.steps(
+                _joints(motion), shot, replace(clean_up, reach=0.0), support if same else None
+            ),
+            0.4,
+            0.6,
         )
         yield 0.6
         if not same:
@@ -275,6 +282,7 @@ def _finished_steps(
         log_likelihood=log_likelihood,
         raw_metrics=raw,
         metrics=metrics,
+        verdict=verdict(joints, controls.fps, shot.own_path, shot.own_scene, support),
         seconds={"fitting": perf_counter() - started},
         warnings=shot.warnings,
     )

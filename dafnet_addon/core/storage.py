@@ -12,7 +12,7 @@ import math
 import re
 import zipfile
 import zlib
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from .network import MAX_ACTIONS
 from .resampling import covering_frames
 from .root import RootPath
 from .skeleton import LOWER, TARGETS, UPPER
-from .take import Controls, Take
+from .take import Controls, Finding, Take
 from .text import printable, read_json
 
 __all__ = ["packed", "unpacked"]
@@ -93,7 +93,13 @@ def packed(take: Take, controls: Controls) -> bytes:
 
 
 def _sayable(value: Any) -> Any:
-    """A number, or figures by name, with None for what JSON has no word for."""
+    """A number, figures by name, or what else a take says, with None for what JSON has no word
+    for.
+    """
+    if isinstance(value, Finding):
+        return asdict(value)
+    if isinstance(value, tuple):
+        return [_sayable(each) for each in value]
     if isinstance(value, dict):
         return {name: _sayable(each) for name, each in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value
@@ -240,4 +246,18 @@ def _take(said: dict[str, Any], arrays: dict[str, np.ndarray], fps: float) -> Ta
         metrics=figures("take.metrics"),
         seconds=seconds,
         warnings=tuple(printable(each, 1000) for each in warnings),
+        verdict=_verdict(said.get("take.verdict", [])),
     )
+
+
+def _verdict(said: Any) -> tuple[Finding, ...]:
+    def finding(each: Any) -> Finding:
+        words = [each.get(name) for name in ("word", "text")] if isinstance(each, dict) else [None]
+        if not all(isinstance(word, str) for word in words):
+            raise InputError("'take.verdict' is something other than findings")
+        word, text = (printable(word, 1000) for word in words)
+        return Finding(word, text, good=each.get("good") is True)
+
+    if not isinstance(said, list):
+        raise InputError("'take.verdict' is something other than findings")
+    return tuple(finding(each) for each in said)

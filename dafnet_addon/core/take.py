@@ -15,7 +15,7 @@ from .root import RootPath
 from .skeleton import LOWER, TARGETS, UPPER
 from .text import printable
 
-__all__ = ["MODES", "Controls", "Take"]
+__all__ = ["MODES", "Controls", "Finding", "Take"]
 
 MODES = ("FREE", "EE", "FULL")
 
@@ -163,6 +163,17 @@ def _checked_mode(mode: object, frames: int) -> str | tuple[str, ...]:
 
 
 @dataclass(frozen=True)
+class Finding:
+    """One thing that an eye sees of a take: ``word`` in short, ``text`` as a sentence, which says
+    what to do where it is not ``good``.
+    """
+
+    word: str
+    text: str
+    good: bool
+
+
+@dataclass(frozen=True)
 class Take:
     """One generated motion at the controls' frame rate.
 
@@ -175,7 +186,7 @@ class Take:
     ``unchanged`` (M, 66): those that it would have gone on with over each change of mode, one after
     another, if there had been none: what resuming and cleaning again need. ``touches`` (T, 4): how
     far hands and feet hold on to something (``touching.touches``), what another body's have to keep
-    to. ``log_likelihood``: of a
+    to. ``verdict``: what an eye would say of it, the worst first. ``log_likelihood``: of a
     standardised pose after those before it, mean over the frames, nats. ``raw_metrics``,
     ``metrics``: ``metrics.motion_metrics`` of the model's own motion and of this one after the
     clean-up, at these frames and canonical size. ``seconds``: time spent by stage. ``warnings``:
@@ -197,6 +208,7 @@ class Take:
     metrics: dict[str, float | None] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    verdict: tuple[Finding, ...] = ()
 
     def __len__(self) -> int:
         return len(self.joints)

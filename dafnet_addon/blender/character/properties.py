@@ -12,6 +12,7 @@ from bpy.props import (
     FloatProperty,
     IntProperty,
     PointerProperty,
+    StringProperty,
 )
 
 from ...core.solids import SOFTEST
@@ -32,6 +33,14 @@ def _is_take(_settings: "CharacterSettings", candidate: bpy.types.Action) -> boo
 
 def _is_not_the_character(settings: "CharacterSettings", candidate: bpy.types.Object) -> bool:
     return candidate != settings.id_data
+
+
+class TakeFinding(bpy.types.PropertyGroup):
+    """One thing that an eye sees of a take (``core.take.Finding``)."""
+
+    word: StringProperty(name="Word", description="What it is, in short")
+    text: StringProperty(name="Text", description="What it is, and what to do about it")
+    good: BoolProperty(name="Good", description="Whether it is as it should be")
 
 
 class TakeSettings(bpy.types.PropertyGroup):
@@ -84,6 +93,9 @@ class TakeSettings(bpy.types.PropertyGroup):
     )
     jerk: FloatProperty(
         name="Jerk", options=set(), description="How jerky the motion is, in m/s\u00b3"
+    )
+    verdict: CollectionProperty(
+        type=TakeFinding, name="Verdict", description="What an eye sees of it, the worst first"
     )
     raw_sliding: FloatProperty(
         name="Sliding before",
@@ -427,7 +439,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
     )
 
 
-_GROUPS = (TakeSettings, TakeLink, CharacterSettings)
+_GROUPS = (TakeFinding, TakeSettings, TakeLink, CharacterSettings)
 
 
 def register() -> None:

@@ -68,6 +68,11 @@ def add_take(
             factor = _STATURE if name == "miss" else 1.0
             setattr(facts, prefix + name, -1.0 if value is None else value * factor)
 
+    facts.verdict.clear()
+    for finding in take.verdict:
+        row = facts.verdict.add()
+        row.word, row.text, row.good = finding.word, finding.text, finding.good
+
     own = armature.dafnet
     own.takes.add().action = action
     own.active_take = len(own.takes) - 1

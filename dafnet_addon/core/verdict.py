@@ -1,0 +1,140 @@
+"""What an eye would say of a take, in words: whether it sits where it was sent, what it goes
+through and whether its feet slide.
+
+Joints are (T, 22, 3), world, canonical metres, at ``fps``.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .cleanup import standing_still
+from .metrics import body_points, seat_episodes
+from .occupancy import distance
+from .root import RootPath
+from .series import runs
+from .skeleton import FEET, JOINTS, PELVIS
+from .softness import OVER_HARD, Support, guessed
+from .solids import Scene
+from .take import Finding
+
+__all__ = ["verdict"]
+
+_OFF_SEAT = 0.04  # metres from where a seat carries a pelvis, from where on it is seen
+_STANDS = 0.80  # metres of a pelvis over the floor, of one who did not sit down
+_SEATS = 0.22  # metres of a top over the floor, from where on one is to sit on it
+_DEEP = 0.05  # metres of a body's bones in something hard: its flesh is past it
+_BRIEF = 0.2  # seconds of what is hardly seen
+_SLIDES = 0.06  # metres that a standing foot moves; of captured walkers, as they roll off, 5 cm
+_USUAL_TOP = 0.45  # metres over the floor
+_UNNAMED = "the furniture"
+_PER_BONE = 4
+_PARTS = {  # what is between a joint and the one it hangs on
+    "hip": "hips", "knee": "thigh", "ankle": "shin", "foot": "foot", "spine1": "trunk",
+    "spine2": "trunk", "spine3": "trunk", "neck": "trunk", "head": "head", "collar": "shoulder",
+    "shoulder": "shoulder", "elbow": "upper arm", "wrist": "forearm", "pelvis": "hips",
+}  # fmt: skip
+
+
+def verdict(
+    joints: np.ndarray, fps: float, path: RootPath, scene: Scene, support: Support
+) -> tuple[Finding, ...]:
+    """What there is to say of a take: seats first, then what it goes through, then its feet.
+
+    ``path`` (T): its root's; ``support``: of ``softness.support_under``, where the root is.
+    """
+    found = [
+        *_seats(joints, fps, path, scene, support),
+        *_inside(joints, fps, path, scene),
+        *_feet(joints, fps, path),
+    ]
+    return tuple(sorted(found, key=lambda each: each.good))
+
+
+def _names_under(scene: Scene, path: RootPath, top: np.ndarray) -> list[str]:
+    """The pieces (T) whose top, at these heights (T,), is under the root."""
+    places = np.column_stack([path.position[:, :2], np.nan_to_num(top)])[:, None]
+    gaps = [distance(Scene((s,)), places, path.position[:, 2])[:, 0] for s in scene.solids]
+    return [scene.solids[k].name or _UNNAMED for k in np.argmin(gaps, axis=0)]
+
+
+def _seats(
+    joints: np.ndarray, fps: float, path: RootPath, scene: Scene, support: Support
+) -> Iterator[Finding]:
+    if not np.isfinite(support.top).any():
+        return
+    carried = support.top + OVER_HARD - support.softness
+    names = _names_under(scene, path, support.top)
+    for episode in seat_episodes(joints, path, fps):
+        here = slice(episode.start, episode.stop)
+        middle = (episode.start + episode.stop) // 2
+        over_floor = np.median(support.top[here]) - episode.position[2]
+        if not over_floor > _SEATS:
+            continue
+
+        name = names[middle]
+        over = float(np.median(joints[here, PELVIS, 2] - carried[here]))
+        amount, when = f"{100 * abs(over):.0f} cm", f"at {middle / fps:.1f} s"
+        if episode.pelvis_height > _STANDS and over > 2 * _OFF_SEAT:
+            yield Finding(
+                "stands",
+                f"Stands in '{name}' {when} and does not sit down; is it a seat, and does the root "
+                "rest on its level part?",
+                good=False,
+            )
+        elif abs(over) <= _OFF_SEAT:
+            yield Finding("sits", f"Sits on '{name}' {when}, within {amount}", good=True)
+        else:
+            does = "hovers" if over > 0 else "sinks"
+            where = "over" if over > 0 else "into"
+            yield Finding(
+                f"{does} {amount}",
+                f"{does.capitalize()} {amount} {where} '{name}' {when}; raise Rest on Seats, set "
+                "its Softness, or move the root onto its level part",
+                good=False,
+            )
+
+
+def _inside(joints: np.ndarray, fps: float, path: RootPath, scene: Scene) -> Iterator[Finding]:
+    points, floor = body_points(joints, _PER_BONE), path.position[:, 2]
+    if not scene.solids or not (distance(scene, points, floor) < -_DEEP).any():
+        return
+
+    for solid in scene.solids:
+        depth = -distance(Scene((solid,)), points, floor)
+        gives = guessed(solid, _USUAL_TOP) if solid.softness is None else solid.softness
+        allowed = _DEEP + gives
+        for start, stop in runs((depth > allowed).any(1), at_least=max(1, round(_BRIEF * fps))):
+            part = depth[start:stop]
+            frame, point = np.unravel_index(np.argmax(part), part.shape)
+            name, what = solid.name or _UNNAMED, _part_of(int(point))
+            yield Finding(
+                f"in {name}",
+                f"The {what} is {100 * part.max():.0f} cm inside '{name}' at "
+                f"{(start + frame) / fps:.1f} s; lead the root farther around it, or move it",
+                good=False,
+            )
+
+
+def _part_of(point: int) -> str:
+    """What of the body a point of ``body_points`` is on."""
+    joint = JOINTS[0 if point == 0 else 1 + (point - 1) // _PER_BONE]
+    side, _, name = joint.rpartition("_")
+    return f"{side} {_PARTS[name]}".strip()
+
+
+def _feet(joints: np.ndarray, fps: float, path: RootPath) -> Iterator[Finding]:
+    for foot, side in enumerate(("left", "right")):
+        slides = [
+            (float(np.linalg.norm(np.ptp(joints[start:stop, FEET[foot], :2], axis=0))), start)
+            for own, start, stop in standing_still(joints, path.position[:, 2], fps)
+            if own == foot and stop - start >= _BRIEF * fps
+        ]
+        if slides and max(slides)[0] > _SLIDES:
+            far, when = max(slides)
+            yield Finding(
+                f"{side} foot slides",
+                f"The {side} foot slides {100 * far:.0f} cm while it stands, at {when / fps:.1f} "
+                "s; raise Plant Feet, or lower the temperature",
+                good=False,
+            )

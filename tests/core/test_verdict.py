@@ -1,0 +1,66 @@
+"""What an eye sees of a take is said, and what it does not see is not."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from dafnet_addon import Box, CleanUp, Controls, Scene, Take, generate, load_weights
+from dafnet_addon.core.paths import Stop, route
+from dafnet_addon.core.root import root_from_matrices
+from dafnet_addon.core.skeleton import FEET
+from dafnet_addon.core.softness import support_under
+from dafnet_addon.core.storage import packed, unpacked
+from dafnet_addon.core.take import Finding
+from dafnet_addon.core.verdict import verdict
+
+STOOL = Scene((Box([0.0, 0.0, 0.22], [0.22, 0.22, 0.22], name="Stool"),))
+WAY = route(Stop((0.0, 1.6), np.pi, 0.3), Stop((0.0, 0.0), 0.0, 0.8, seated=True))
+CONTROLS = Controls(30.0, WAY.path.matrices())
+
+
+def _take() -> Take:
+    return generate(STOOL, CONTROLS, load_weights(), clean_up=CleanUp(feet=1.0, seat=1.0))
+
+
+def _said(joints: np.ndarray, scene: Scene = STOOL) -> list[Finding]:
+    path, _ = root_from_matrices(CONTROLS.root)
+    return list(verdict(joints, 30.0, path, scene, support_under(scene, path)))
+
+
+def test_who_sits_well_is_told_so_and_the_file_keeps_it() -> None:
+    take = _take()
+    assert [each.word for each in take.verdict] == ["sits"] and take.verdict[0].good
+    assert "'Stool'" in take.verdict[0].text
+    assert unpacked(packed(take, CONTROLS))[0].verdict == take.verdict
+    assert unpacked(packed(replace(take, verdict=()), CONTROLS))[0].verdict == ()
+
+
+def test_hovering_sinking_and_standing_are_told_apart() -> None:
+    joints = _take().joints
+    for higher, word in ((0.09, "hovers 9 cm"), (-0.08, "sinks 8 cm"), (0.4, "stands")):
+        found = [each for each in _said(joints + np.array([0.0, 0.0, higher])) if not each.good]
+        assert word in {each.word for each in found}, (higher, found)
+
+
+def test_what_is_gone_through_is_named_with_the_part_of_the_body() -> None:
+    joints = _take().joints
+    knees = joints[-1, [4, 5]].mean(axis=0)
+    block = Box([knees[0], knees[1], 0.25], [0.3, 0.1, 0.2], name="Box")
+    found = [each for each in _said(joints, Scene((*STOOL.solids, block))) if not each.good]
+    assert found[0].word == "in Box" and "shin is" in found[0].text
+    away = replace(block, center=[3.0, 0.0, 0.25])
+    assert all(each.good for each in _said(joints, Scene((*STOOL.solids, away))))
+
+
+def test_a_foot_that_slides_is_named() -> None:
+    joints = _take().joints.copy()
+    last = joints[-30:]
+    last[:, FEET[1], 0] += np.linspace(0.0, 0.1, 30)
+    last[:, FEET[1], 2] = joints[-31, FEET[1], 2]
+    words = [each.word for each in _said(joints)]
+    assert "right foot slides" in words and "left foot slides" not in words
+
+
+def test_without_furniture_there_is_nothing_to_sit_on() -> None:
+    take = generate(Scene(), CONTROLS, load_weights(), clean_up=CleanUp(feet=1.0))
+    assert all("slides" in each.word for each in take.verdict)
