@@ -7,6 +7,7 @@ import bpy
 
 from ...core.progress import stepwise, within
 from ...core.wishes import Wishes
+from .export import export_steps
 from .people import Played, takes_to_play
 from .render import render_steps
 from .truth import truth_of, write_truth
@@ -42,6 +43,15 @@ def _jobs(
     take = f"take_{number + 1}"
     if wishes.truth or wishes.render:
         yield _seen(people, number, folder=folder, take=take, wishes=wishes)
+    if wishes.export:
+        yield export_steps(
+            bpy.context,
+            people,
+            number,
+            kinds=wishes.export,
+            root_motion=wishes.root_motion,
+            folder=folder / "export" / take,
+        )
 
 
 def _seen(

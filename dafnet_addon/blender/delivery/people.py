@@ -13,6 +13,7 @@ from ...core.skeleton import JOINTS
 from ...core.take import Take
 from ...director.plans import Plan
 from ..character.armature import is_character, objects_of
+from ..character.mannequin import FACING
 from ..character.takes import PACKED
 from ..compat import assign_action
 from ..pipeline.rollback import state_restorer
@@ -28,7 +29,7 @@ from ..rig.reading import (
 )
 from ..scene.playback import frame_kept
 
-__all__ = ["Body", "Played", "file_names", "playing", "takes_to_play"]
+__all__ = ["Body", "Played", "facing_of", "file_names", "playing", "takes_to_play"]
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,17 @@ def file_names(people: Sequence[Played]) -> list[str]:
             name = f"{cleaned}_{len(names) + 1}"
         names.append(name)
     return names
+
+
+def facing_of(armature: bpy.types.Object) -> np.ndarray:
+    """The axes of the canonical frame (x right, y forward, z up) in an armature's space, as columns
+    (3, 3).
+    """
+    if is_character(armature):
+        return FACING
+    rig_map = with_bone_names_of(map_of(armature), armature.data.bones.keys())
+    rest = rest_matrices(armature, [rig_map.place(name) for name in JOINTS])
+    return shape_of(armature, rig_map, rest, 1.0).axes
 
 
 class Body:
