@@ -34,7 +34,8 @@ USUAL_DOWN, USUAL_UP = 1.3, 0.9
 
 _SHORTEST_WAY = 0.12  # metres; what is less is shifting on a seat
 _LONGEST = 90  # frames of a captured way down
-_STRETCHED = (0.6, 3.0)  # of a captured transition's length
+_STRETCHED = (0.5, 3.7)  # of a captured transition's length: quick ones last 0.6 s
+_EVENLY = 0.5  # of the times, drawn evenly from the quickest to the slowest: the usual are many
 _STANDS = 0.35  # metres a second, of the fastest joint: a body that has not begun yet
 _BEFORE = 45  # frames before the pelvis' way, in which a body bends forward
 _ROUND = 6  # frames on both sides of the way that keep its speed
@@ -118,7 +119,9 @@ def stretches_of(
     stretches = []
     for way in ways:
         usual = USUAL_DOWN if way.down != backward else USUAL_UP
-        wanted = np.exp(rng.triangular(*np.log([QUICKEST, usual, SLOWEST])))
+        low, most, high = np.log([QUICKEST, usual, SLOWEST])
+        evenly = rng.random() < _EVENLY
+        wanted = np.exp(rng.uniform(low, high) if evenly else rng.triangular(low, most, high))
         stretches.append(float(np.clip(wanted / way.seconds, *_STRETCHED)))
     return stretches
 
