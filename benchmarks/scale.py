@@ -21,9 +21,9 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from dafnet_addon.batch.report import took
 from dafnet_addon.core.files import save_text
 from dafnet_addon.core.manifest import read_manifest
+from dafnet_addon.core.text import duration
 from dafnet_addon.core.threads import cores
 
 __all__ = ["ROWS", "Options", "Row", "dafnet", "main", "prepared"]
@@ -169,7 +169,7 @@ def kills(options: Options) -> Iterator[Row]:
         f"{options.scenes} scenes of {options.takes} takes of {options.frames} frames, killed "
         f"{options.kills} times, {options.rounds} times over",
         "all takes, none twice, none half-written, as in one quiet run",
-        f"quiet: {len(expected)} takes in {took(seconds)}; " + "; ".join(told),
+        f"quiet: {len(expected)} takes in {duration(seconds)}; " + "; ".join(told),
         holds,
     )
 

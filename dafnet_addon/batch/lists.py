@@ -114,9 +114,10 @@ def _expanded(
     """The shots that one table of the list stands for; what cannot be used is one that says so."""
     name = fallback
     try:
-        said = require_known(entry, (*_OWN, *_WORDS), which)
+        said: dict[str, Any] = entry if isinstance(entry, dict) else {}
         file = _file(said.get("shot"), which, folder)
         name = _name(said.get("name", file.stem if file else fallback), which)
+        require_known(entry, (*_OWN, *_WORDS), which)
         written = _absolute(read_tables(file, "shots"), file.parent) if file else {}
         own = _absolute({key: said[key] for key in said if key not in _OWN}, folder)
         words = {**defaults, **written, **own}

@@ -12,11 +12,11 @@ from typing import Any
 
 from ..core.files import save_text
 from ..core.manifest import current_version, read_manifest
-from ..core.text import printable
+from ..core.text import duration, printable
 from .making import Outcome
 from .running import Batch
 
-__all__ = ["counted", "report", "save_report", "took"]
+__all__ = ["counted", "report", "save_report"]
 
 _COLUMNS = {
     "bad_collisions_per_frame": ("collisions a frame", 1.0, "{:.2f}"),
@@ -108,7 +108,9 @@ def _page(batch: Batch, told: dict[str, Any], thumbnail: Callable[[Path], bytes]
     rows = "\n".join(_line(batch, row, columns, pictures) for row in told["shots"])
     return _PAGE.format(
         title=escape(printable(batch.output.name)),
-        summary=escape(f"{counted(told['counts'])}, in {took(told['seconds'])}; the worst first"),
+        summary=escape(
+            f"{counted(told['counts'])}, in {duration(told['seconds'])}; the worst first"
+        ),
         head=head,
         rows=rows,
         version=escape(told["version"]),
@@ -116,10 +118,8 @@ def _page(batch: Batch, told: dict[str, Any], thumbnail: Callable[[Path], bytes]
 
 
 def _frame(folder: Path) -> Path | None:
-    """A rendered frame in the middle of a shot."""
-    found = sorted(
-        each for each in (folder / "frames").rglob("*") if each.suffix in (".png", ".jpg")
-    )
+    """A rendered frame in the middle of a shot; masks and depths have words behind the number."""
+    found = sorted(each for each in (folder / "frames").rglob("*.png") if each.stem.isdigit())
     return found[len(found) // 2] if found else None
 
 
@@ -164,14 +164,6 @@ def counted(counts: dict[str, int]) -> str:
     total = sum(counts.values())
     states = ", ".join(f"{count} {state}" for state, count in counts.items())
     return f"{total} shot{'s' if total != 1 else ''}: {states}"
-
-
-def took(seconds: float) -> str:
-    """A time in words, as long as it is worth saying: 8 s, 5 min, 2 h 20 min."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60)
-    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"
 
 
 _PAGE = """<!DOCTYPE html>

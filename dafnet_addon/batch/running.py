@@ -36,6 +36,9 @@ class Batch:
     weights: Path | None = None
     program: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "output", self.output.absolute())  # wherever shots are made
+
     def folder(self, name: str) -> Path:
         """That of a shot."""
         return self.output / name

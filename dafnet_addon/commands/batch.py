@@ -10,10 +10,10 @@ from ..batch.cluster import cluster_workers
 from ..batch.lists import read_list
 from ..batch.local import local_workers
 from ..batch.making import Outcome
-from ..batch.report import counted, report, save_report, took
+from ..batch.report import counted, report, save_report
 from ..batch.running import Batch, chosen, look, make_batch
 from ..core.errors import InputError
-from ..core.text import printable
+from ..core.text import duration, printable
 from ..core.threads import cores
 from .command import MAX_PROCESSES, Command, Progress, Result, add_weights, number
 from .console import complain
@@ -59,7 +59,7 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
         shots = chosen(shots, options.only)
     batch = Batch(
         shots,
-        options.output.absolute(),
+        options.output,
         weights=options.weights.absolute() if options.weights else None,
     )
 
@@ -73,7 +73,7 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
         outcomes = make_batch(batch, workers, progress=progress, tell=_tell)
 
     told = report(batch, outcomes, time.monotonic() - started)
-    lines = [f"{counted(told['counts'])}, in {took(told['seconds'])}"]
+    lines = [f"{counted(told['counts'])}, in {duration(told['seconds'])}"]
     if not options.only:  # which other processes may be busy with, too
         lines.append(f"Report: {save_report(batch, told, _thumbnails())}")
 

@@ -32,6 +32,7 @@ _DATA = {
 _RESEARCH = {
     "ablation": "ablation",
     "canonical": "canonical",
+    "farm": "farm",
     "life-ablation": "life_ablation",
     "scale": "scale",
     "tables": "experiments",
@@ -43,6 +44,7 @@ do it.
 _NEEDS = {
     "ablation": ("torch",),
     "life-ablation": ("torch",),
+    "farm": ("bpy",),
     "scale": ("bpy",),
     "speed": ("torch",),
     "tables": ("torch",),
@@ -95,7 +97,7 @@ COMMAND = Command(
     summary=(
         f"measure: {'; '.join(f'{name!r}: {does}' for name, does in _MEASURES.items())}; "
         "'canonical' fits bodies to the skeleton; 'ablation', 'life-ablation' and 'tables' "
-        "train and compare; 'scale' makes batches and kills them"
+        "train and compare; 'scale' makes batches and kills them, 'farm' says what many shots take"
     ),
     add_arguments=_add_arguments,
     run=_run,

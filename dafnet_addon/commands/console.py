@@ -8,9 +8,11 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
+from time import monotonic
 from typing import TextIO
 
 from ..core.errors import InputError
+from ..core.text import duration
 
 __all__ = [
     "MAX_SHOWN",
@@ -77,8 +79,13 @@ def complain(text: str, end: str = "\n") -> None:
         print(text, end=end, file=sys.stderr, flush=True)
 
 
+_SURE = 0.03
+"""The part done from which the time left is told."""
+
+
 class ProgressBar:
-    """Progress for people, on standard error: a bar on a terminal, ten dots elsewhere.
+    """Progress for people, on standard error: a bar and the time left on a terminal, ten dots
+    elsewhere.
 
     ``stop_if_asked`` is called at every step, and raises where the command is to stop.
     """
@@ -87,6 +94,7 @@ class ProgressBar:
         self.stop_if_asked = stop_if_asked
         self.dots = 0
         self.shown = False
+        self.started = monotonic()
 
     def __call__(self, progress: float) -> None:
         """Show the part done, in [0, 1]."""
@@ -96,10 +104,18 @@ class ProgressBar:
 
         if sys.stderr.isatty():
             filled = "#" * int(30 * part)
-            complain(f"\r[{filled:.<30}] {100 * part:3.0f} %", end="")
+            bar = f"[{filled:.<30}] {100 * part:3.0f} %{self._left(part)}"
+            complain(f"\r{bar:<60}", end="")
         elif int(10 * part) > self.dots:
             complain("." * (int(10 * part) - self.dots), end="")
             self.dots = int(10 * part)
+
+    def _left(self, part: float) -> str:
+        """How long it will take still, where there is enough to tell by."""
+        spent = monotonic() - self.started
+        if part < _SURE or part == 1.0 or spent < 2.0:
+            return ""
+        return f", {duration(spent * (1.0 - part) / part)} left"
 
     def __enter__(self) -> "ProgressBar":
         return self

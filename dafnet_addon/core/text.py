@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from numbers import Number
 from typing import Any
 
-__all__ = ["metres", "nearest_known", "printable", "read_json"]
+__all__ = ["duration", "metres", "nearest_known", "printable", "read_json"]
 
 _DEEPEST = 32  # lists and objects within each other
 _LONGEST = 18  # digits of a whole number
@@ -35,6 +35,14 @@ def printable(words: object, max_length: int = 200) -> str:
 def metres(length: float) -> str:
     """A length in metres with its unit, in two digits or more: 0.0095 m, 95 m, 1,250 m."""
     return f"{length:,.0f} m" if length >= 10.0 else f"{length:.2g} m"
+
+
+def duration(seconds: float) -> str:
+    """A time, as closely as it is worth saying: 8 s, 5 min, 2 h 20 min."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"
 
 
 def nearest_known(word: str, known: Iterable[str]) -> str:
