@@ -41,10 +41,9 @@ __all__ = ["MAX_SHOTS", "ListedShot", "read_list"]
 MAX_SHOTS = 100_000
 
 _LONGEST = 100  # characters of a name
-_RESERVED = {"logs", "con", "prn", "aux", "nul"} | {
-    f"{x}{k}" for x in ("com", "lpt") for k in "123456789"
-}
-"""Names of folders that are something else, here or on Windows."""
+_OURS = {"logs", "batch.json", "report.html", "report.json"}
+_WINDOWS = {"con", "prn", "aux", "nul"} | {f"{x}{k}" for x in ("com", "lpt") for k in "123456789"}
+"""Names that are something else, beside a shot's folder or on Windows, there with any ending."""
 
 _WORDS = tuple(
     each.name
@@ -152,7 +151,9 @@ def _file(shot: object, which: str, folder: Path) -> Path | None:
 
 def _name(value: object, which: str) -> str:
     good = isinstance(value, str) and re.fullmatch(r"\w[\w. -]*(?<![. ])", value)
-    if not good or len(str(value)) > _LONGEST or str(value).lower() in _RESERVED:
+    name = str(value).lower()
+    taken = name in _OURS or name.split(".")[0] in _WINDOWS
+    if not good or taken or len(name) > _LONGEST:
         raise InputError(
             f"{which} is called '{printable(value, 40)}', which cannot be a folder's name; use "
             "letters, digits, - and _."

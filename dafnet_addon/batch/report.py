@@ -28,6 +28,8 @@ _COLUMNS = {
 """Metrics that the table shows: title, factor, format; the worse the larger. Shots that are equally
 bad by one are told apart by the next.
 """
+_MAX_PICTURES = 500
+"""That the page shows, of the worst: it stays under 10 MB."""
 _WORST = ("failed", "busy", "missing")
 """States that stand before those that are there."""
 
@@ -90,11 +92,11 @@ def save_report(
 
 
 def _page(batch: Batch, told: dict[str, Any], thumbnail: Callable[[Path], bytes] | None) -> str:
-    pictures = {}
+    pictures: dict[str, str] = {}
     if thumbnail:
         for row in told["shots"]:
             frame = _frame(Path(row["folder"])) if row["folder"] else None
-            if frame:
+            if frame and len(pictures) < _MAX_PICTURES:
                 pictures[row["name"]] = b64encode(thumbnail(frame)).decode("ascii")
 
     columns = {

@@ -79,11 +79,11 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
 
     failed = [outcome for outcome in outcomes if outcome.state in ("failed", "busy")]
     if failed and not options.report:
-        of = f"{len(failed)} of {len(shots)} shots" if len(shots) > 1 else "The shot"
         first = failed[0]
+        several = len(failed) > 1
         raise InputError(
-            f"{of} could not be made, first '{first.name}': {first.sentence} Run again, and they "
-            "are tried again."
+            f"{len(failed)} of {len(shots)} shots could not be made, {'first ' * several}"
+            f"'{first.name}': {first.sentence} Run again to try {'them' if several else 'it'} again."
         )
     return told, "\n".join(lines)
 

@@ -116,8 +116,8 @@ def test_the_command_says_what_became_of_all(
     said = capsys.readouterr()
     assert said.out == "" and "bad: The room is broken; mend it. (" in said.err
     assert said.err.splitlines()[-1] == (
-        "dafnet: 1 of 3 shots could not be made, first 'bad': The room is broken; mend it. Run "
-        "again, and they are tried again."
+        "dafnet: 1 of 3 shots could not be made, 'bad': The room is broken; mend it. Run "
+        "again to try it again."
     )
     (worst, *_) = json.loads((out / "report.json").read_text(encoding="utf-8"))["shots"]
     assert (worst["name"], worst["state"]) == ("bad", "failed")
