@@ -67,7 +67,7 @@ def way_in(
         gaps = [(_gap(way, some), which) for which, some in points]
         gap, which = min(gaps, default=(np.inf, ""))
         if via:
-            stands = yield from has_room.steps(room.solids, begin[None], 0.2, room.floor)
+            stands = yield from has_room(room, begin[None], 0.2)
             gap = gap if stands[0] else -1.0
         clear.append(gap)
         blockers.append(which)
@@ -87,4 +87,5 @@ def _gap(way: np.ndarray, points: np.ndarray) -> float:
     """Metres between a way (N, 2) and points (M, 2)."""
     if not len(points):
         return np.inf
-    return float(np.sqrt(min(((points - at) ** 2).sum(axis=1).min() for at in way)))
+    x, y = points.T.copy()
+    return float(np.sqrt(min(((x - at[0]) ** 2 + (y - at[1]) ** 2).min() for at in way)))

@@ -114,12 +114,10 @@ class Chooser:
         """Those that nobody keeps and where one can stand with ``radius`` metres around; what is
         used from there may be closer (``besides``).
         """
-        solids = self.person.room.solids
-        if besides is not None:
-            solids = [s for s in solids if not any(s is own for own in besides.solids)]
         open_ = [spot for spot in spots if not self.person.is_taken(spot.position)]
         at = np.array([spot.position for spot in open_]).reshape(-1, 2)
-        free = yield from has_room.steps(solids, at, radius, self.person.room.floor)
+        named = None if besides is None else besides.name
+        free = yield from has_room(self.person.room, at, radius, named)
         if spots and not open_:
             raise Taken()
         return [spot for spot, is_free in zip(open_, free, strict=True) if is_free]

@@ -50,12 +50,18 @@ class Crowd:
 
 @stepwise
 def plan_crowd(
-    room: Room, people: Sequence[Somebody], fps: float, *, fewer: bool = False
+    room: Room,
+    people: Sequence[Somebody],
+    fps: float,
+    *,
+    present: Sequence[Plan] = (),
+    fewer: bool = False,
 ) -> Generator[float, None, Crowd]:
     """Plan what everybody does. Those who begin at a place stand there until they do.
 
-    ``fewer``: who finds no place is left out. Raises InputError, which names the person, where a
-    task cannot be done, or there is no place for somebody.
+    ``present``: plans of others that stay as they are. ``fewer``: who finds no place is left out.
+    Raises InputError, which names the person, where a task cannot be done, or there is no place for
+    somebody.
     """
     order = sorted(
         range(len(people)), key=lambda k: (people[k].start is not None, people[k].begins, k)
@@ -63,7 +69,7 @@ def plan_crowd(
     first: dict[int, Plan] = {}
     out: dict[int, str] = {}
     for done, k in enumerate(order):
-        job = _first_place(room, people[k], fps, list(first.values()))
+        job = _first_place(room, people[k], fps, [*present, *first.values()])
         try:
             first[k] = yield from within(job, *_part(done, 0.0, 0.3, len(people)))
         except InputError as error:
@@ -71,7 +77,7 @@ def plan_crowd(
 
     plans: dict[int, Plan] = {}
     for done, k in enumerate([k for k in order if k in first]):
-        others = [plans.get(j, first[j]) for j in first if j != k]
+        others = [*present, *(plans.get(j, first[j]) for j in first if j != k)]
         job = _planned(room, people[k], fps, first[k], others)
         try:
             plans[k] = yield from within(job, *_part(done, 0.3, 0.7, len(people)))
@@ -169,7 +175,7 @@ def _start_of(
     taken = np.array([plan.path.position[0, :2] for plan in others]).reshape(-1, 2)
     away = np.linalg.norm(spots[:, None] - taken, axis=2).min(axis=1, initial=np.inf)
     spots = spots[away > _STEP - 0.01]
-    free = yield from has_room.steps(room.solids, spots, _SPACE, room.floor)
+    free = yield from has_room(room, spots, _SPACE)
     if not free.any():
         raise Occupied(
             f"There is no room to stand around the start ({_said(who.start)}); give another place, "

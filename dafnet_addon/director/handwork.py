@@ -24,7 +24,7 @@ from .places import (
 from .room import Piece
 from .seats import NoSeat, SeatPlace
 from .tasks import LookAt, Reach, WorkAt, WriteOn
-from .tops import Top, beside_top, surface_before, top_of
+from .tops import Top, beside_top, known_top, surface_before
 
 __all__ = ["look_at", "reach", "work_at", "write_on"]
 
@@ -51,7 +51,7 @@ def work_at(chooser: Chooser, task: WorkAt) -> Job[Done]:
     person, near = chooser.person, chooser.near(task.near)
 
     def work(piece: Piece) -> Job[Done]:
-        top = yield from within(top_of.steps(piece, person.room.floor), 0.0, 0.2)
+        top = yield from within(known_top(person.room, piece), 0.0, 0.2)
         surface = _in_reach(top, person.place, person.pelvis) if person.sits else None
         if surface is None:
             surface = yield from within(_come_to(chooser, piece, top, task, near), 0.2, 1.0)

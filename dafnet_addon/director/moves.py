@@ -8,7 +8,7 @@ from ..core.errors import InputError
 from ..core.root import forward_of
 from .beds import Bed, bed_of
 from .choosing import Chooser, Done, Job, Taken
-from .places import Place, beside, seats_on
+from .places import Place, beside, known_seats
 from .room import Piece
 from .seats import SeatPlace
 from .tasks import LieOn, SitOn, StandUp, Wait, WalkAlong, WalkTo
@@ -103,7 +103,7 @@ def take_seat(
 ) -> Job[Done]:
     """Sit down on a place of a piece that is free and ``fits``; see ``places.seats_on``."""
     person = chooser.person
-    seats = yield from seats_on.steps(piece, towards, person.room.floor, near, person.size)
+    seats = yield from known_seats(person.room, piece, towards, near, person.size)
     free = [seat for seat in seats if fits(seat) and not person.is_taken(seat.position)]
     for seat in free:
         if person.sits_at(seat.position):

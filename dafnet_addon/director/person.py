@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.errors import InputError
 from ..core.paths import Stop, facing, route
 from ..core.progress import within
 from ..core.root import RootPath, forward_of
@@ -25,7 +26,7 @@ from .plans import Hold
 from .room import Piece, Room
 from .seats import SeatPlace
 from .track import Track
-from .walks import NoWay, ways
+from .walks import NoWay, unit_doubt, way_round
 
 __all__ = ["SPEED", "Person", "Way"]
 
@@ -189,10 +190,16 @@ class Person:
         self, start: np.ndarray, goal: np.ndarray, standing: Sequence[Box]
     ) -> Generator[float, None, list[tuple[float, float]]]:
         """Corners of the way from one point (2,) to another, round the furniture and others."""
-        solids = [*self.room.solids, *standing]
-        job = ways.steps(solids, [start, goal], floor=self.room.floor, size=self.size)
-        (corners,) = yield from job
-        return corners
+        stands = [*(yield from self.room.footprints()).values(), *map(_footprint, standing)]
+        points = np.concatenate([np.zeros((0, 2)), *stands])
+        over_floor = np.column_stack([points, np.ones(len(points))])
+        try:
+            return (yield from way_round.steps(over_floor, start, goal, self.size))
+        except NoWay as error:
+            doubt = unit_doubt(self.room.solids, [start, goal], self.room.floor, self.size)
+            if doubt:
+                raise InputError(doubt) from error
+            raise
 
     def way_along(self, line: np.ndarray, speed: float) -> Generator[float, None, Way]:
         """The way to a line (N, 2) and along it."""
@@ -347,6 +354,12 @@ class Person:
             "Somebody else stays in the way, or comes there later; begin at another time, or go "
             "elsewhere."
         )
+
+
+def _footprint(box: Box) -> np.ndarray:
+    """Points (N, 2) all over an upright box, seen from above."""
+    axes = [np.arange(-half, half + 0.04, 0.04) for half in box.half_size[:2]]
+    return np.asarray(box.center[:2] + np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2))
 
 
 def _before(stop: Stop) -> np.ndarray:

@@ -5,7 +5,7 @@ Canonical metres, world. Several places are given in no order; whoever asks choo
 """
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,10 +14,8 @@ from ..core.progress import stepwise, within
 from ..core.root import forward_of
 from ..core.rotations import normalised
 from ..core.skeleton import OFFSETS, SEAT_TO_PELVIS, STANDING_PELVIS, joint
-from ..core.solids import Box, Mesh
-from .room import Piece, top_view
+from .room import HEAD_HIGH, KNEE_LOW, Piece, Room, top_view
 from .seats import SeatPlace, seat_of
-from .surfaces import parts_of_surfaces
 
 __all__ = [
     "REACH",
@@ -25,14 +23,13 @@ __all__ = [
     "Surface",
     "beside",
     "has_room",
+    "known_seats",
     "seated_pelvis",
     "seats_on",
     "shoulder",
     "standing_pelvis",
 ]
 
-_STEPPED_OVER = 0.07  # metres over the floor
-_HEAD_HIGH = 1.85  # metres over the floor
 _ELBOW_ROOM = 0.6  # metres between people on one seat or at one top
 _SPACING = 0.05  # metres between points of what stands in the way
 _ARM = float(np.linalg.norm(OFFSETS[[joint("left_elbow"), joint("left_wrist")]], axis=1).sum())
@@ -79,25 +76,46 @@ def _shoulder_over_pelvis() -> np.ndarray:
 _SHOULDER = _shoulder_over_pelvis()
 
 
-@stepwise
 def has_room(
-    solids: Sequence[Box | Mesh], spots: np.ndarray, radius: float, floor: float
+    room: Room, spots: np.ndarray, radius: float, besides: str | None = None
 ) -> Generator[float, None, np.ndarray]:
-    """Whether (N,) a body that stands at ``spots`` (N, 2) keeps ``radius`` metres from all
-    solids.
+    """Whether (N,) a body that stands at ``spots`` (N, 2) keeps ``radius`` metres from all pieces,
+    but for the one that is named (``besides``). A job.
     """
-    if not len(spots):
-        return np.zeros(0, bool)
-    reach = spots.min(axis=0) - radius, spots.max(axis=0) + radius
-    parts = yield from within(parts_of_surfaces.steps(solids, _SPACING, reach), 0.0, 0.5)
     free = np.ones(len(spots), bool)
-    for k, part in enumerate(parts):
-        over = part[:, 2] - floor
-        points = part[(over > _STEPPED_OVER) & (over < _HEAD_HIGH), :2]
-        for i in np.flatnonzero(free):
-            free[i] = not (((points - spots[i]) ** 2).sum(axis=1) < radius**2).any()
-        yield 0.5 + 0.5 * k / len(parts)
+    if not len(spots):
+        return free
+    low, high = spots.min(axis=0) - radius, spots.max(axis=0) + radius
+    for name, points in (yield from room.footprints()).items():
+        if name == besides or not len(points):
+            continue
+        near = points[((points > low) & (points < high)).all(axis=1)]
+        x, y = near.T.copy()
+        for i in np.flatnonzero(free) if len(near) else ():
+            gap = (x - spots[i, 0]) ** 2 + (y - spots[i, 1]) ** 2
+            free[i] = not (gap < radius**2).any()
+        yield 0.9
     return free
+
+
+def known_seats(
+    room: Room, piece: Piece, towards: np.ndarray, near: np.ndarray | None, size: float
+) -> Generator[float, None, list[SeatPlace]]:
+    """``seats_on`` a piece of a room; looked for once on all of one shape that have a back, which
+    tells the facing. A job.
+    """
+    shape, place = piece.shape()
+    key = ("seats", shape)
+    if near is not None or key not in room.known.shapes:
+        found = yield from seats_on.steps(piece, towards, room.floor, near, size)
+        if near is None and all(seat.back for seat in found):
+            room.known.shapes[key] = [_moved(seat, -place) for seat in found]
+        return found
+    return [_moved(seat, place) for seat in room.known.shapes[key]]
+
+
+def _moved(seat: SeatPlace, by: np.ndarray) -> SeatPlace:
+    return replace(seat, position=seat.position + by)
 
 
 @stepwise
@@ -138,7 +156,7 @@ def beside(
     """
     if isinstance(thing, Piece):
         field, _ = yield from top_view.steps(
-            thing.solids, _SPACING, floor + _STEPPED_OVER, floor + _HEAD_HIGH
+            thing.solids, _SPACING, floor + KNEE_LOW, floor + HEAD_HIGH
         )
         points = field.middles(np.argwhere(np.isfinite(field.top)))
         points = points if len(points) else thing.box().mean(axis=0)[None, :2]

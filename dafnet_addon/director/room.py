@@ -1,22 +1,28 @@
 """What the director knows of a scene: furniture by name, and where other things are."""
 
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 
 from ..core.distance import scaled
 from ..core.errors import InputError
 from ..core.nearby import bounds
-from ..core.progress import stepwise
+from ..core.progress import stepwise, within
 from ..core.solids import Box, Mesh, Scene
 from ..core.text import nearest_known, printable
 from .seats import rectangle_axes
 from .surfaces import HeightField, height_field, parts_of_surfaces
 
-__all__ = ["Piece", "Room", "axes_from_above", "top_view"]
+__all__ = ["HEAD_HIGH", "KNEE_LOW", "Piece", "Room", "axes_from_above", "top_view"]
 
+KNEE_LOW = 0.07
+"""Metres over the floor; what lies lower is stepped over."""
+HEAD_HIGH = 1.85
+"""Metres over the floor; what hangs higher is not met."""
+_FINE = 0.04  # metres between points on furniture, however small who walks round it
 _MAX_CELLS = 1_000_000  # cells of a field; what is larger is looked at more coarsely
 
 
@@ -26,6 +32,25 @@ class Piece:
 
     name: str
     solids: tuple[Box | Mesh, ...]
+
+    def shape(self) -> tuple[Hashable, np.ndarray]:
+        """What pieces of one shape have in common, wherever on the floor they stand, and where (2,)
+        this one does.
+        """
+        found, place = [], None
+        for solid in self.solids:
+            if isinstance(solid, Box):
+                made, frames = tuple(np.ravel(solid.half_size)), solid.matrices()
+            else:
+                # the points themselves are kept by whoever keeps this
+                made, frames = (id(solid.vertices), len(solid.triangles)), solid.matrix
+            if np.ndim(frames) == 3:
+                return object(), np.zeros(2)
+            place = frames[:2, 3] if place is None else place
+            moved = np.array(frames, float)
+            moved[:2, 3] -= place
+            found.append((made, np.round(moved, 5).tobytes()))
+        return tuple(found), np.zeros(2) if place is None else np.array(place, float)
 
     def box(self) -> np.ndarray:
         """The lowest and the highest corner (2, 3) of the upright box around it at first."""
@@ -37,6 +62,37 @@ class Piece:
         if not corners:
             return np.zeros((2, 3))
         return np.stack([np.min(corners, axis=0)[0], np.max(corners, axis=0)[1]])
+
+
+@dataclass
+class Known:
+    """What has been found out about a room, for whoever asks next: the room in other ``sizes``, its
+    ``pieces``, their ``surfaces`` and ``footprints``, and what was found on ``shapes`` of
+    furniture. A room that is ``factor`` times another one knows which (``of``).
+    """
+
+    of: "Room | None" = None
+    factor: float = 1.0
+    sizes: "dict[float, Room]" = field(default_factory=dict)
+    pieces: "dict[str, Piece] | None" = None
+    surfaces: dict[str, np.ndarray] | None = None
+    footprints: dict[str, np.ndarray] | None = None
+    shapes: dict[Hashable, Any] = field(default_factory=dict)
+
+
+def _thinned(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Points (N, k) float32, of those closer together than a centimetre only one."""
+    if not parts:
+        return np.zeros((0, 3), np.float32)
+    points = np.concatenate(parts)
+    if not len(points):
+        return points.astype(np.float32)
+    cells = np.rint((points - points.min(axis=0)) * 100.0).astype(np.int64)
+    key = cells[:, 0]
+    for column in cells.T[1:]:
+        key = key * (int(column.max()) + 1) + column
+    _, first = np.unique(key, return_index=True)
+    return points[first].astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -55,9 +111,17 @@ class Room:
     points: Mapping[str, Sequence[float] | np.ndarray] = field(default_factory=dict)
     lines: Mapping[str, np.ndarray] = field(default_factory=dict)
     floor: float = 0.0
+    known: "Known" = field(default_factory=lambda: Known(), repr=False, compare=False)
 
     def resized(self, factor: float) -> "Room":
-        """The room ``factor`` times as large, about the world's origin."""
+        """The room ``factor`` times as large, about the world's origin; the same one for whoever
+        asks again.
+        """
+        if factor not in self.known.sizes:
+            self.known.sizes[factor] = self._resized(factor)
+        return self.known.sizes[factor]
+
+    def _resized(self, factor: float) -> "Room":
         return Room(
             solids=scaled(Scene(tuple(self.solids)), factor).solids,
             parts=self.parts,
@@ -65,14 +129,48 @@ class Room:
             points={name: factor * np.asarray(at, float) for name, at in self.points.items()},
             lines={name: factor * np.asarray(line, float) for name, line in self.lines.items()},
             floor=factor * self.floor,
+            known=Known(of=self, factor=factor),
         )
+
+    def surfaces(self) -> Generator[float, None, dict[str, np.ndarray]]:
+        """Points (N, 3) all over each piece, by name; a job."""
+        if self.known.surfaces is None and self.known.of is not None:
+            found = yield from self.known.of.surfaces()
+            self.known.surfaces = {
+                name: (self.known.factor * points).astype(np.float32)
+                for name, points in found.items()
+            }
+        elif self.known.surfaces is None:
+            pieces, surfaces = self.pieces(), {}
+            for k, (name, piece) in enumerate(pieces.items()):
+                job = parts_of_surfaces.steps(piece.solids, _FINE)
+                found_parts = yield from within(job, k / len(pieces), (k + 1) / len(pieces))
+                surfaces[name] = _thinned(found_parts)
+            self.known.surfaces = surfaces
+        return self.known.surfaces
+
+    def footprints(self) -> Generator[float, None, dict[str, np.ndarray]]:
+        """Where (N, 2) each piece stands in the way of a body, from knee-low to head-high, by name;
+        canonical metres. A job.
+        """
+        if self.known.footprints is None:
+            footprints = {}
+            for name, points in (yield from self.surfaces()).items():
+                over = points[:, 2] - self.floor
+                stands = points[(over > KNEE_LOW) & (over < HEAD_HIGH), :2]
+                footprints[name] = _thinned([stands]).astype(float)
+                yield 1.0
+            self.known.footprints = footprints
+        return self.known.footprints
 
     def pieces(self) -> dict[str, Piece]:
         """All furniture by its name."""
-        found: dict[str, list[Box | Mesh]] = {}
-        for solid in self.solids:
-            found.setdefault(self.parts.get(solid.name, solid.name), []).append(solid)
-        return {name: Piece(name, tuple(solids)) for name, solids in found.items()}
+        if self.known.pieces is None:
+            found: dict[str, list[Box | Mesh]] = {}
+            for solid in self.solids:
+                found.setdefault(self.parts.get(solid.name, solid.name), []).append(solid)
+            self.known.pieces = {name: Piece(name, tuple(each)) for name, each in found.items()}
+        return self.known.pieces
 
     def named(self, pattern: str) -> list[Piece]:
         """The pieces that a name, pattern or group means; raises InputError where none is meant."""

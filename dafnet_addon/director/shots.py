@@ -306,8 +306,8 @@ def drawn(shot: Shot) -> tuple[Somebody, ...]:
                 Somebody(
                     name=names[g] if group.count == 1 else f"{names[g]} {k + 1}",
                     seed=int(rng.integers(MAX_SEED)),
-                    # to the centimetre, so that what is computed for a size serves several
-                    height=round(height, 2),
+                    # in steps of 2.5 cm, so that what is found out for a size serves several
+                    height=round(round(height * 40.0) / 40.0, 3),
                     begins=round(begins, 3),
                     start=group.start,
                     heading=group.heading,

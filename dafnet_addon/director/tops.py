@@ -13,11 +13,11 @@ from ..core.paths import facing
 from ..core.progress import stepwise
 from ..core.root import forward_of
 from .places import Place, Surface
-from .room import Piece, top_view
+from .room import Piece, Room, top_view
 from .seats import rectangle_axes
 from .surfaces import height_field
 
-__all__ = ["Top", "beside_top", "surface_before", "top_of"]
+__all__ = ["Top", "beside_top", "known_top", "surface_before", "top_of"]
 
 _CELL = 0.03  # metres
 _ELBOW_ROOM = 0.6  # metres between people at one top
@@ -67,6 +67,17 @@ def top_of(piece: Piece, floor: float) -> Generator[float, None, Top]:
             "choose a desk, a table or a counter."
         )
     return Top(level, best)
+
+
+def known_top(room: Room, piece: Piece) -> Generator[float, None, Top]:
+    """``top_of`` a piece of a room, looked for once on all of one shape. A job."""
+    shape, place = piece.shape()
+    key = ("top", shape)
+    if key not in room.known.shapes:
+        found = yield from top_of.steps(piece, room.floor)
+        room.known.shapes[key] = Top(found.height, found.cells - place)
+    top = room.known.shapes[key]
+    return Top(top.height, top.cells + place)
 
 
 def surface_before(top: Top, place: Place) -> Surface | None:

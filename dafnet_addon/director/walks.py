@@ -13,6 +13,7 @@ from ..core.root import forward_of
 from ..core.series import MODEL_FPS
 from ..core.solids import Box, Mesh
 from ..core.text import metres
+from .room import HEAD_HIGH, KNEE_LOW
 from .surfaces import HeightField, boxes_of, height_field, parts_of_surfaces
 
 __all__ = ["NoWay", "around", "unit_doubt", "walk_to", "way_round", "ways"]
@@ -21,10 +22,6 @@ _CELL = 0.08
 """Metres; of the cells that ways are searched over."""
 _RADIUS = 0.30
 """Metres that the body's middle keeps from furniture."""
-_KNEE_LOW = 0.07
-"""Metres over the floor; what lies lower is stepped over."""
-_HEAD_HIGH = 1.85
-"""Metres over the floor; what hangs higher is not met."""
 _AROUND = 2.0
 """Metres of floor beyond start and goal in which ways are looked for."""
 _FARTHEST = 100.0
@@ -224,7 +221,7 @@ def _way(
     field = height_field(np.zeros((0, 3)), *around(both), _CELL)
     for k, part in enumerate(parts):
         over = part - np.array([0.0, 0.0, floor])
-        field.add(over[(over[:, 2] > _KNEE_LOW) & (over[:, 2] < _HEAD_HIGH)])
+        field.add(over[(over[:, 2] > KNEE_LOW) & (over[:, 2] < HEAD_HIGH)])
         yield 0.2 * k / len(parts)
 
     blocked = yield from within(_blocked(field, _RADIUS), 0.2, 0.2)
@@ -322,7 +319,7 @@ def unit_doubt(
     extent = float((boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)).max())
     longest = (boxes[:, 1] - boxes[:, 0]).max(axis=1)
     rises = boxes[:, 1, 2] - floor
-    stands = (boxes[:, 0, 2] < floor + _HEAD_HIGH) & (rises > np.maximum(_KNEE_LOW, _LOW * longest))
+    stands = (boxes[:, 0, 2] < floor + HEAD_HIGH) & (rises > np.maximum(KNEE_LOW, _LOW * longest))
     low, high = np.min(places, axis=0) - _BESIDE, np.max(places, axis=0) + _BESIDE
     near = stands & ((boxes[:, 1, :2] >= low) & (boxes[:, 0, :2] <= high)).all(axis=1)
     judged = rises[near if near.any() else stands]

@@ -8,7 +8,7 @@ rigs do.
 import bpy
 import numpy as np
 
-__all__ = ["FACING", "add_body"]
+__all__ = ["FACING", "add_body", "body_material"]
 
 FACING = np.diag([-1.0, -1.0, 1.0])
 """Rotation from the canonical frame to the armature's space, half a circle about z; its own
@@ -363,7 +363,7 @@ def add_body(
     mesh = bpy.data.meshes.new(f"{armature.name} Body")
     mesh.from_pydata((scale * np.concatenate(vertices) @ FACING).tolist(), [], faces)
     for name, colour in _MATERIALS:
-        mesh.materials.append(_material(name, colour))
+        mesh.materials.append(body_material(name, colour))
 
     mesh.polygons.foreach_set("material_index", materials)
     mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), bool))
@@ -380,7 +380,7 @@ def add_body(
     return body
 
 
-def _material(name: str, colour: tuple[float, float, float, float]) -> bpy.types.Material:
+def body_material(name: str, colour: tuple[float, float, float, float]) -> bpy.types.Material:
     found = bpy.data.materials.get((name, None))
     if found is None:
         found = bpy.data.materials.new(name)

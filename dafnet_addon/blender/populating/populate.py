@@ -18,19 +18,23 @@ from ...core.files import require_replaceable, whole_folder
 from ...core.generate import Asked, Draw, crowd_steps
 from ...core.manifest import MANIFEST, Manifest, content_hash, words_hash
 from ...core.progress import run_to_end
+from ...core.root import root_from_matrices
 from ...core.skeleton import STATURE
 from ...core.solids import Scene
 from ...core.tables import read_tables
-from ...core.take import Take
-from ...director.crowds import Planned, over_shot, plan_crowd
+from ...core.take import Controls, Take
+from ...director.crowds import Crowd, over_shot, plan_crowd
 from ...director.plans import Plan
+from ...director.room import Room
 from ...director.shots import Shot, drawn, shot_of
 from ...director.tasks import said
-from ..character.armature import metres_per_unit
-from ..character.takes import add_take, play_take
-from ..pipeline.baker import bake
+from ...director.track import Targets
+from ..character.settings import settings_of
+from ..delivery.deliver import deliver
+from ..delivery.people import Played
 from ..pipeline.batch import save_scene
-from .cast import hire
+from ..scene.scene_reader import read_scene
+from .cast import Player, dismiss, hire, play
 from .openings import open_room
 from .surroundings import room_of
 
@@ -45,26 +49,25 @@ SCENE = "scene.blend"
 """The scene's name in the folder."""
 
 _TAIL = 0.5  # seconds after the last task, where the length of the shot is not given
-_FIRST_FRAME = 1
 
 # Progress when each stage is done.
 _OPENED = 0.05
 _PLANNED = 0.35
 _GENERATED = 0.75
 _BAKED = 0.9
+_SAVED = 0.92
 
 
 @dataclass(frozen=True)
-class _Player:
-    """Somebody of the shot with his ``armature``, his ``plan`` over the whole of it, his ``takes``
-    and their ``actions``.
+class _Part:
+    """What somebody does in all frames of the shot: his ``plan``, None where he is led by his own
+    root, and what he is generated from.
     """
 
-    planned: Planned
-    armature: bpy.types.Object
-    plan: Plan
-    takes: Sequence[Take]
-    actions: Sequence[bpy.types.Action]
+    player: Player
+    plan: Plan | None
+    controls: Controls
+    draws: tuple[Draw, ...]
 
 
 def populate(
@@ -86,22 +89,20 @@ def populate(
     weights = weights or load_weights()
 
     clock = _Clock()
-    files, warnings = open_room(shot)
+    opened, warnings = open_room(shot)
+    context = bpy.context
+    scene = context.scene
+    room = room_of(context)
+    people = drawn(shot)
+    files = [*opened, *{shot.path(who.cast) for who in people if who.cast is not None}]
+    inputs = {str(file.absolute()): content_hash(file) for file in files}
+    players = [hire(context, shot, who) for who in people]
     clock.done("opening")
     progress(_OPENED)
 
-    context = bpy.context
-    scene = context.scene
-    fps = scene.render.fps / scene.render.fps_base
-    room = room_of(context)
-    clock.done("reading")
-
-    crowd = run_to_end(
-        plan_crowd.steps(room, drawn(shot), fps, fewer=shot.fewer),
-        lambda share: progress(_OPENED + share * (_PLANNED - _OPENED)),
+    parts, left_out = _planned(
+        context, shot, room, players, lambda share: progress(_between(_OPENED, _PLANNED, share))
     )
-    frames = _length(shot, crowd.people, fps)
-    plans = [over_shot(each.plan, frames) for each in crowd.people]
     clock.done("planning")
 
     solids, said_of_them = prepared(Scene(tuple(room.solids)), room.floor)
@@ -109,48 +110,62 @@ def populate(
     takes = run_to_end(
         crowd_steps(
             solids,
-            [
-                Asked(plan.controls(), _draws(each, shot))
-                for each, plan in zip(crowd.people, plans, strict=True)
-            ],
+            [Asked(part.controls, part.draws) for part in parts],
             weights,
             clean_up=CLEAN_UP,
         ),
-        lambda share: progress(_PLANNED + share * (_GENERATED - _PLANNED)),
+        lambda share: progress(_between(_PLANNED, _GENERATED, share)),
     )
     clock.done("generating")
 
-    scene.frame_start, scene.frame_end = _FIRST_FRAME, _FIRST_FRAME + frames - 1
-    players = []
-    for each, plan, made in zip(crowd.people, plans, takes, strict=True):
-        players.append(_baked(context, each, plan, made, _draws(each, shot)))
-        share = len(players) / len(plans)
-        progress(_GENERATED + share * (_BAKED - _GENERATED))
-    scene.frame_set(_FIRST_FRAME)
+    scene.frame_end = scene.frame_start + len(parts[0].controls) - 1
+    played = []
+    for part, made in zip(parts, takes, strict=True):
+        armature, actions = play(
+            context,
+            part.player,
+            takes=made,
+            draws=part.draws,
+            controls=part.controls,
+            first=scene.frame_start,
+        )
+        played.append(Played(armature, made, actions, part.plan))
+        progress(_between(_GENERATED, _BAKED, len(played) / len(parts)))
+    scene.frame_set(scene.frame_start)
     clock.done("baking")
 
-    told = [*warnings, *said_of_them, *crowd.left_out, *_warnings(players)]
+    told = [*warnings, *said_of_them, *left_out, *_warnings(parts, takes)]
     with whole_folder(output, MANIFEST) as folder:
-        save_scene(folder / SCENE, lambda: progress(1.0))
+        save_scene(folder / SCENE, lambda: progress(_SAVED))
         clock.done("saving")
+        if shot.wishes.anything:
+            job = deliver.steps(scene, played, folder, shot.wishes)
+            told += run_to_end(job, lambda share: progress(_between(_SAVED, 1.0, share)))
+            clock.done("delivering")
+
         manifest = Manifest(
             words=words_hash(shot.words),
             seed=shot.seed,
             takes=shot.takes,
-            inputs={str(file.absolute()): content_hash(file) for file in files},
+            inputs=inputs,
             weights=content_hash(Path(weights.path)),
             seconds=clock.seconds,
-            metrics=_means(take for each in players for take in each.takes),
+            metrics=_means(takes),
             warnings=told,
-            people=[_said_of(each, fps) for each in players],
+            people=[_said_of(part, each, scene) for part, each in zip(parts, played, strict=True)],
             content={
-                f"{each.planned.who.name}, take {k}": _content(take)
-                for each in players
-                for k, take in enumerate(each.takes, 1)
+                f"{part.player.who.name}, take {k}": _content(take)
+                for part, made in zip(parts, takes, strict=True)
+                for k, take in enumerate(made, 1)
             },
         )
         manifest.save(folder)
+    progress(1.0)
     return manifest
+
+
+def _between(low: float, high: float, share: float) -> float:
+    return low + share * (high - low)
 
 
 class _Clock:
@@ -173,52 +188,82 @@ def _shot(spec: Path | str | Mapping[str, Any], changes: Mapping[str, Any]) -> S
     return shot_of({**read_tables(file, "shots"), **changes}, file.parent)
 
 
-def _length(shot: Shot, people: Sequence[Planned], fps: float) -> int:
+def _planned(
+    context: bpy.types.Context,
+    shot: Shot,
+    room: Room,
+    players: Sequence[Player],
+    progress: Callable[[float], None],
+) -> tuple[list[_Part], tuple[str, ...]]:
+    """What everybody does, those who are led by their own roots first; and a sentence for each who
+    is left out.
+    """
+    scene = context.scene
+    fps = scene.render.fps / scene.render.fps_base
+    own = range(scene.frame_start, scene.frame_end + 1)
+    led = {player.who.name: player for player in players if not player.who.tasks}
+    present = [_walked(_own_controls(context, each, own)) for each in led.values()]
+
+    crowd = Crowd(())
+    if len(led) < len(players):
+        asked = [player.who for player in players if player.who.tasks]
+        job = plan_crowd.steps(room, asked, fps, present=present, fewer=shot.fewer)
+        crowd = run_to_end(job, progress)
+
+    plans = {each.who.name: each.plan for each in crowd.people}
+    frames = _length(shot, [*plans.values(), *present], fps)
+    shown = range(scene.frame_start, scene.frame_start + frames)
+    parts = []
+    for player in players:
+        draws = tuple(Draw(seed, temperature=shot.temperature) for seed in player.who.take_seeds)
+        if player.who.name in led:
+            parts.append(_Part(player, None, _own_controls(context, player, shown), draws))
+        elif player.who.name in plans:
+            plan = over_shot(plans[player.who.name], frames)
+            parts.append(_Part(player, plan, plan.controls(), draws))
+        else:
+            dismiss(player)
+    return parts, crowd.left_out
+
+
+def _own_controls(context: bpy.types.Context, player: Player, frames: range) -> Controls:
+    """What a character's own root and targets ask."""
+    settings = settings_of(
+        player.armature, context.scene, frame_start=frames[0], frame_end=frames[-1]
+    )
+    return read_scene(context, settings).controls
+
+
+def _walked(controls: Controls) -> Plan:
+    """The plan of somebody who goes where his root goes."""
+    path, _ = root_from_matrices(np.asarray(controls.root, float))
+    return Plan(
+        fps=controls.fps,
+        path=path,
+        targets=Targets({}, None, {}, ("FREE",) * len(path)),
+        timeline=(),
+        scale=controls.scale,
+    )
+
+
+def _length(shot: Shot, plans: Sequence[Plan], fps: float) -> int:
     """Frames of the shot."""
     if shot.seconds is not None:
         return max(1, round(shot.seconds * fps))
-    last = max(round(each.plan.begins * fps) + len(each.plan) for each in people)
+    last = max(round(plan.begins * fps) + len(plan) for plan in plans)
     return last + round(_TAIL * fps)
 
 
-def _draws(planned: Planned, shot: Shot) -> tuple[Draw, ...]:
-    return tuple(Draw(seed, temperature=shot.temperature) for seed in planned.who.take_seeds)
-
-
-def _baked(
-    context: bpy.types.Context,
-    planned: Planned,
-    plan: Plan,
-    takes: Sequence[Take],
-    draws: Sequence[Draw],
-) -> _Player:
-    armature = hire(context, planned.who)
-    unit = metres_per_unit(context.scene)
-    actions = []
-    for k, (take, draw) in enumerate(zip(takes, draws, strict=True), 1):
-        action = bake(take, armature, _FIRST_FRAME, f"{armature.name} take {k}", unit)
-        add_take(
-            armature,
-            action,
-            take=take,
-            controls=plan.controls(),
-            draw=draw,
-            frame_start=_FIRST_FRAME,
-        )
-        actions.append(action)
-    play_take(armature, actions[0])
-    return _Player(planned, armature, plan, takes, actions)
-
-
-def _warnings(players: Sequence[_Player]) -> list[str]:
+def _warnings(parts: Sequence[_Part], takes: Sequence[Sequence[Take]]) -> list[str]:
     """Of plans and takes, each sentence once, with who it is about; but that one who sits does not
     move is as it should be.
     """
     found: dict[str, list[str]] = {}
-    for each in players:
-        for sentence in (*each.planned.plan.warnings, *each.takes[0].warnings):
-            if sentence != STAYS:
-                found.setdefault(sentence, []).append(each.planned.who.name)
+    for part, made in zip(parts, takes, strict=True):
+        planned = part.plan.warnings if part.plan is not None else ()
+        for sentence in (*planned, *made[0].warnings):
+            if part.plan is None or sentence != STAYS:
+                found.setdefault(sentence, []).append(part.player.who.name)
     return [f"{names[0]}{_more(names)}: {sentence}" for sentence, names in found.items()]
 
 
@@ -226,22 +271,23 @@ def _more(names: Sequence[str]) -> str:
     return f" and {len(names) - 1} more" if len(names) > 1 else ""
 
 
-def _said_of(player: _Player, fps: float) -> dict[str, Any]:
+def _said_of(part: _Part, played: Played, scene: bpy.types.Scene) -> dict[str, Any]:
     """Who did what when, in plain data; seconds of the shot."""
-    who = player.planned.who
+    who, fps = part.player.who, scene.render.fps / scene.render.fps_base
     return {
         "name": who.name,
-        "armature": player.armature.name,
-        "height": round(player.plan.scale * STATURE, 3),
+        "armature": played.armature.name,
+        "cast": who.cast,
+        "height": round(part.controls.scale * STATURE, 3),
         "begins": who.begins,
-        "actions": [action.name for action in player.actions],
+        "actions": [action.name for action in played.actions],
         "seeds": list(who.take_seeds),
         "metrics": [
             {
                 name: None if value is None else round(value, 5)
                 for name, value in take.metrics.items()
             }
-            for take in player.takes
+            for take in played.takes
         ],
         "tasks": [
             {
@@ -252,15 +298,15 @@ def _said_of(player: _Player, fps: float) -> dict[str, Any]:
                 "furniture": entry.furniture,
                 "seat": entry.seat,
             }
-            for entry in player.plan.timeline
+            for entry in (part.plan.timeline if part.plan is not None else ())
         ],
     }
 
 
-def _means(takes: Any) -> dict[str, float]:
+def _means(takes: Sequence[Sequence[Take]]) -> dict[str, float]:
     """Of each metric that was measured."""
     values: dict[str, list[float]] = {}
-    for take in takes:
+    for take in (take for made in takes for take in made):
         for name, value in take.metrics.items():
             if value is not None and np.isfinite(value):
                 values.setdefault(name, []).append(float(value))

@@ -91,26 +91,35 @@ def _line(curve: bpy.types.Object, unit: float) -> np.ndarray | None:
 
 _LEVEL = 0.02
 """Metres of height that count as one level."""
+_COVERS = 0.3
+"""Share of the room's extent that a floor covers, at least."""
+_SMALLEST = 4.0
+"""Square metres of a floor; tables are smaller."""
 
 
 def _floor(solids: tuple[Mesh, ...]) -> float:
-    """The height of the floor: the lowest level at which surfaces that look up are at least half as
-    large as at any other; 0 where there are none.
+    """The height of the floor: the lowest level at which surfaces that look up cover much of the
+    room, and at least half as much as at any other; where there is none, what the furniture stands
+    on.
     """
-    levels, areas = [np.zeros(0, int)], [np.zeros(0)]
+    levels, areas, points = [np.zeros(0, int)], [np.zeros(0)], [np.zeros((0, 3))]
     for solid in solids:
         matrix = np.asarray(solid.matrix, float).reshape(-1, 4, 4)[0]
         world = np.asarray(solid.vertices) @ matrix[:3, :3].T + matrix[:3, 3]
         corners = world[np.asarray(solid.triangles)]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        area = np.linalg.norm(normal, axis=1)
-        up = normal[:, 2] > 0.99 * area
+        area = np.linalg.norm(normal, axis=1) / 2.0
+        up = normal[:, 2] > 0.99 * 2.0 * area
         levels.append(np.rint(corners[up, :, 2].mean(axis=1) / _LEVEL).astype(int))
         areas.append(area[up])
+        points.append(np.stack([world.min(axis=0), world.max(axis=0)]))
 
-    level = np.concatenate(levels)
-    if not len(level):
+    extents = np.concatenate(points)
+    if not len(extents):
         return 0.0
-    known, which = np.unique(level, return_inverse=True)
-    total = np.bincount(which.reshape(-1), np.concatenate(areas))
-    return float(known[total >= 0.5 * total.max()][0]) * _LEVEL
+    known, which = np.unique(np.concatenate(levels), return_inverse=True)
+    total = np.bincount(which.reshape(-1), np.concatenate(areas), len(known))
+    across = float(np.prod(np.ptp(extents[:, :2], axis=0)))
+    least = max(_SMALLEST, _COVERS * across, 0.5 * float(total.max(initial=0.0)))
+    floors = known[total >= least]
+    return float(floors[0]) * _LEVEL if len(floors) else float(extents[:, 2].min())
