@@ -83,7 +83,8 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
         several = len(failed) > 1
         raise InputError(
             f"{len(failed)} of {len(shots)} shots could not be made, {'first ' * several}"
-            f"'{first.name}': {first.sentence} Run again to try {'them' if several else 'it'} again."
+            f"'{first.name}': {first.sentence} "
+            f"Run again to try {'them' if several else 'it'} again."
         )
     return told, "\n".join(lines)
 

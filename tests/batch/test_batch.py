@@ -41,6 +41,7 @@ def states(of: Batch, workers: int = 2, **given: Any) -> str:
     return " ".join(each.state for each in made(of, workers, **given).values())
 
 
+@pytest.mark.slow
 def test_a_list_is_made_and_made_again_only_where_it_changed(tmp_path: Path) -> None:
     room = tmp_path / "hall.blend"
     room.write_bytes(b"a hall")
@@ -67,6 +68,7 @@ def test_a_list_is_made_and_made_again_only_where_it_changed(tmp_path: Path) -> 
     assert states(batch(tmp_path, more)) == "unchanged made unchanged"
 
 
+@pytest.mark.slow
 def test_neither_order_nor_workers_change_a_result(tmp_path: Path) -> None:
     shots = [shot(f"s{k}", count=2) for k in range(3)]
     first = batch(tmp_path, "".join(shots))
@@ -78,6 +80,7 @@ def test_neither_order_nor_workers_change_a_result(tmp_path: Path) -> None:
     assert len({json.dumps(content) for content in before.values()}) == 6
 
 
+@pytest.mark.slow
 def test_several_are_made_at_once(tmp_path: Path) -> None:
     text = "".join(shot(f"s{k}", seconds=1.0) for k in range(4))
     started = time.monotonic()
@@ -131,6 +134,7 @@ def test_a_process_that_ends_without_a_word(tmp_path: Path) -> None:
     assert "'/no/program' cannot be used" in made(missing)["a"].sentence
 
 
+@pytest.mark.slow
 def test_a_full_disk(tmp_path: Path) -> None:
     """Files of over 1 MB fail, in the processes that are started here, as on a disk that is full;
     a signal would say so otherwise.
@@ -182,6 +186,7 @@ posix = pytest.mark.skipif(not Path("/proc/self").exists(), reason="looks proces
 
 
 @posix
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_what_is_stopped_goes_on_and_leaves_no_process(tmp_path: Path, number: int) -> None:
     text = shot("quick") + shot("slow", seconds=1.5, count=3)
@@ -197,6 +202,7 @@ def test_what_is_stopped_goes_on_and_leaves_no_process(tmp_path: Path, number: i
 
 
 @posix
+@pytest.mark.slow
 def test_two_runs_share_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Who finds a shot in the making leaves it alone, and waits for no longer than it takes to be
     sure.
@@ -212,6 +218,7 @@ def test_two_runs_share_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 @posix
+@pytest.mark.slow
 def test_a_process_that_is_killed_is_told_and_tried_again(tmp_path: Path) -> None:
     of = batch(tmp_path, shot("slow", seconds=2.0) + shot("b"))
 

@@ -26,6 +26,8 @@ from kit.batches import HEAD, alive, contents, shot, wait_until
 from kit.places import ROOT
 from kit.populating import PROGRAM
 
+pytestmark = pytest.mark.slow
+
 _DASK = (sys.executable, "-m", "distributed.cli.dask_scheduler")
 _WORKER = (sys.executable, "-m", "distributed.cli.dask_worker")
 
@@ -44,7 +46,11 @@ def started(*command: str, path: Path = ROOT) -> Iterator["subprocess.Popen[byte
         yield process
     finally:
         process.terminate()
-        process.wait()
+        try:
+            process.wait(3.0)
+        except subprocess.TimeoutExpired:  # a worker looks for its scheduler for half a minute
+            process.kill()
+            process.wait()
 
 
 @pytest.fixture

@@ -71,6 +71,7 @@ def test_the_template_is_one() -> None:
 
 @needs_openjd
 @posix
+@pytest.mark.slow
 def test_the_template_makes_shots_and_a_report(tmp_path: Path, dafnet: Path) -> None:
     output = tmp_path / "out"
     given = [f"List={jobs(tmp_path)}", f"Output={output}", "Shots=2", f"Dafnet={dafnet}"]
@@ -117,6 +118,7 @@ def test_the_job_type_makes_tasks_and_then_a_report() -> None:
 
 @needs_node
 @posix
+@pytest.mark.slow
 def test_what_the_job_type_makes_can_be_run(tmp_path: Path, dafnet: Path) -> None:
     output = tmp_path / "out"
     found = compiled(
