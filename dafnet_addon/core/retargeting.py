@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .body import SAME_SIZE, Body, size_ratio
+from .body import SAME_SIZE, Body, canonical_body, size_ratio
 from .kinematics import two_bone
 from .reaching import REACH, SHRUG, Pose, bring_head, lean, limited, shrug
-from .rotations import normalised, rotate, rotation_between
-from .series import smoothstep
+from .rotations import normalised, rotate, rotation_between, transpose
+from .series import MODEL_FPS, smoothstep
 from .skeleton import (
     ANKLES,
     COLLARS,
@@ -35,6 +35,7 @@ from .skeleton import (
     SPINE,
     WRISTS,
 )
+from .touching import in_lap
 
 __all__ = ["Motion", "RetargetedMotion", "retarget"]
 
@@ -103,7 +104,8 @@ def retarget(
     ``held`` (T, 4; see ``touching.touches``; None: all the time), at the price of its limbs'
     directions where the proportions differ; but arms keep their directions on a body of another
     size and build, whose hands would miss what they touch anyway (``_arms_land``). Without it all
-    limbs keep their directions, and head and shoulders lie as the source's do from the hips.
+    limbs keep their directions, and head and shoulders lie as the source's do from the hips. Hands
+    that lie on thighs lie there on every body.
 
     Where the sizes differ (``size_ratio``), the source's joints are scaled about the root, except
     that steps keep their length, since the root's path keeps its own and feet would slide
@@ -138,12 +140,11 @@ def retarget(
         bring_head(pose, targets[:, HEAD], fixed=(spine[-1],))
         pose.place(*COLLARS, *SHOULDERS)
 
+    bends = {leg: _place_limb(pose, leg, source, targets, shares[leg]) for leg in _LEGS}
+    _lay_in_lap(pose, source, source_body, targets, shares)
     for arm in _ARMS:
-        _place_shoulder(
-            pose, arm, source, targets, landing=landing, arms_land=arms_land, share=shares[arm]
-        )
-
-    bends = [_place_limb(pose, limb, source, targets, share) for limb, share in shares.items()]
+        _place_shoulder(pose, arm, source, targets, landing=landing, share=shares[arm])
+        bends[arm] = _place_limb(pose, arm, source, targets, shares[arm])
 
     pose.place(*FEET)
     for j in range(1, len(JOINTS)):
@@ -154,7 +155,7 @@ def retarget(
         motion=Motion(pose.joints, pose.frames),
         turns=pose.frames @ body.alignment,
         targets=targets,
-        bends=np.stack(bends, axis=1),
+        bends=np.stack([bends[limb] for limb in LIMBS], axis=1),
         ratio=size_ratio(source_body, body),
     )
 
@@ -262,7 +263,6 @@ def _place_shoulder(
     targets: np.ndarray,
     *,
     landing: bool,
-    arms_land: bool,
     share: np.ndarray,
 ) -> None:
     """Turn an arm's collar, where there is one, and put its shoulder; towards what its hand holds
@@ -275,9 +275,9 @@ def _place_shoulder(
         for j in (elbow, wrist)
     )
 
-    if pose.body.present[collar] and arms_land:
+    if pose.body.present[collar] and landing:
         shrug(pose, arm, targets[:, wrist], np.linalg.norm(meant, axis=-1, keepdims=True), share)
-    elif pose.body.present[collar] and not landing:
+    elif pose.body.present[collar]:
         # The shoulder to its place, then a little to where the wrist would come to its own.
         for place, limit in (
             (targets[:, shoulder], SHRUG),
@@ -289,6 +289,34 @@ def _place_shoulder(
             pose.place(shoulder)
 
     pose.place(shoulder)
+
+
+def _lay_in_lap(
+    pose: Pose,
+    source: Motion,
+    source_body: Body,
+    targets: np.ndarray,
+    shares: dict[str, np.ndarray],
+) -> None:
+    """Bring the wrists' ``targets``, and the ``shares`` of the arms, to where the source's hands
+    lie on its thighs, on the body's own.
+    """
+    size = source_body.leg() / canonical_body(1.0).leg()
+    lap = in_lap(source.joints / size, MODEL_FPS)
+    ratio = pose.body.leg() / source_body.leg()
+    for a, arm in enumerate(_ARMS):
+        wrist = LIMBS[arm][2]
+        for b, leg in enumerate(_LEGS):
+            share = lap[:, a, b] * (lap[:, a, b] >= lap[:, a].max(axis=-1))
+            hip, knee, _ = LIMBS[leg]
+            thigh = source.joints[:, knee] - source.joints[:, hip]
+            off = source.joints[:, wrist] - source.joints[:, hip]
+            along = np.clip((off * thigh).sum(-1) / (thigh**2).sum(-1), 0.0, 1.0)[:, None]
+            aside = rotate(transpose(source.frames[:, hip]), off - along * thigh)
+            place = (1.0 - along) * pose.joints[:, hip] + along * pose.joints[:, knee]
+            place = place + ratio * rotate(pose.frames[:, hip], aside)
+            targets[:, wrist] += share[:, None] * (place - targets[:, wrist])
+            shares[arm] = np.maximum(shares[arm], share)
 
 
 def _place_limb(

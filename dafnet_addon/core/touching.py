@@ -12,7 +12,7 @@ from .rotations import normalised
 from .series import smoothstep
 from .skeleton import ELBOWS, FEET, HEAD, HIPS, KNEES, LIMBS, TARGETS, TOE_HEIGHT, WRISTS
 
-__all__ = ["touches"]
+__all__ = ["in_lap", "touches"]
 
 _PALM = 0.08  # metres from the wrist on
 _NEAR, _FAR = 0.03, 0.12  # metres from what a palm touches, and where it is free
@@ -37,11 +37,10 @@ def touches(
     targets.
     """
     shares = np.zeros((len(joints), len(LIMBS)))
-    wrists = joints[:, WRISTS]
-    palms = wrists + _PALM * normalised(wrists - joints[:, ELBOWS])
+    palms = _palms(joints)
     gaps = [_to_own_body(joints, palms)]
     if distance is not None:
-        gaps.append(np.minimum(distance(palms), distance(wrists)))
+        gaps.append(np.minimum(distance(palms), distance(joints[:, WRISTS])))
     shares[:, :2] = smoothstep((_FAR - np.min(gaps, axis=0)) / (_FAR - _NEAR))
 
     height = joints[:, FEET, 2] - np.reshape(floor, (-1, 1)) - TOE_HEIGHT
@@ -53,15 +52,40 @@ def touches(
             asked = np.isfinite(targets[name]).all(axis=-1)
             shares[asked, ends.index(joint)] = 1.0
 
+    return _eased(shares, fps)
+
+
+def in_lap(joints: np.ndarray, fps: float) -> np.ndarray:
+    """How far (T, 2, 2) each hand lies on the left and the right thigh, from 0, free, to 1; joints
+    as for ``touches``.
+    """
+    gaps = np.stack(_to_thighs(joints, _palms(joints)), axis=-1)
+    return _eased(smoothstep((_FAR - gaps) / (_FAR - _NEAR)), fps)
+
+
+def _palms(joints: np.ndarray) -> np.ndarray:
+    """Places (T, 2, 3)."""
+    wrists = joints[:, WRISTS]
+    return wrists + _PALM * normalised(wrists - joints[:, ELBOWS])
+
+
+def _eased(shares: np.ndarray, fps: float) -> np.ndarray:
+    """Shares (T, …) that begin and end softly."""
     return np.maximum(shares, np.clip(gaussian(shares, _EASE * fps), 0.0, 1.0))
 
 
 def _to_own_body(joints: np.ndarray, palms: np.ndarray) -> np.ndarray:
     """Metres (T, 2) from the palms to the body's own thighs, head, and the other palm."""
-    gaps = [
-        np.linalg.norm(palms - joints[:, [HEAD]], axis=-1) - _SKULL,
-        np.repeat(np.linalg.norm(np.diff(palms, axis=1), axis=-1), 2, axis=1) - _OTHER,
-    ]
+    to_head = np.linalg.norm(palms - joints[:, [HEAD]], axis=-1) - _SKULL
+    apart = np.repeat(np.linalg.norm(np.diff(palms, axis=1), axis=-1), 2, axis=1) - _OTHER
+    return np.min([to_head, apart, *_to_thighs(joints, palms)], axis=0)
+
+
+def _to_thighs(joints: np.ndarray, palms: np.ndarray) -> list[np.ndarray]:
+    """Metres (T, 2) from the palms to the left and to the right thigh; inf to one that is
+    upright.
+    """
+    gaps = []
     for hip, knee in zip(HIPS, KNEES, strict=True):
         thigh = joints[:, [knee]] - joints[:, [hip]]
         length = np.linalg.norm(thigh, axis=-1)
@@ -70,4 +94,4 @@ def _to_own_body(joints: np.ndarray, palms: np.ndarray) -> np.ndarray:
         upright = -thigh[..., 2] > _UPRIGHT * length
         gap = np.linalg.norm(palms - nearest, axis=-1) - _THIGH
         gaps.append(np.where(upright, np.inf, gap))
-    return np.min(gaps, axis=0)
+    return gaps

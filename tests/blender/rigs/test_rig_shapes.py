@@ -15,6 +15,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.core import (
     kinematics,
     rotations,
     skeleton,
+    touching,
 )
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import JOINTS
@@ -219,11 +220,16 @@ def test_full_mode_reads_real_imports_as_they_are_seen(stage: RigStage, name: st
     end = int(rig.animation_data.action.frame_range[1])
     world, frames = World(stage, rig), range(2, end, max(1, end // 40))
     source, read = world.played(frames), world.read(frames)
-    for part, off in seen_off(read, source).items():
-        most = (
-            0.1 if part in ("upper arms", "forearms", "elbows", "thighs", "shins", "knees") else 6.0
-        )
-        assert off.max() < most, f"{part} {off.mean():.1f} ({off.max():.1f})"
+    # Hands that lie on thighs lie on the character's own, at the price of some degrees.
+    lie = touching.in_lap(read, 30.0).max(axis=(1, 2)) > 0.01
+    for frames, arms in ((lie, 25.0), (~lie, 0.1)):
+        for part, off in seen_off(read[frames], source[frames]).items():
+            on_arms, on_legs = (
+                part in ("upper arms", "forearms", "elbows"),
+                part in ("thighs", "shins", "knees"),
+            )
+            most = arms if on_arms else 0.1 if on_legs else 6.0
+            assert off.max(initial=0.0) < most, f"{part} {off.mean():.1f} ({off.max():.1f})"
     way = [joints[:, 15] - joints[:, [1, 2]].mean(axis=1) for joints in (read, source)]
     size = np.linalg.norm(way[0], axis=1).max() / np.linalg.norm(way[1], axis=1).max()
     assert np.linalg.norm(way[0] - size * way[1], axis=1).max() < 4.0 * CENTIMETRE, (
@@ -270,8 +276,8 @@ def test_real_characters_keep_the_motions_shape(stage: RigStage, name: str, what
         if (holds := held[:, side] > 0.99).any() and name in ("mixamo_gltf_woman", "vrm_b"):
             assert (
                 np.linalg.norm(played[holds, arm[2]] - source[holds, arm[2]], axis=-1).mean()
-                < 2 * CENTIMETRE
-            ), "a hand that holds on to something"
+                < 2.5 * CENTIMETRE
+            ), "a hand that holds on to something, or lies in its own lap"
 
     for leg in ((1, 4, 7), (2, 5, 8)):
         assert limb_off(played, source, leg).mean() < LEGS[name]
