@@ -16,6 +16,7 @@ __all__ = ["in_lap", "touches"]
 
 _PALM = 0.08  # metres from the wrist on
 _NEAR, _FAR = 0.03, 0.12  # metres from what a palm touches, and where it is free
+_OFF_LAP = 0.08  # metres from a thigh, where a palm does not lie on it
 _THIGH, _SKULL, _OTHER = 0.075, 0.11, 0.04  # metres of flesh around thighs, head and the other palm
 _UPRIGHT = 0.8  # of a thigh: nothing lies in the lap of one who stands
 _LOW, _HIGH = 0.10, 0.25  # metres of a toe over the floor: it may touch, and it is free
@@ -60,7 +61,7 @@ def in_lap(joints: np.ndarray, fps: float) -> np.ndarray:
     as for ``touches``.
     """
     gaps = np.stack(_to_thighs(joints, _palms(joints)), axis=-1)
-    return _eased(smoothstep((_FAR - gaps) / (_FAR - _NEAR)), fps)
+    return _eased(smoothstep((_OFF_LAP - gaps) / (_OFF_LAP - _NEAR)), fps)
 
 
 def _palms(joints: np.ndarray) -> np.ndarray:

@@ -222,7 +222,7 @@ def test_full_mode_reads_real_imports_as_they_are_seen(stage: RigStage, name: st
     source, read = world.played(frames), world.read(frames)
     # Hands that lie on thighs lie on the character's own, at the price of some degrees.
     lie = touching.in_lap(read, 30.0).max(axis=(1, 2)) > 0.01
-    for frames, arms in ((lie, 25.0), (~lie, 0.1)):
+    for frames, arms in ((lie, 40.0), (~lie, 0.1)):
         for part, off in seen_off(read[frames], source[frames]).items():
             on_arms, on_legs = (
                 part in ("upper arms", "forearms", "elbows"),
@@ -230,6 +230,7 @@ def test_full_mode_reads_real_imports_as_they_are_seen(stage: RigStage, name: st
             )
             most = arms if on_arms else 0.1 if on_legs else 6.0
             assert off.max(initial=0.0) < most, f"{part} {off.mean():.1f} ({off.max():.1f})"
+            assert not len(off) or off.mean() < 10.0
     way = [joints[:, 15] - joints[:, [1, 2]].mean(axis=1) for joints in (read, source)]
     size = np.linalg.norm(way[0], axis=1).max() / np.linalg.norm(way[1], axis=1).max()
     assert np.linalg.norm(way[0] - size * way[1], axis=1).max() < 4.0 * CENTIMETRE, (
