@@ -221,8 +221,15 @@ def test_full_mode_reads_real_imports_as_they_are_seen(stage: RigStage, name: st
     world, frames = World(stage, rig), range(2, end, max(1, end // 40))
     source, read = world.played(frames), world.read(frames)
     # Hands that lie on thighs lie on the character's own, at the price of some degrees.
-    lie = touching.in_lap(read, 30.0).max(axis=(1, 2)) > 0.01
-    for frames, arms in ((lie, 40.0), (~lie, 6.0 if lie.any() else 0.1)):
+    legs = [np.linalg.norm(each[0, 4] - each[0, 1]) for each in (source, read)]
+    lie = (
+        np.max(
+            [touching.in_lap(each, 30.0) for each in (read, source * legs[1] / legs[0])],
+            axis=(0, 2, 3),
+        )
+        > 0.0
+    )
+    for frames, arms in ((lie, 40.0), (~lie, 0.1)):
         for part, off in seen_off(read[frames], source[frames]).items():
             on_arms, on_legs = (
                 part in ("upper arms", "forearms", "elbows"),
