@@ -32,6 +32,7 @@ from .skeleton import (
     LIMBS,
     OFFSETS,
     PARENTS,
+    PELVIS,
     TARGETS,
     TOE_HEIGHT,
     joint,
@@ -58,7 +59,9 @@ _LOW = 0.035  # metres over a planted toe base
 _SLOW = 0.45  # metres a second that a foot slides and is still meant to stand
 _PLANTS = 4  # frames of the shortest stand
 _MENDS = 3  # frames of the longest gap in one
-_SLIPS = 0.12  # metres from its place at which a foot is let go
+_SLIPS = 0.12  # metres from its place at which a foot is let go, while the pelvis moves
+_CREEPS = 0.30  # metres at which it is let go though the pelvis rests
+_RESTS = 0.1  # metres a second of a pelvis that rests
 _FADE = 1 / 3  # seconds in which what is added dies away
 _SMOOTHING = 2.5  # frames; deviation of the Gaussian at full strength
 _SKIN = 0.03  # metres between a wrist or ankle and the surface that it must not sink into
@@ -156,16 +159,20 @@ def standing_still(
     3).
 
     A foot stands while its toe base is low over the ``floor``, a height or one for each frame, and
-    not fast; it is let go, and stands anew, where it has slipped too far for that.
+    not fast; it is let go, and stands anew, where it has slipped too far for that. What creeps
+    under a body that rests stands.
     """
+
+    def speed_of(places: np.ndarray) -> np.ndarray:
+        if len(places) < 2:
+            return np.zeros(len(places))
+        return np.linalg.norm(np.gradient(places, axis=0), axis=-1) * fps
+
     stands = []
+    moves = speed_of(joints[:, PELVIS, :2]) > _RESTS
     for foot, toe in enumerate(FEET):
         place = joints[:, toe]
-        speed = (
-            np.linalg.norm(np.gradient(place, axis=0), axis=-1) * fps
-            if len(joints) > 1
-            else np.zeros(len(joints))
-        )
+        speed = speed_of(place)
         on = (place[:, 2] - floor < TOE_HEIGHT + _LOW) & (speed < _SLOW)
         for start, end in runs(~on):
             if start > 0 and end < len(on) and end - start <= _MENDS:
@@ -176,7 +183,8 @@ def standing_still(
 
         for start, end in runs(on):
             while end - start >= _PLANTS:
-                away = np.linalg.norm(place[start:end, :2] - place[start, :2], axis=-1) > _SLIPS
+                slipped = np.linalg.norm(place[start:end, :2] - place[start, :2], axis=-1)
+                away = slipped > np.where(moves[start:end], _SLIPS, _CREEPS)
                 stop = start + int(np.argmax(away)) if away.any() else end
                 if stop - start >= _PLANTS:
                     stands.append((foot, int(start), int(stop)))

@@ -82,6 +82,18 @@ def test_feet_that_stand_stay_and_those_in_the_air_do_not():
     assert np.abs(_lengths(out) - BONES).max() < 1e-3
 
 
+def test_a_foot_that_creeps_under_a_body_that_rests_stays_and_under_one_that_leaves_goes_along():
+    """Twenty centimetres in a second: no stand is given up for it, unless the pelvis goes too."""
+    joints = np.repeat(REST[None], 30, axis=0)
+    creeps = np.linspace(0.0, 0.2, 30)[:, None, None] * (0.0, 1.0, 0.0)
+    joints[..., 2] -= 0.25
+    joints[:, [joint("left_ankle"), joint("left_foot")], 2] += 0.25
+    joints[:, [joint("left_ankle"), joint("left_foot")]] += creeps
+    out = on_bones(joints)
+    assert np.ptp(planted(out)[:, TOES[0], 1]) < 0.005
+    assert np.ptp(planted(out + creeps)[:, TOES[0], 1]) > 0.1
+
+
 def test_the_pelvis_comes_down_where_legs_are_too_short():
     joints = np.repeat(REST[None], 40, axis=0)
     # Straight legs, and a foot that is led 12 cm out while the other stands: only a lower pelvis
