@@ -1,7 +1,7 @@
 """Shots are made on this machine, several at once."""
 
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
 
@@ -22,22 +22,19 @@ def local_workers(count: int) -> Iterator[Workers]:
     processes = Processes()
 
     def outcomes(orders: Iterable[Order]) -> Iterator[Outcome | None]:
-        results: SimpleQueue[Outcome] = SimpleQueue()
+        results: SimpleQueue[Future[Outcome]] = SimpleQueue()
         waiting = 0
         for order in orders:
+            pool.submit(make, order, processes).add_done_callback(results.put)
             waiting += 1
-            future = pool.submit(make, order, processes)
-            future.add_done_callback(
-                lambda done: None if done.cancelled() else results.put(done.result())
-            )
         while waiting:
             try:
-                outcome = results.get(timeout=TICK)
+                done = results.get(timeout=TICK)
             except Empty:
                 yield None
             else:
                 waiting -= 1
-                yield outcome
+                yield done.result()
 
     with ThreadPoolExecutor(count) as pool:
         try:

@@ -276,3 +276,12 @@ def test_an_order_can_be_made_alone(tmp_path: Path) -> None:
     ended = Processes()
     ended.end()
     assert "was stopped" in make(of.order(of.shots[0]), ended).sentence
+
+
+def test_a_fault_of_ours_ends_the_batch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> Outcome:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("dafnet_addon.batch.local.make", fails)
+    with pytest.raises(ZeroDivisionError):
+        made(batch(tmp_path, shot("a") + shot("b")))
