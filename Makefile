@@ -7,7 +7,7 @@ PYTHON ?= $(shell command -v python3.11 || echo python3)
 TORCH ?= torch==2.13.0
 PIP := bin/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test quick lint zip window setup system clean
+.PHONY: demo test quick lint zip release repository docs window setup system clean
 
 demo: setup
 	.venv/bin/python -m dafnet_addon demo -o out/demo
@@ -31,6 +31,20 @@ lint: .venv/.test
 zip: setup
 	scripts/build_zip.sh .venv/bin/python
 
+# build/release: the zip, its checksum, what it consists of, what has changed. VERSION=0.2.0 sets the version and cuts the changelog
+# first, WEBSITE=… writes the address into the manifest. The commit and the tag are left to you.
+release: setup
+	.venv/bin/python scripts/release.py $(VERSION) $(if $(WEBSITE),--website $(WEBSITE))
+
+# build/repository: a folder from which Blender installs and updates, over the web or by its file:// address.
+repository: zip
+	rm -rf build/repository
+	scripts/repository.sh .venv/bin/python build/repository build/dafnet-*.zip
+
+# build/site: docs as pages that need nothing from elsewhere; it fails at a dead link.
+docs: .venv-docs/.docs
+	.venv-docs/bin/mkdocs build --quiet
+
 # Real Blenders (4.3 and 5.2) in windows under a virtual screen, driven with mouse and keys; the pictures of docs/guide.md. As root.
 window: setup
 	scripts/debian_blender.sh trixie out/blender-4.3
@@ -47,7 +61,7 @@ system:
 	@touch $@
 
 .venv/.test: pyproject.toml .venv/.demo
-	.venv/$(PIP) '$(TORCH)' 'numpy>=1.26,<2' matplotlib pytest trimesh rtree scipy safetensors tensorboard ruff mypy hypothesis distributed openjd-cli
+	.venv/$(PIP) '$(TORCH)' 'numpy>=1.26,<2' matplotlib pytest trimesh rtree scipy safetensors tensorboard ruff mypy hypothesis distributed openjd-cli pyyaml
 	@touch $@
 
 # Both generations of NumPy are in use: 4.2 takes either.
@@ -58,5 +72,10 @@ system:
 	$(@D)/$(PIP) $(HOST) pytest trimesh rtree scipy hypothesis
 	@touch $@
 
+.venv-docs/.docs: | system
+	$(PYTHON) -m venv .venv-docs
+	.venv-docs/$(PIP) 'mkdocs-material==9.*' 'numpy>=1.26'
+	@touch $@
+
 clean:
-	rm -rf .venv .venv-4.2 .venv-5.0 build out
+	rm -rf .venv .venv-4.2 .venv-5.0 .venv-docs build out

@@ -31,11 +31,7 @@ def register() -> None:
         bpy.utils.register_class(cls)
 
     bpy.types.VIEW3D_MT_add.append(panels.add_menu)
-    _commands.append(
-        bpy.utils.register_cli_command(
-            "dafnet", lambda arguments: cli.main(arguments, in_blender=True)
-        )
-    )
+    _commands.append(bpy.utils.register_cli_command("dafnet", cli.run_in_blender))
 
 
 def unregister() -> None:

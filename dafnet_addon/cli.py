@@ -13,23 +13,22 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
-from contextlib import ExitStack
-from pathlib import Path
+from contextlib import ExitStack, redirect_stdout
 
 from .commands import COMMANDS, Command
 from .commands.console import (
     ProgressBar,
+    claim_stdout,
     complain,
     escape_unprintable,
     flush_streams,
     open_streams,
     say,
-    stdout_kept_clean,
 )
 from .core.errors import DafnetError, InputError
 from .core.stopping import Stop, end_with_stdin
 
-__all__ = ["main", "run"]
+__all__ = ["main", "run", "run_in_blender"]
 
 _PACKAGES = {"PIL": "pillow"}
 """The packages to install for modules that have other names than their package."""
@@ -52,12 +51,12 @@ def main(
         options = _parser(in_blender).parse_args(argv)
         command: Command = options.command
         needed = command.needs(options)
-        _require(command.folder, needed)
+        _require(needed)
 
         with ExitStack() as stack:
             # A command that runs Blender stops between two steps, any other wherever it is.
             stop_if_asked = stack.enter_context(Stop()).now if "bpy" in needed else _never_stop
-            with stdout_kept_clean(), ProgressBar(stop_if_asked) as progress:
+            with redirect_stdout(sys.stderr), ProgressBar(stop_if_asked) as progress:
                 found = command.run(options, progress)
             if found is not None:
                 say(json.dumps(found[0], indent=2) if options.json else found[1])
@@ -80,9 +79,18 @@ def main(
         return 128 + (stop.args[0] if stop.args else signal.SIGINT)
 
 
+def run_in_blender(arguments: Sequence[str]) -> int:
+    """``main`` as ``blender [file] --command dafnet``, after which Blender ends."""
+    claim_stdout()
+    code = main(arguments, in_blender=True)
+    flush_streams()
+    return code
+
+
 def run(loading: Stop | None = None) -> None:
     """``main`` as a process."""
     open_streams()
+    claim_stdout()
     code = main(loading=loading)
     flush_streams()
 
@@ -113,13 +121,8 @@ def _parser(in_blender: bool) -> argparse.ArgumentParser:
     return parser
 
 
-def _require(folder: str, modules: Sequence[str]) -> None:
-    """Raise InputError where this installation lacks a folder of the checkout, or a module."""
-    if not (Path(__file__).parents[1] / folder).is_dir():
-        raise InputError(
-            "This command is not part of the extension; run it from a checkout of the project."
-        )
-
+def _require(modules: Sequence[str]) -> None:
+    """Raise InputError where this Python lacks a module."""
     missing = [_PACKAGES.get(name, name) for name in modules if not _is_installed(name)]
     if missing:
         inside = ", or run it inside Blender" if missing == ["bpy"] else ""

@@ -7,6 +7,7 @@ from .add_example import DAFNET_OT_add_example
 from .add_root import DAFNET_OT_add_root
 from .add_targets import DAFNET_OT_add_foot_targets, DAFNET_OT_add_targets
 from .bake_to_rig import DAFNET_OT_bake_to_rig
+from .copy_report import DAFNET_OT_copy_report
 from .find_furniture import DAFNET_OT_find_furniture
 from .follow_path import (
     DAFNET_OT_root_from_object,
@@ -39,6 +40,7 @@ CLASSES = (
     DAFNET_OT_clean_again,
     DAFNET_OT_mark_frames,
     DAFNET_OT_add_preset,
+    DAFNET_OT_copy_report,
     DAFNET_OT_walk_along_curve,
     DAFNET_OT_walk_through_points,
     DAFNET_OT_root_from_object,

@@ -4,10 +4,8 @@ set -euo pipefail
 
 cd "$(dirname "$0")/.."
 python=${1:-.venv/bin/python}
-packages=$("$python" -c "import sysconfig; print(sysconfig.get_path('purelib'))")
-tool=$(echo "$packages"/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py)
 mkdir -p build
 rm -f build/dafnet-*.zip
-"$python" "$tool" build --source-dir . --output-dir build
-"$python" "$tool" validate build/dafnet-*.zip
+scripts/blender_ext.sh "$python" build --source-dir . --output-dir build
+scripts/blender_ext.sh "$python" validate build/dafnet-*.zip
 ls -lh build/dafnet-*.zip

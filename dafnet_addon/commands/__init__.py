@@ -1,39 +1,35 @@
 """The commands of ``dafnet``, a file each: its arguments, what it needs, and the function that
 runs.
+
+The extension's zip lacks those that train and measure; what is not there is not offered.
 """
 
-from . import (
-    bake,
-    batch,
-    bench,
-    carry,
-    cool,
-    demo,
-    evaluate,
-    figures,
-    info,
-    populate,
-    prepare,
-    train,
-    validate,
-)
+from importlib import import_module
+from importlib.util import find_spec
+
 from .command import Command
 
 __all__ = ["COMMANDS", "Command"]
 
-COMMANDS = (
-    demo.COMMAND,
-    bake.COMMAND,
-    populate.COMMAND,
-    batch.COMMAND,
-    info.COMMAND,
-    prepare.COMMAND,
-    train.COMMAND,
-    carry.COMMAND,
-    validate.COMMAND,
-    cool.COMMAND,
-    evaluate.COMMAND,
-    bench.COMMAND,
-    figures.COMMAND,
+_NAMES = (
+    "demo",
+    "bake",
+    "populate",
+    "batch",
+    "info",
+    "prepare",
+    "train",
+    "carry",
+    "validate",
+    "cool",
+    "evaluate",
+    "bench",
+    "figures",
+)
+
+COMMANDS: tuple[Command, ...] = tuple(
+    import_module(f".{name}", __name__).COMMAND
+    for name in _NAMES
+    if find_spec(f".{name}", __name__)
 )
 """In the order in which ``--help`` lists them."""

@@ -99,6 +99,11 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         help="whether what makes takes differ varies during a take, as in real motion, or is held",
     )
     add_weights(parser)
+    parser.add_argument(
+        "--device",
+        metavar="NAME",
+        help="run the network on PyTorch, where that is installed: 'cpu', 'cuda' or 'mps'",
+    )
 
 
 def _changes(options: argparse.Namespace) -> dict[str, Any]:
@@ -121,6 +126,7 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
         character=options.character,
         takes=options.takes,
         weights=load_weights(options.weights) if options.weights else None,
+        device=options.device,
         progress=progress,
         changes=_changes(options),
     )
@@ -164,5 +170,5 @@ COMMAND = Command(
     summary="generate the motion of a scene's character and save the scene with its keys",
     add_arguments=_add_arguments,
     run=_run,
-    needs=lambda _: ("bpy",),
+    needs=lambda options: ("bpy", "torch") if options.device else ("bpy",),
 )

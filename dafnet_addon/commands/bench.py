@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
+from ..core.errors import InputError
 from .command import Command, Progress, Result, add_weights
 
 __all__ = ["COMMAND", "benchmark"]
@@ -14,6 +15,7 @@ __all__ = ["COMMAND", "benchmark"]
 _MEASURES = {
     "life": "whether people sway as they walk, sit down as slowly as asked, and move as they rest",
     "rest": "clean up bodies that hover over seats or sink into them",
+    "sample": "on the held-out motion that comes with the project, beside that motion",
     "seats": "sit on ten heights from three sides",
     "speed": "time every system",
 }
@@ -52,8 +54,13 @@ _NEEDS = {
 
 
 def benchmark(name: str) -> ModuleType:
-    """A script in the folder of benchmarks, as a module that its processes can import as well."""
+    """A script in the folder of benchmarks, as a module that its processes can import as well.
+
+    Raises InputError where that folder does not lie beside the package.
+    """
     checkout = str(Path(__file__).absolute().parents[2])
+    if not Path(checkout, "benchmarks").is_dir():
+        raise InputError("The benchmarks are not installed; run this in a checkout of the project.")
     if checkout not in sys.path:
         sys.path.insert(0, checkout)
     return importlib.import_module(f"benchmarks.{name}")
@@ -102,5 +109,4 @@ COMMAND = Command(
     add_arguments=_add_arguments,
     run=_run,
     needs=lambda options: _NEEDS.get(options.name, ()),
-    folder="benchmarks",
 )

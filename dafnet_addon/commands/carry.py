@@ -49,5 +49,4 @@ COMMAND = Command(
     add_arguments=_add_arguments,
     run=_run,
     needs=lambda options: ("torch",) if any(options.folder.glob("*.checkpoint")) else (),
-    folder="dafnet_addon/training",
 )

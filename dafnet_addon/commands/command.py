@@ -35,8 +35,7 @@ class Command:
     """One word of ``dafnet``, what it takes and what it does.
 
     ``add_arguments`` declares what ``run`` reads from its options. ``needs``: the modules besides
-    NumPy that it imports, which may depend on the options. ``folder``: of the checkout, where the
-    command needs one that the extension's zip lacks.
+    NumPy that it imports, which may depend on the options.
     """
 
     name: str
@@ -44,7 +43,6 @@ class Command:
     add_arguments: Callable[[argparse.ArgumentParser], None]
     run: Callable[[argparse.Namespace, Progress], Result]
     needs: Callable[[argparse.Namespace], Sequence[str]] = lambda _options: ()
-    folder: str = ""
 
 
 def add_noise(parser: argparse.ArgumentParser, temperature: float | None) -> None:

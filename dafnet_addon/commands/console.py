@@ -2,12 +2,11 @@
 may be closed, full or no longer read.
 """
 
-import ctypes
 import io
 import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from time import monotonic
 from typing import TextIO
 
@@ -17,12 +16,12 @@ from ..core.text import duration
 __all__ = [
     "MAX_SHOWN",
     "ProgressBar",
+    "claim_stdout",
     "complain",
     "escape_unprintable",
     "flush_streams",
     "open_streams",
     "say",
-    "stdout_kept_clean",
 ]
 
 MAX_SHOWN = 2000
@@ -39,6 +38,19 @@ def open_streams() -> None:
         except OSError:
             # The system gives it the lowest free number, which is this one.
             setattr(sys, name, open(os.devnull, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115
+
+
+def claim_stdout() -> None:
+    """Keep standard output for what is said here, for the rest of the process.
+
+    What else is printed, as Blender's own messages are by its C, goes to standard error; so JSON
+    stays JSON. Only for a process that does nothing but run the command.
+    """
+    stream = sys.stdout
+    stream.flush()
+    ours = os.dup(stream.fileno())
+    os.dup2(sys.stderr.fileno(), stream.fileno())
+    sys.stdout = open(ours, "w", encoding=stream.encoding)  # noqa: SIM115 - until the process ends
 
 
 def flush_streams() -> None:
@@ -123,23 +135,6 @@ class ProgressBar:
     def __exit__(self, *_: object) -> None:
         if self.shown:
             complain("")
-
-
-@contextmanager
-def stdout_kept_clean() -> Iterator[None]:
-    """A block in which what Blender itself prints on standard output goes to standard error, so
-    that JSON stays JSON.
-    """
-    sys.stdout.flush()
-    kept = os.dup(1)
-    os.dup2(2, 1)
-    try:
-        with redirect_stdout(sys.stderr):  # what goes through Python; the rest is written by C
-            yield
-    finally:
-        ctypes.CDLL("ucrtbase" if os.name == "nt" else None).fflush(None)
-        os.dup2(kept, 1)
-        os.close(kept)
 
 
 def _discard(stream: TextIO) -> None:

@@ -155,5 +155,4 @@ COMMAND = Command(
     add_arguments=_add_arguments,
     run=_run,
     needs=_needs,
-    folder="dafnet_addon/training",
 )

@@ -53,5 +53,4 @@ COMMAND = Command(
     add_arguments=_add_arguments,
     run=_run,
     needs=lambda _: ("bpy", "PIL"),
-    folder="benchmarks",
 )

@@ -82,5 +82,4 @@ COMMAND = Command(
     add_arguments=_add_arguments,
     run=_run,
     needs=lambda _: ("torch",),
-    folder="dafnet_addon/training",
 )

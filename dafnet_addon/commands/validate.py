@@ -55,5 +55,4 @@ COMMAND = Command(
     add_arguments=_add_arguments,
     run=_run,
     needs=lambda _: ("torch", "matplotlib"),
-    folder="dafnet_addon/training",
 )

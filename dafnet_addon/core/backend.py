@@ -5,6 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from .errors import InputError
+from .text import printable
+
 __all__ = ["Array", "Backend"]
 
 Array = Any
@@ -16,6 +19,8 @@ class Backend:
 
     ``device`` is None for NumPy, else a torch device ('cpu', 'cuda', …). ``dtype``: 'float32' or
     'float64'. ``xp``: the library's module, whose functions of arrays have NumPy's names.
+
+    Raises InputError where torch, or the device, is missing.
     """
 
     def __init__(self, device: str | None = None, dtype: str = "float32") -> None:
@@ -23,9 +28,7 @@ class Backend:
         self.dtype = dtype
         self.xp: ModuleType = np
         if device is not None:
-            import torch
-
-            self.xp = torch
+            self.xp = _torch_on(device)
 
     def array(self, values: np.ndarray) -> Array:
         """The values as an array of this library."""
@@ -43,3 +46,23 @@ class Backend:
         """Along the last axis of (B, K)."""
         x = self.xp.exp(x - self.xp.amax(x, -1)[:, None])
         return x / x.sum(-1)[:, None]
+
+
+def _torch_on(device: str) -> ModuleType:
+    """The module torch, if it can use this device."""
+    try:
+        import torch
+
+        torch.zeros(1, device=device)
+    except ImportError:
+        raise InputError(
+            "PyTorch is not installed in this Python; leave the device out, and NumPy is used."
+        ) from None
+    except (RuntimeError, AssertionError) as error:  # torch asserts that it was built for a device
+        reason = printable(str(error).split("\n")[0].rstrip("."), 200)
+        raise InputError(
+            f"The device '{printable(device, 40)}' cannot be used ({reason}); name another, or "
+            "none for NumPy."
+        ) from None
+
+    return torch

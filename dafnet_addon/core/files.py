@@ -7,10 +7,10 @@ taken for its output; the next run that writes to that folder removes it.
 
 import errno
 import os
+import platform
 import re
 import secrets
 import shutil
-import socket
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -27,7 +27,7 @@ __all__ = [
     "whole_folder",
 ]
 
-_HOST = re.sub(r"[^0-9A-Za-z]", "", socket.gethostname())[:32]
+_HOST = re.sub(r"[^0-9A-Za-z]", "", platform.node())[:32]
 _PART = re.compile(r"\.dafnet-(?P<host>\w*)-(?P<process>\d+)-(?P<name>[0-9a-f]{16})\.part")
 """How the name of an unfinished file begins; Blender puts an @ behind it while it writes."""
 _IN_THE_WAY = (errno.ENOTEMPTY, errno.EEXIST, errno.EACCES, errno.ENOTDIR)
@@ -229,15 +229,17 @@ def remove_abandoned(folder: Path) -> None:
 
 def _runs(process: int) -> bool:
     """Whether there is a process of this number."""
-    if sys.platform == "win32":
-        import ctypes
+    if sys.platform == "win32":  # where os.kill would end it
+        import _winapi
 
-        handle = ctypes.windll.kernel32.OpenProcess(0x1000, False, process)  # to ask, not to touch
-        if handle:
-            ctypes.windll.kernel32.CloseHandle(handle)
-
-        # it is there, but not ours
-        return bool(handle) or ctypes.windll.kernel32.GetLastError() == 5
+        try:
+            handle = _winapi.OpenProcess(0x1000, False, process)  # to ask, not to touch
+        except OSError as error:
+            return error.winerror == 5  # it is there, but not ours
+        try:
+            return _winapi.GetExitCodeProcess(handle) == _winapi.STILL_ACTIVE
+        finally:
+            _winapi.CloseHandle(handle)
 
     try:
         os.kill(process, 0)

@@ -75,16 +75,16 @@ class Shot(Stage):
         assert self.state() == before
         return str(caught.value)
 
-    def command(self, capfd: pytest.CaptureFixture[str], *options: str) -> tuple[int, str, str]:
+    def command(self, capsys: pytest.CaptureFixture[str], *options: str) -> tuple[int, str, str]:
         """Save the scene and bake it with the command: exit code, standard output, last line of
         standard error.
         """
         file = self.folder / "scene.blend"
         bpy.ops.wm.save_as_mainfile(filepath=str(file))
-        capfd.readouterr()
+        capsys.readouterr()
         arguments = ["bake", str(file), "-o", str(self.folder / "out.blend"), "--json", *options]
         code = main(arguments)
-        out, err = capfd.readouterr()
+        out, err = capsys.readouterr()
         return code, out, err.strip().splitlines()[-1]
 
     def heads(self) -> np.ndarray:
@@ -200,29 +200,29 @@ ERRORS: dict[str, tuple[Change, str]] = {
 
 @pytest.mark.parametrize("case", ERRORS)
 def test_errors_are_the_same_sentence_at_both_doors(
-    shot: Shot, capfd: pytest.CaptureFixture[str], case: str
+    shot: Shot, capsys: pytest.CaptureFixture[str], case: str
 ) -> None:
     change, words = ERRORS[case]
     change(shot)
     said = shot.refused()
     assert re.search(words, said), said
-    code, out, err = shot.command(capfd)
+    code, out, err = shot.command(capsys)
     assert (code, out, err) == (1, "", f"dafnet: {said}")
     assert not (shot.folder / "out.blend").exists()
 
 
-def test_no_root(shot: Shot, capfd: pytest.CaptureFixture[str]) -> None:
+def test_no_root(shot: Shot, capsys: pytest.CaptureFixture[str]) -> None:
     """The button is grey, so its tooltip says it."""
     shot.own.root = None
     assert "Choose the character's root" in shot.refused_by_poll()
-    code, _, err = shot.command(capfd)
+    code, _, err = shot.command(capsys)
     assert code == 1 and "has no root; choose" in err
 
 
 @pytest.mark.parametrize("active", ["nothing", "the chair", "edit mode"])
 def test_where_the_button_is_grey_the_command_still_works(
     shot: Shot,
-    capfd: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str],
     active: str,
 ) -> None:
     objects = bpy.context.view_layer.objects
@@ -230,14 +230,14 @@ def test_where_the_button_is_grey_the_command_still_works(
     if active == "edit mode":
         bpy.ops.object.mode_set(mode="EDIT")
     assert "Select a character" in shot.refused_by_poll()
-    code, out, _ = shot.command(capfd)
+    code, out, _ = shot.command(capsys)
     assert code == 0 and json.loads(out)["warnings"] == []
 
 
 @pytest.mark.parametrize("override", [False, True])
 def test_linked_and_overridden_characters(
     shot: Shot,
-    capfd: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str],
     override: bool,
 ) -> None:
     library = str(shot.folder / "library.blend")
@@ -258,7 +258,7 @@ def test_linked_and_overridden_characters(
     bpy.context.view_layer.objects.active = shot.ann
     said = shot.refused()
     assert "is linked or a library override; make it local" in said
-    code, _, err = shot.command(capfd, "--character", shot.ann.name_full)
+    code, _, err = shot.command(capsys, "--character", shot.ann.name_full)
     assert (code, err) == (1, f"dafnet: {said}")
 
 
@@ -285,7 +285,7 @@ def _hostile(raw: bytes) -> bytes:
 )
 def test_weights_that_cannot_be_used(
     shot: Shot,
-    capfd: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str],
     spoilt: Callable[[bytes], bytes] | None,
     words: str,
 ) -> None:
@@ -299,7 +299,7 @@ def test_weights_that_cannot_be_used(
     finally:
         preferences.weights = ""
     assert words in said and "choose another file" in said
-    code, out, err = shot.command(capfd, "--weights", str(file))
+    code, out, err = shot.command(capsys, "--weights", str(file))
     assert (code, out, err) == (1, "", f"dafnet: {said}")
 
 
@@ -400,22 +400,22 @@ WARNINGS: dict[str, tuple[Change, str]] = {
 
 @pytest.mark.parametrize("case", WARNINGS)
 def test_warnings_are_the_same_at_both_doors(
-    shot: Shot, capfd: pytest.CaptureFixture[str], case: str
+    shot: Shot, capsys: pytest.CaptureFixture[str], case: str
 ) -> None:
     change, words = WARNINGS[case]
     change(shot)
-    capfd.readouterr()
+    capsys.readouterr()
     assert bpy.ops.dafnet.generate() == {"FINISHED"}
     reported = [
         line.removeprefix("Warning: ")
-        for line in capfd.readouterr().out.splitlines()
+        for line in capsys.readouterr().out.splitlines()
         if "Warning: " in line
     ]
     assert re.search(words, " ".join(reported)), reported
     assert shot.scene.frame_current == 5
     values = [point.co for curve in action_curves(shot.ann) for point in curve.keyframe_points]
     assert len(values) == (6 + 3 + 22 * 4) * shot.scene.frame_end and np.isfinite(values).all()
-    code, out, _ = shot.command(capfd)
+    code, out, _ = shot.command(capsys)
     assert code == 0 and json.loads(out)["warnings"] == reported
 
 
@@ -533,11 +533,11 @@ def test_whatever_becomes_a_mesh_is_read_and_moves(shot: Shot) -> None:
 )
 def test_an_output_that_cannot_be_written(
     shot: Shot,
-    capfd: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str],
     output: str,
     words: str,
 ) -> None:
     (shot.folder / "file").write_text("in the way", encoding="utf-8")
     (shot.folder / "folder.blend").mkdir()
-    code, out, err = shot.command(capfd, "-o", output.format(tmp=shot.folder))
+    code, out, err = shot.command(capsys, "-o", output.format(tmp=shot.folder))
     assert code == 1 and out == "" and words in err and err.startswith("dafnet: ")

@@ -43,16 +43,16 @@ def test_bake_saves_the_keys_that_the_operator_makes(
     blender: ModuleType,
     scene_file: Path,
     tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(scene_file))
     assert bpy.ops.dafnet.generate() == {"FINISHED"}
     by_operator = played()
 
     out = tmp_path / "made" / "out.blend"
-    capfd.readouterr()
+    capsys.readouterr()
     assert cli.main(["bake", str(scene_file), "-o", str(out), "--json"]) == 0
-    report = json.loads(capfd.readouterr().out)
+    report = json.loads(capsys.readouterr().out)
     assert {"reading", "conditions", "sampling", "baking"} <= set(report["seconds"])
     assert report["takes"][0]["frames"] == 20
 
@@ -67,10 +67,10 @@ def test_several_takes_are_kept_and_the_first_one_plays(
     blender: ModuleType,
     scene_file: Path,
     tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     out = tmp_path / "takes.blend"
-    capfd.readouterr()
+    capsys.readouterr()
     arguments = [
         "bake",
         str(scene_file),
@@ -85,7 +85,7 @@ def test_several_takes_are_kept_and_the_first_one_plays(
         "--json",
     ]
     assert cli.main(arguments) == 0
-    takes = json.loads(capfd.readouterr().out)["takes"]
+    takes = json.loads(capsys.readouterr().out)["takes"]
     made = [(take["seed"], take["temperature"], take["frames"]) for take in takes]
     assert made == [(5, 0.0, 7), (6, 1.0, 7), (7, 1.0, 7)]
     blender.ops.wm.open_mainfile(filepath=str(out))
@@ -130,15 +130,15 @@ def test_several_takes_are_kept_and_the_first_one_plays(
 def test_bake_says_what_is_wrong(
     scene_file: Path,
     tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str],
     arguments: list[str],
     said: str,
 ) -> None:
     out = tmp_path / "out.blend"
-    capfd.readouterr()
+    capsys.readouterr()
     filled = [argument.format(scene=scene_file, out=out) for argument in arguments]
     assert cli.main(["bake", *filled]) == 1
-    assert said in capfd.readouterr().err
+    assert said in capsys.readouterr().err
     assert not out.exists()
 
 

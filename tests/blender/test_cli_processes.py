@@ -182,7 +182,7 @@ def test_runs_that_write_to_one_file_leave_it_whole(
 
 
 def test_the_input_is_written_only_in_place(
-    scene: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     before = scene.read_bytes()
     link, hard = tmp_path / "link.blend", tmp_path / "hard.blend"
@@ -193,7 +193,7 @@ def test_the_input_is_written_only_in_place(
         assert (code, err.count("\n")) == (1, 1) and "is the scene's own file" in err
     assert scene.read_bytes() == before and main(["bake", str(scene)]) == 2
     assert main(["bake", str(scene), "--in-place", "-o", "x.blend"]) == 2
-    assert "one of the arguments -o/--output --in-place is required" in capfd.readouterr().err
+    assert "one of the arguments -o/--output --in-place is required" in capsys.readouterr().err
     code, said, err = ran("bake", link, "--in-place", "--json")
     assert code == 0 and json.loads(said)["output"] == str(link), err
     assert scene.read_bytes() != before and link.is_symlink() and hard.read_bytes() == before
@@ -351,29 +351,29 @@ def test_values_of_other_commands(
         assert f"argument {value.partition('=')[0]}: " in capsys.readouterr().err.splitlines()[-1]
 
 
-def _refused(capfd: pytest.CaptureFixture[str], *arguments: object) -> str:
+def _refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
     """The sentence with which ``bake`` refuses."""
-    capfd.readouterr()
+    capsys.readouterr()
     assert cli.main(["bake", *map(str, arguments)]) == 1
-    out, err = capfd.readouterr()
+    out, err = capsys.readouterr()
     assert out == ""
     return err.strip().splitlines()[-1]
 
 
-def _baked(capfd: pytest.CaptureFixture[str], *arguments: object) -> Any:
+def _baked(capsys: pytest.CaptureFixture[str], *arguments: object) -> Any:
     """The report of ``bake``."""
-    capfd.readouterr()
+    capsys.readouterr()
     code = cli.main(["bake", *map(str, arguments), "--json"])
-    out, err = capfd.readouterr()
+    out, err = capsys.readouterr()
     assert code == 0, err
     return json.loads(out)
 
 
 def test_a_failed_bake_makes_no_folder(
-    scene: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert "no armature" in _refused(
-        capfd, scene, "-o", tmp_path / "new" / "out.blend", "--character", "Nobody"
+        capsys, scene, "-o", tmp_path / "new" / "out.blend", "--character", "Nobody"
     )
     assert names(tmp_path) == ["scene.blend"]
 
@@ -382,43 +382,43 @@ def test_a_character_in_another_scene(
     blender: ModuleType,
     scene: Path,
     tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     blender.context.scene.name = "Walk"
     other = blender.data.scenes.new("Empty")
     blender.context.window.scene = other
     saved(blender, scene)
     out = tmp_path / "out.blend"
-    said = _refused(capfd, scene, "-o", out)
+    said = _refused(capsys, scene, "-o", out)
     assert said.endswith(
         "The scene 'Empty' has no character; the scene 'Walk' has '花子': give --scene 'Walk'."
     )
-    assert "give --scene 'Walk'" in _refused(capfd, scene, "-o", out, "--character", "花子")
+    assert "give --scene 'Walk'" in _refused(capsys, scene, "-o", out, "--character", "花子")
     assert "no scene 'Run'; choose one of 'Empty', 'Walk'" in _refused(
-        capfd, scene, "-o", out, "--scene", "Run"
+        capsys, scene, "-o", out, "--scene", "Run"
     )
-    there = _baked(capfd, scene, "-o", out, "--scene", "Walk")
+    there = _baked(capsys, scene, "-o", out, "--scene", "Walk")
     blender.ops.wm.open_mainfile(filepath=str(out))
     assert blender.context.scene.name == "Empty", "the active scene stays"
     blender.context.window.scene = blender.data.scenes["Walk"]
     saved(blender, scene)
-    here = _baked(capfd, scene, "-o", out)
+    here = _baked(capsys, scene, "-o", out)
     assert [take["metrics"] for take in here["takes"]] == [
         take["metrics"] for take in there["takes"]
     ]
 
 
 def test_files_that_are_no_scenes(
-    scene: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     broken = tmp_path / "broken.blend"
     for content in (b"", b"hello", scene.read_bytes()[: len(scene.read_bytes()) // 2]):
         broken.write_bytes(content)
         assert "cannot be opened by Blender" in _refused(
-            capfd, broken, "-o", tmp_path / "out.blend"
+            capsys, broken, "-o", tmp_path / "out.blend"
         )
     assert "There is no file" in _refused(
-        capfd, tmp_path / "none.blend", "-o", tmp_path / "out.blend"
+        capsys, tmp_path / "none.blend", "-o", tmp_path / "out.blend"
     )
     assert names(tmp_path) == ["broken.blend", "scene.blend"]
 
@@ -427,7 +427,7 @@ def test_a_file_of_a_newer_blender(
     blender: ModuleType,
     scene: Path,
     tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     newer = tmp_path / "newer.blend"
     blender.ops.wm.save_as_mainfile(filepath=str(newer), compress=False)
@@ -439,8 +439,8 @@ def test_a_file_of_a_newer_blender(
         else raw[:at] + b"09" + raw[at + 2 :]
     )
     out = tmp_path / "out.blend"
-    assert "which is newer than this one" in _refused(capfd, newer, "--in-place")
-    warnings = _baked(capfd, newer, "-o", out)["warnings"]
+    assert "which is newer than this one" in _refused(capsys, newer, "--in-place")
+    warnings = _baked(capsys, newer, "-o", out)["warnings"]
     assert any("which is newer than this one, so parts" in warning for warning in warnings)
 
 
@@ -448,7 +448,7 @@ def test_what_the_scene_links(
     blender: ModuleType,
     scene: Path,
     tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """A library is never the output; one that is missing is said; paths hold from the output's
     folder.
@@ -460,14 +460,14 @@ def test_what_the_scene_links(
     blender.context.scene.collection.objects.link(wanted.objects[0])
     wanted.objects[0].library.filepath = "//library.blend"
     saved(blender, scene)
-    assert "is a library of the scene" in _refused(capfd, scene, "-o", library)
+    assert "is a library of the scene" in _refused(capsys, scene, "-o", library)
     out = tmp_path / "deeper" / "out.blend"
-    assert not any("library" in warning for warning in _baked(capfd, scene, "-o", out)["warnings"])
+    assert not any("library" in warning for warning in _baked(capsys, scene, "-o", out)["warnings"])
     blender.ops.wm.open_mainfile(filepath=str(out))
     (found,) = blender.data.libraries
     assert found.filepath == "//../library.blend" and not found.is_missing
     library.unlink()
-    warnings = _baked(capfd, scene, "-o", out)["warnings"]
+    warnings = _baked(capsys, scene, "-o", out)["warnings"]
     assert any("The library '//library.blend' is missing" in warning for warning in warnings)
 
 
@@ -476,7 +476,7 @@ def test_scripts_of_a_file_run_only_where_blender_lets_them(
     blender: ModuleType,
     scene: Path,
     tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str],
     allowed: bool,
 ) -> None:
     made = tmp_path / "made_by_a_script"
@@ -488,7 +488,7 @@ def test_scripts_of_a_file_run_only_where_blender_lets_them(
     assert not preferences.use_scripts_auto_execute
     preferences.use_scripts_auto_execute = allowed
     try:
-        warnings = _baked(capfd, scene, "-o", tmp_path / "out.blend")["warnings"]
+        warnings = _baked(capsys, scene, "-o", tmp_path / "out.blend")["warnings"]
     finally:
         preferences.use_scripts_auto_execute = False
     assert made.exists() == allowed

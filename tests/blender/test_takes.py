@@ -11,7 +11,6 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import bpy
 import numpy as np
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender import preferences
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.properties import _is_take
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.takes import (
     PACKED,
@@ -259,21 +258,6 @@ def test_influence_and_blend_are_read_from_the_scene(shot: Shot) -> None:
     assert any(c.data_path == "dafnet.hand_left_influence" for c in _curves(shot).values()), (
         "keys come along to the new action"
     )
-
-
-def test_an_engine_that_is_not_there_is_said(shot: Shot, monkeypatch: pytest.MonkeyPatch) -> None:
-    own = bpy.context.preferences.addons["bl_ext.user_default.dafnet"].preferences
-    try:
-        own.engine = "mps"
-        with pytest.raises(RuntimeError, match="preferences"):
-            bpy.ops.dafnet.generate()
-        own.engine = "cpu"
-        monkeypatch.setattr(preferences.importlib.util, "find_spec", lambda name: None)
-        with pytest.raises(RuntimeError, match="PyTorch is not installed"):
-            bpy.ops.dafnet.generate()
-    finally:
-        own.engine = "NUMPY"
-    assert not shot.listed()
 
 
 def _curves(shot: Shot) -> dict:

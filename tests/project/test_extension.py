@@ -10,12 +10,14 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
 import pytest
 
+from dafnet_addon.core.weights import load_weights
 from kit.messages import without_blenders
 from kit.places import ROOT
 
@@ -32,7 +34,12 @@ SHIPPED = {
     "docs",
 }
 LEFT_OUT = {"model", "data", "training", "baselines"}
-PACKAGES = ("core", "director", "batch", "blender", "commands")
+PACKAGES = ("core", "director", "batch", "blender")
+OF_A_CHECKOUT = {
+    f"{name}.py"
+    for name in ("prepare", "train", "carry", "validate", "cool", "evaluate", "bench", "figures")
+}
+"""Commands that the zip does not have."""
 
 LIFE = """
 import os, sys, bpy, addon_utils
@@ -100,6 +107,8 @@ def test_the_zip_holds_what_an_animator_needs(zipped: Path) -> None:
             path for path in (ROOT / "dafnet_addon/blender" / folder).iterdir() if path.is_file()
         }
         assert files and {str(path.relative_to(ROOT)) for path in files} <= shipped
+    commands = {name.name for name in names if name.parent.name == "commands"}
+    assert commands == {file.name for file in modules("dafnet_addon/commands")} - OF_A_CHECKOUT
     for package in (*(f"dafnet_addon/{part}" for part in PACKAGES), "operators", "panels"):
         assert {str(path.relative_to(ROOT)) for path in (ROOT / package).rglob("*.py")} <= shipped
     assert any(name.parts[0] == "weights_stub" and name.suffix == ".safetensors" for name in names)
@@ -203,7 +212,7 @@ BLENDERS_OWN = {
 }
 """Words that Blender translates itself."""
 
-THE_SAME = {"DAFNet", "DAFNet Rig", "EE", "FREE", "FULL", "NumPy"}
+THE_SAME = {"DAFNet", "DAFNet Rig", "EE", "FREE", "FULL"}
 """Words that are the same in all languages."""
 
 UNSEEN = {
@@ -235,3 +244,76 @@ def interface_words(file: Path) -> Iterator[str]:
 def test_what_the_interface_says_is_translated() -> None:
     shown = {word for file in interface_files() for word in interface_words(file) if word}
     assert shown - {*translated(), *BLENDERS_OWN, *THE_SAME, *UNSEEN} == set()
+
+
+def shipped_sources(zipped: Path) -> dict[str, ast.Module]:
+    """What the zip's Python files say, by name."""
+    with zipfile.ZipFile(zipped) as archive:
+        names = [name for name in archive.namelist() if name.endswith(".py")]
+        return {name: ast.parse(archive.read(name).decode("utf-8")) for name in names}
+
+
+EXPLAINED = {
+    "ctypes": {"dafnet_addon/core/threads.py"},
+    "subprocess": {"dafnet_addon/batch/making.py"},
+    "torch": {"dafnet_addon/core/backend.py"},
+    "distributed": {"dafnet_addon/batch/cluster.py"},
+}
+"""Modules that a reviewer asks about, and where alone each is used; docs/platform.md says why."""
+
+NEVER = {
+    *("socket", "ssl", "http", "urllib", "ftplib", "smtplib", "asyncio", "requests", "webbrowser"),
+    *("pip", "ensurepip", "venv", "pickle", "shelve", "marshal", "multiprocessing", "site"),
+}
+"""What reaches a network, installs, or runs what a file says."""
+
+
+def imported_names(tree: ast.Module) -> set[str]:
+    """The outermost modules of others that a file imports, anywhere in it."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            found.add((node.module or "").split(".")[0])
+    return found
+
+
+def test_what_ships_reaches_no_network_and_installs_nothing(zipped: Path) -> None:
+    used: dict[str, set[str]] = {}
+    for name, tree in shipped_sources(zipped).items():
+        for module in imported_names(tree):
+            used.setdefault(module, set()).add(name)
+    assert not NEVER & used.keys()
+    assert {module: used[module] for module in EXPLAINED} == EXPLAINED
+    of_blender = {"bpy", "bmesh", "mathutils", "gpu", "gpu_extras", "blf", "bpy_extras"}
+    of_blender |= {"bl_operators", "bl_ui", "numpy"}
+    assert used.keys() <= {*sys.stdlib_module_names, *of_blender, *EXPLAINED}
+    page = (ROOT / "docs" / "platform.md").read_text(encoding="utf-8")
+    for files in EXPLAINED.values():
+        assert all(f"`{file}`" in page for file in files)
+
+
+def test_what_ships_runs_no_text_and_touches_no_path(zipped: Path) -> None:
+    """No ``eval`` or ``exec``, no change of ``sys.path``, no shell."""
+    for name, tree in shipped_sources(zipped).items():
+        calls = {ast.unparse(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+        assert not calls & {"eval", "exec", "compile", "__import__", "os.system", "os.popen"}, name
+        assert not [call for call in calls if call.startswith("sys.path")], name
+
+
+def test_the_interface_offers_no_engine_of_others() -> None:
+    words = {word for file in interface_files() for word in interface_words(file) if word}
+    texts = "\n".join(file.read_text(encoding="utf-8") for file in modules("panels"))
+    assert not [word for word in words if re.search("torch|cuda|metal", word, re.I)]
+    assert not re.search("torch|cuda|checkout", texts, re.I)
+
+
+def test_the_manifest_says_whose_it_is_and_under_which_licences() -> None:
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    assert manifest["license"] == ["SPDX:GPL-3.0-or-later", "SPDX:CC-BY-4.0"]
+    assert all(re.fullmatch(r"\d{4}(-\d{4})? \S.*", line) for line in manifest["copyright"])
+    assert set(manifest["tags"]) == {"Animation", "Rigging", "Pipeline"}
+    assert manifest["permissions"].keys() == {"files", "clipboard"}, "no network"
+    weights = load_weights(ROOT / "weights_stub" / "dafnet.safetensors")
+    assert str(weights.says("licence")).startswith("CC-BY-4.0")

@@ -33,6 +33,7 @@ def bake_takes(
     changes: dict[str, Any] | None = None,
     takes: int = 1,
     weights: "Weights | None" = None,
+    device: str | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[Path, job.Result]:
     """Bake this many ``takes`` of one character and save; the first one plays, the others are
@@ -41,8 +42,8 @@ def bake_takes(
     ``file`` None stands for the file that is open, ``output`` None for the file itself. ``scene``
     is needed where another one is active in the file, ``character`` names the armature where the
     scene has several. ``changes`` override the character's own settings (fields of ``Settings``).
-    Each further take has the next seed, and temperature 1 where none is set. Returns the file
-    written and the ``Result``.
+    Each further take has the next seed, and temperature 1 where none is set. ``device``: None runs
+    the network on NumPy, else on that torch device. Returns the file written and the ``Result``.
 
     Whatever ``progress`` raises, until the new file is whole, leaves everything as it was. Raises
     InputError where a file cannot be opened or written, or there is nothing to bake onto.
@@ -78,7 +79,7 @@ def bake_takes(
     with _active(chosen):
         armature = _character(chosen, character)
         settings = job.settings_of(armature, chosen, **{"take_count": takes, **(changes or {})})
-        result = run_to_end(job.steps(bpy.context, settings, weights), progress)
+        result = run_to_end(job.steps(bpy.context, settings, weights, device=device), progress)
 
     save_scene(written, lambda: progress(1.0))
     return written, replace(result, warnings=warnings + result.warnings)

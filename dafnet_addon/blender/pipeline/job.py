@@ -22,7 +22,7 @@ from ...core.take import Controls, Take
 from ..character.armature import metres_per_unit
 from ..character.settings import CLEAN_UP, HELD, Settings, settings_of
 from ..character.takes import add_take, draw_of, play_take, stored_take
-from ..preferences import device_of, weights_path
+from ..preferences import weights_path
 from ..scene.lookup import find_action, find_object, find_scene, names_in_use
 from ..scene.scene_reader import read_scene
 from .baker import bake
@@ -92,13 +92,15 @@ def run(
     settings: Settings,
     weights: "Weights | None" = None,
     watch: Callable[[int, np.ndarray], None] | None = None,
+    device: str | None = None,
 ) -> Generator[float, None, Result]:
     """Read the scene, generate, bake; yields progress in [0, 1] and returns the ``Result``.
 
     ``settings`` comes from ``settings_of(armature, scene, **overrides)``. Without ``weights`` those
-    of the preferences, else the shipped ones, are loaded. ``watch``: see ``takes_steps``. The
-    current frame is as it was at every yield (but see ``read_scene`` for simulations). Any error
-    (``InputError``, ``WeightsError`` or any other), and ``close()``, leaves the scene as it was.
+    of the preferences, else the shipped ones, are loaded. ``watch``, ``device``: see
+    ``takes_steps``. The current frame is as it was at every yield (but see ``read_scene`` for
+    simulations). Any error (``InputError``, ``WeightsError`` or any other), and ``close()``, leaves
+    the scene as it was.
     """
     if weights is None:
         weights = load_weights(weights_path(context))
@@ -125,7 +127,7 @@ def run(
             draws,
             resume=resume,
             resume_frame=resume_frame,
-            device=device_of(context),
+            device=device,
             clean_up=_clean_up(settings),
             watch=watch,
         ),

@@ -31,6 +31,7 @@ __all__ = [
     "HeldClip",
     "fingerprint",
     "frozen_text",
+    "held_clip",
     "held_out",
     "is_frozen",
     "held_out_motions",
@@ -143,7 +144,8 @@ def _composed(recipe: dict[str, Any], motions: dict[str, Motion]) -> Motion:
     return replace(sit, joints=join(walk, joints[recipe["entry"] :]))
 
 
-def _clip(frozen: dict[str, Any], motion: Motion) -> HeldClip:
+def held_clip(frozen: dict[str, Any], motion: Motion) -> HeldClip:
+    """A frozen clip with its motion. Raises InputError where that is another one."""
     start = frozen["start"]
     raised = frozen.get("raised", 0.0)
     joints = motion.joints[start : start + frozen["frames"]] + np.array([0.0, 0.0, raised])
@@ -188,7 +190,7 @@ def held_out(folder: Path) -> list[HeldClip]:
                 )
 
         clips.append(
-            _clip(frozen, _composed(recipe, motions) if recipe else motions[frozen["name"]])
+            held_clip(frozen, _composed(recipe, motions) if recipe else motions[frozen["name"]])
         )
 
     return clips

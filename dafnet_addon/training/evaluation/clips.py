@@ -53,6 +53,7 @@ __all__ = [
     "MeasuredClip",
     "measure_clip",
     "captured_clips",
+    "clean_up_takes",
     "grouped",
     "measure_takes",
     "map_clips",
