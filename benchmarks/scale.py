@@ -1,7 +1,7 @@
 """Do batches and populations hold what they promise: how long crowds take, what a second worker
 gives, what is left of a batch whose processes are killed at random, and who sits where.
 
-    dafnet bench scale [--only workers kills dask] [-o FOLDER]
+    dafnet bench scale [--only people density populations workers kills dask] [-o FOLDER]
 
 ``kills`` and ``dask`` find processes in /proc, which Linux has. ``LIMITS`` are what is wanted.
 """
@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from dafnet_addon.core.files import save_text
 from dafnet_addon.core.manifest import read_manifest
@@ -282,7 +283,78 @@ def _cluster(folder: Path) -> Iterator[tuple[str, "list[subprocess.Popen[bytes]]
             each.wait()
 
 
+def people(options: Options) -> Iterator[Row]:
+    """60 people in one room."""
+    found = _alone("sixty_people(folder)", options.folder)
+    network = found["stages"]["generating"]
+    yield Row(
+        f"{found['people']} people, {found['frames']} frames, one room, from spec to saved .blend",
+        "under 60 s, under 3 GB; the network's share under 20 s",
+        f"{found['seconds']:.0f} s ({found['processor_seconds']:.0f} s of a core), "
+        f"{found['megabytes'] / 1e3:.2f} GB; generating {network:.1f} s",
+        found["seconds"] < 60.0 and found["megabytes"] < 3e3 and network < 20.0,
+    )
+
+
+def density(options: Options) -> Iterator[Row]:
+    """100 people of one hall against 10."""
+    few, many = _alone("by_number(folder)", options.folder).values()
+    times = many["processor_seconds_each"] / few["processor_seconds_each"]
+    yield Row(
+        f"seconds a person at {many['people']} people, against {few['people']}",
+        "≤ 1.2 times",
+        f"{times:.2f} times: {many['processor_seconds_each']:.2f} s of a core each, and "
+        f"{few['processor_seconds_each']:.2f} s",
+        times <= 1.2,
+    )
+
+
+def populations(options: Options) -> Iterator[Row]:
+    """A café by one seed after another."""
+    found = _alone("many_populations()", options.folder)
+    wrong = [*found["seats_taken_twice"], *found["overlaps"]]
+    refused = sorted({*found["refused"].values()})
+    yield Row(
+        f"{found['made'] + len(found['refused'])} populations of a room by seed",
+        "nobody on a seat that is taken; nobody over 2 cm in anybody; every refusal a sentence",
+        f"{found['made']} made, {len(found['seats_taken_twice'])} seats taken twice, "
+        f"{len(found['overlaps'])} overlaps, the nearest {100 * found['deepest']:+.1f} cm in; "
+        f"refused: {'; '.join(refused) or 'none'}{'; wrong: ' * bool(wrong)}{'; '.join(wrong[:5])}",
+        not wrong,
+    )
+
+
+_CODE = """
+import json, os, sys
+from pathlib import Path
+from dafnet_addon.blender.populating.measuring import *
+folder = Path(sys.argv[1])
+print(json.dumps({call}), flush=True)
+os._exit(0)
+"""
+
+
+def _alone(call: str, folder: Path) -> dict[str, Any]:
+    """What is measured beside what populates, in a process of its own, whose memory counts. Raises
+    RuntimeError where it fails.
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", _CODE.format(call=call), str(folder)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise RuntimeError(done.stderr)
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
 ROWS: dict[str, Callable[[Options], Iterator[Row]]] = {
+    "people": people,
+    "density": density,
+    "populations": populations,
     "workers": workers,
     "kills": kills,
     "dask": dask,
