@@ -139,3 +139,24 @@ def test_the_python_on_the_page(tmp_path: Path, blender: ModuleType) -> None:
         ["cafe_1", "made"],
     ], done.stderr
     assert read_manifest(tmp_path / "out" / "shots" / "cafe_1")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="looks processes up in /proc")
+def test_killed_batches_are_measured(tmp_path: Path, blender: ModuleType) -> None:
+    """A small version of what ``dafnet bench scale`` does with a hundred scenes."""
+    if blender.app.binary_path:
+        pytest.skip("runs Blender's Python module in processes of its own")
+    small = ["--scenes", "4", "--takes", "2", "--frames", "15", "--kills", "3", "--rounds", "1"]
+    done = subprocess.run(
+        [sys.executable, "-m", "dafnet_addon", "bench", "scale", "--only", "kills", *small]
+        + ["-o", str(tmp_path)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    (row,) = json.loads((tmp_path / "scale.json").read_text(encoding="utf-8"))
+    assert row["holds"] and "8 takes, the same" in row["measured"], row
+    assert "| yes |" in done.stdout
