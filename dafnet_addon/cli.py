@@ -81,6 +81,7 @@ def main(
 
 def run_in_blender(arguments: Sequence[str]) -> int:
     """``main`` as ``blender [file] --command dafnet``, after which Blender ends."""
+    open_streams()
     claim_stdout()
     code = main(arguments, in_blender=True)
     flush_streams()

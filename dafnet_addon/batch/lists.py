@@ -30,6 +30,7 @@ from typing import Any
 
 from ..core.checks import MAX_SEED, whole
 from ..core.errors import InputError
+from ..core.files import is_device
 from ..core.manifest import words_hash
 from ..core.tables import read_tables, require_known
 from ..core.text import printable
@@ -42,8 +43,7 @@ MAX_SHOTS = 100_000
 
 _LONGEST = 100  # characters of a name
 _OURS = {"logs", "batch.json", "report.html", "report.json"}
-_WINDOWS = {"con", "prn", "aux", "nul"} | {f"{x}{k}" for x in ("com", "lpt") for k in "123456789"}
-"""Names that are something else, beside a shot's folder or on Windows, there with any ending."""
+"""Names that are something else beside a shot's folder."""
 
 _WORDS = tuple(
     each.name
@@ -152,7 +152,7 @@ def _file(shot: object, which: str, folder: Path) -> Path | None:
 def _name(value: object, which: str) -> str:
     good = isinstance(value, str) and re.fullmatch(r"\w[\w. -]*(?<![. ])", value)
     name = str(value).lower()
-    taken = name in _OURS or name.split(".")[0] in _WINDOWS
+    taken = name in _OURS or is_device(name)
     if not good or taken or len(name) > _LONGEST:
         raise InputError(
             f"{which} is called '{printable(value, 40)}', which cannot be a folder's name; use "

@@ -19,6 +19,8 @@ from pathlib import Path
 from .errors import InputError
 
 __all__ = [
+    "is_device",
+    "portable_name",
     "remove_abandoned",
     "require_replaceable",
     "require_writable",
@@ -32,8 +34,20 @@ _PART = re.compile(r"\.dafnet-(?P<host>\w*)-(?P<process>\d+)-(?P<name>[0-9a-f]{1
 """How the name of an unfinished file begins; Blender puts an @ behind it while it writes."""
 _IN_THE_WAY = (errno.ENOTEMPTY, errno.EEXIST, errno.EACCES, errno.ENOTDIR)
 """What a system says where a folder is renamed to a name that is taken; Windows the third."""
+_DEVICES = {"con", "prn", "aux", "nul"} | {f"{x}{k}" for x in ("com", "lpt") for k in "123456789"}
+"""Names that are something else than files on Windows, with any ending."""
 _ours: set[str] = set()
 """Names of what this process is writing."""
+
+
+def is_device(name: str) -> bool:
+    """Whether Windows takes the name of a file or folder, with whatever ending, for a device's."""
+    return name.lower().split(".")[0] in _DEVICES
+
+
+def portable_name(name: str) -> str:
+    """A name that is a file's on every system, where ``name`` is one on most."""
+    return f"{name}_" if is_device(name) else name
 
 
 def save_text(path: Path, text: str) -> None:

@@ -6,12 +6,15 @@ import socket
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from dafnet_addon.core import files
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.files import (
+    is_device,
+    portable_name,
     require_replaceable,
     require_writable,
     save_text,
@@ -264,3 +267,38 @@ def test_folders_that_killed_runs_left_are_removed(tmp_path: Path) -> None:
     assert killed.returncode != 0 and len(names(tmp_path)) == 1
     _folder(tmp_path, "whole")
     assert names(tmp_path) == ["shot"]
+
+
+@pytest.mark.parametrize("name", ["con", "Aux.png", "COM1", "lpt9.tar.gz", "NUL"])
+def test_what_windows_takes_for_a_device_becomes_a_file(name: str) -> None:
+    assert is_device(name) and not is_device(portable_name(name.split(".")[0]))
+
+
+def test_other_names_stay() -> None:
+    for name in ("Ann", "console", "com", "com10", "花子"):
+        assert portable_name(name) == name
+
+
+def test_on_windows_a_process_is_asked_for_without_touching_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With a stand-in for the system's calls: this runs on no Windows."""
+    running, closed = {7: 259, 8: 0}, []
+
+    def opened(_access: int, _inherit: bool, process: int) -> int:
+        if process not in running:
+            error = OSError("no such process, or not ours")
+            error.winerror = 5 if process == 9 else 87  # type: ignore[attr-defined]
+            raise error
+        return process
+
+    calls = SimpleNamespace(
+        OpenProcess=opened,
+        GetExitCodeProcess=running.__getitem__,
+        CloseHandle=closed.append,
+        STILL_ACTIVE=259,
+    )
+    monkeypatch.setitem(sys.modules, "_winapi", calls)
+    monkeypatch.setattr(files.sys, "platform", "win32")
+    assert [files._runs(process) for process in (7, 8, 9, 10)] == [True, False, True, False]
+    assert closed == [7, 8]

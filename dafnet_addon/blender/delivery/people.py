@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.files import portable_name
 from ...core.retargeting import Motion
 from ...core.skeleton import JOINTS
 from ...core.take import Take
@@ -94,7 +95,7 @@ def file_names(people: Sequence[Played]) -> list[str]:
     """A name of a file for each of them, without an ending, all different."""
     names: list[str] = []
     for person in people:
-        cleaned = name = bpy.path.clean_name(person.name)
+        cleaned = name = portable_name(bpy.path.clean_name(person.name))
         while name.lower() in (each.lower() for each in names):
             name = f"{cleaned}_{len(names) + 1}"
         names.append(name)

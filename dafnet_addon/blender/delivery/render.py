@@ -18,7 +18,7 @@ import numpy as np
 
 from ...core.coco import COCO, COCO_BONES
 from ...core.errors import InputError
-from ...core.files import save_text, whole_file
+from ...core.files import portable_name, save_text, whole_file
 from ...core.images import save_numbers
 from ..character.armature import metres_per_unit
 from ..compat import node_tree_of, output_image, output_numbers
@@ -70,7 +70,7 @@ def render_steps(
         numbers = undo.enter_context(_Numbers(scene, people)) if measured else None
         for k, frame in enumerate(frames):
             for j, camera in enumerate(cameras):
-                file = folder / bpy.path.clean_name(camera.name) / f"{frame:04d}.png"
+                file = folder / portable_name(bpy.path.clean_name(camera.name)) / f"{frame:04d}.png"
                 if pictures:
                     with whole_file(file) as part:
                         _render(pictures, camera, frame, part)
@@ -86,7 +86,10 @@ def render_steps(
     for j, camera in enumerate(cameras):
         found = [boxes.get((j, k)) for k in range(len(frames))]
         coco = _coco(truth, file_names(people), j, found, picture_size(scene))
-        save_text(folder / bpy.path.clean_name(camera.name) / "keypoints.json", json.dumps(coco))
+        save_text(
+            folder / portable_name(bpy.path.clean_name(camera.name)) / "keypoints.json",
+            json.dumps(coco),
+        )
     return ()
 
 

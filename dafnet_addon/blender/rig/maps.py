@@ -18,7 +18,7 @@ from typing import Any
 import bpy
 
 from ...core.errors import InputError
-from ...core.files import save_text
+from ...core.files import portable_name, save_text
 from ...core.skeleton import JOINTS
 from ..preferences import ADDON
 
@@ -132,7 +132,7 @@ def save_map(rig_map: RigMap, name: str) -> Path:
 
     ``InputError``: the name is empty, or nothing can be written there.
     """
-    stem = bpy.path.clean_name(name.strip()).lower()
+    stem = portable_name(bpy.path.clean_name(name.strip()).lower())
     if not stem.strip("_"):
         raise InputError("The preset has no name; enter one.")
 
