@@ -146,3 +146,7 @@ def _draw_targets(
         row.use_property_decorate = True
         row.active = getattr(settings, role) is not None
         row.prop(settings, f"{role}_influence", text="Influence", slider=True)
+        if role == "head" and settings.head is not None:
+            row = layout.row()
+            row.use_property_decorate = True
+            row.prop(settings, "head_follows")

@@ -1,14 +1,30 @@
 """``dafnet bake``: motion for the character of a .blend file, without a window."""
 
 import argparse
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ..core.errors import InputError
 from ..core.take import MODES
 from ..core.text import printable
-from .command import Command, Progress, Result, add_noise, add_weights, frame_range, number
+from ..director.task_lists import read_task_file
+from ..director.tasks import said
+from .command import (
+    Command,
+    Progress,
+    Result,
+    add_noise,
+    add_weights,
+    add_wishes,
+    frame_range,
+    number,
+    wishes_of,
+)
 from .console import MAX_SHOWN
+
+if TYPE_CHECKING:
+    from ..blender.pipeline.batch import Written
 
 __all__ = ["COMMAND"]
 
@@ -105,6 +121,29 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         help="run the network on PyTorch, where that is installed: 'cpu', 'cuda' or 'mps'",
     )
 
+    parser.add_argument(
+        "--tasks",
+        type=Path,
+        metavar="FILE",
+        help="a TOML or JSON file of tasks, planned in the scene and keyed before",
+    )
+    parser.add_argument(
+        "--already-there",
+        action="store_true",
+        help="with --tasks: at first the character is where its first task is done",
+    )
+    parser.add_argument(
+        "--find",
+        action="store_true",
+        help="find the furniture along the root's path, as Find Furniture does",
+    )
+    add_wishes(parser)
+    parser.add_argument(
+        "--rig",
+        metavar="ARMATURE",
+        help="put the takes onto this armature as well, and deliver it instead of the character",
+    )
+
 
 def _changes(options: argparse.Namespace) -> dict[str, Any]:
     """What the options set on the character, by the setting's name."""
@@ -119,7 +158,10 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
     from ..blender.pipeline.batch import bake_takes
     from ..core.weights import load_weights
 
-    output, result = bake_takes(
+    if options.already_there and options.tasks is None:
+        raise InputError("--already-there is about tasks; give --tasks as well.")
+
+    written = bake_takes(
         options.file,
         options.output,
         scene=options.scene,
@@ -129,10 +171,17 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
         device=options.device,
         progress=progress,
         changes=_changes(options),
+        tasks=read_task_file(options.tasks) if options.tasks else (),
+        already_there=options.already_there,
+        find=options.find,
+        wishes=replace(wishes_of(options), rig=options.rig),
     )
+    result = written.result
 
     report: dict[str, Any] = {
-        "output": str(output),
+        "output": str(written.file),
+        "delivered": None if written.folder is None else str(written.folder),
+        "tasks": _tasks(written),
         "takes": [
             {
                 "action": action.name,
@@ -153,8 +202,31 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
     return report, _as_text(report)
 
 
+def _tasks(written: "Written") -> list[dict[str, Any]]:
+    """What was planned, in the scene's frames."""
+    if written.directed is None:
+        return []
+    first = written.directed.first
+    return [
+        {
+            "task": said(entry.task),
+            "start": first + entry.start,
+            "there": first + entry.there,
+            "stop": first + entry.stop,
+            "furniture": entry.furniture,
+            "seat": entry.seat,
+        }
+        for entry in written.directed.plan.timeline
+    ]
+
+
 def _as_text(report: dict[str, Any]) -> str:
     lines = [f"Warning: {printable(warning, MAX_SHOWN)}" for warning in report["warnings"]]
+    for task in report["tasks"]:
+        seat = f" ({printable(task['seat'])})" if task["seat"] else ""
+        lines.append(
+            f"Frames {task['start']} to {task['stop'] - 1}: {printable(task['task'])}{seat}"
+        )
     for take in report["takes"]:
         slides = f"{take['metrics']['foot_sliding_per_frame']:.2f} sliding feet per frame"
         lines.append(
@@ -162,7 +234,10 @@ def _as_text(report: dict[str, Any]) -> str:
         )
 
     spent = (f"{stage} {seconds:.2f} s" for stage, seconds in report["seconds"].items())
-    return "\n".join((*lines, ", ".join(spent), f"Written to {report['output']}"))
+    lines += [", ".join(spent), f"Written to {report['output']}"]
+    if report["delivered"]:
+        lines.append(f"Delivered in {report['delivered']}")
+    return "\n".join(lines)
 
 
 COMMAND = Command(

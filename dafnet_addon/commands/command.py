@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.checks import MAX_SEED
+from ..core.wishes import EXPORTED, RENDERED, ROOT_MOTIONS, Wishes
 
 __all__ = [
     "MAX_PROCESSES",
@@ -16,8 +17,10 @@ __all__ = [
     "Result",
     "add_noise",
     "add_weights",
+    "add_wishes",
     "frame_range",
     "number",
+    "wishes_of",
 ]
 
 Progress = Callable[[float], None]
@@ -70,6 +73,51 @@ def add_weights(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help="trained weights; the ones that ship if left out",
+    )
+
+
+def add_wishes(parser: argparse.ArgumentParser) -> None:
+    """What is delivered of a shot besides the scene; ``wishes_of`` reads it."""
+    parser.add_argument(
+        "--truth", action="store_true", help="ground truth: joints, contacts, tasks … as numbers"
+    )
+    parser.add_argument(
+        "--render",
+        nargs="+",
+        metavar="WHAT",
+        default=(),
+        help=f"pictures by the scene's cameras: {', '.join(RENDERED)}",
+    )
+    parser.add_argument(
+        "--every",
+        type=number(int, 1),
+        default=1,
+        metavar="N",
+        help="cameras look at every N-th frame only",
+    )
+    parser.add_argument(
+        "--export",
+        nargs="+",
+        metavar="FORMAT",
+        default=(),
+        help=f"a file for each character and take: {', '.join(EXPORTED)}",
+    )
+    parser.add_argument(
+        "--root-motion",
+        choices=ROOT_MOTIONS,
+        default="bone",
+        help="with --export: what carries the character over the floor",
+    )
+
+
+def wishes_of(options: argparse.Namespace) -> Wishes:
+    """What the options of ``add_wishes`` say. Raises InputError for a word that is not known."""
+    return Wishes(
+        truth=options.truth,
+        render=options.render,
+        every=options.every,
+        export=options.export,
+        root_motion=options.root_motion,
     )
 
 

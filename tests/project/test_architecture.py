@@ -212,7 +212,7 @@ LAYERS = {
     "demo": {"core"},
     "blender": {"core", "director", "demo"},
     "batch": {"core", "director"},
-    "commands": {"core", "batch", "data", "training", "baselines", "blender"},
+    "commands": {"core", "batch", "director", "data", "training", "baselines", "blender"},
     "cli": {"core", "commands"},
     "__main__": {"core", "cli"},
     "__init__": {"core"},

@@ -266,6 +266,9 @@ class CharacterSettings(bpy.types.PropertyGroup):
     active_take: IntProperty(
         name="Take", options=set(), description="The take that the buttons below act on"
     )
+    planned: StringProperty(
+        options={"HIDDEN"}, description="What tells the keys that were planned from edited ones"
+    )
     blend_frames: IntProperty(
         name="Blend",
         default=10,
@@ -284,6 +287,16 @@ class CharacterSettings(bpy.types.PropertyGroup):
             "How much the head's target counts; at 0 the head is free. Keyframe it to reach for a "
             "target and to let go of it"
         ),
+    )
+    head_follows: EnumProperty(
+        name="Head Follows",
+        default="ALL",
+        description="What of the head's target counts. Keyframe it to change it during the shot",
+        items=[
+            ("ALL", "Place and Turn", "Its place, and its rotation once it is rotated"),
+            ("PLACE", "Place", "Only its place; the head turns as it likes"),
+            ("TURN", "Turn", "Only its rotation; the head stays where the body brings it"),
+        ],
     )
     hand_left_influence: FloatProperty(
         name="Left Hand Influence",

@@ -38,7 +38,8 @@ class Played:
     """Somebody of a shot: the ``armature``, a character of ours or a rig that is mapped, with
     ``actions`` of hers, one for each of ``takes``, and the ``plan`` of her tasks, if she has any.
 
-    Her furniture is the collection of ``armature.dafnet.furniture``, or all that stands in the
+    ``instead_of``: the character whose motion a rig has; it is not shown where the rig is. Her
+    furniture is the collection of ``armature.dafnet.furniture``, or all that stands in the
     scene. An action's first frame is that of its take and of the plan.
     """
 
@@ -46,6 +47,7 @@ class Played:
     takes: Sequence[Take]
     actions: Sequence[bpy.types.Action]
     plan: Plan | None = None
+    instead_of: bpy.types.Object | None = None
 
     @property
     def name(self) -> str:
@@ -88,6 +90,9 @@ def playing(scene: bpy.types.Scene, people: Sequence[Played], number: int) -> It
         for person in people:
             undo.callback(state_restorer(person.armature), person.armature)
             assign_action(person.armature, person.actions[number])
+            for hidden in objects_of(person.instead_of) if person.instead_of else ():
+                undo.callback(setattr, hidden, "hide_render", hidden.hide_render)
+                hidden.hide_render = True
         yield
 
 

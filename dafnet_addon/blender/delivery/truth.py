@@ -124,9 +124,9 @@ def truth_of(
     bodies = [Body(person.armature) for person in people]
     furniture = _Furnished(scene, people)
     owners = {each: k for k, person in enumerate(people) for each in person.meshes()}
-    sights = Sights(scene, owners, set(scene.objects) - rendered(scene.collection))
 
     with playing(scene, people, number):
+        sights = Sights(scene, owners, set(scene.objects) - rendered(scene.collection))
         for k, frame in enumerate(frames):
             scene.frame_set(frame)
             depsgraph = context.evaluated_depsgraph_get()

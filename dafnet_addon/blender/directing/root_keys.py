@@ -22,6 +22,7 @@ __all__ = [
     "keyable_root",
     "key_route",
     "last_key",
+    "require_keyable",
     "unchanged_on_failure",
     "write_keys",
 ]
@@ -51,10 +52,14 @@ def keyable_root(settings: Settings) -> bpy.types.Object:
         )
 
     root = find_object(settings, settings.root, "root")
-    for reason in _reasons_not_to_key(root):
-        raise InputError(f"The root '{root.name}' {reason}")
-
+    require_keyable(root, "root")
     return root
+
+
+def require_keyable(owner: bpy.types.Object, role: str) -> None:
+    """``InputError`` where an object's keys alone do not decide where it is in the world."""
+    for reason in _reasons_not_to_key(owner):
+        raise InputError(f"The {role} '{owner.name}' {reason}")
 
 
 def _reasons_not_to_key(root: bpy.types.Object) -> Iterator[str]:

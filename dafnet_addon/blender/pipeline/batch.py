@@ -2,26 +2,59 @@
 file.
 """
 
+import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import bpy
 
 from ...core.errors import InputError
-from ...core.files import require_writable, whole_file
+from ...core.files import (
+    require_replaceable,
+    require_writable,
+    save_text,
+    whole_file,
+    whole_folder,
+)
 from ...core.progress import run_to_end
+from ...core.wishes import Wishes
+from ...director.tasks import Task
 from ..character.armature import is_character
 from ..character.properties import ensure_registered
+from ..delivery.deliver import deliver
+from ..delivery.onto_rig import onto_rig, rig_named
+from ..delivery.people import Played
+from ..directing.surroundings import find_furniture
+from ..directing.tasks import Assignment, Directed, direct
 from . import job
 
 if TYPE_CHECKING:
     from ...core.weights import Weights
 
-__all__ = ["bake_takes", "open_file", "save_scene"]
+__all__ = ["DELIVERED", "Written", "bake_takes", "open_file", "save_scene"]
+
+_GENERATED = 0.5
+"""Progress once the takes are generated, where more is to be done with them."""
+
+
+DELIVERED = "delivered.json"
+"""What says, in the folder beside a scene, that it is an earlier run's."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a bake has written: the scene ``file``, with what ``result`` says, and where there were
+    wishes the ``folder`` beside it; ``directed``: what its tasks became.
+    """
+
+    file: Path
+    result: job.Result
+    folder: Path | None = None
+    directed: Directed | None = None
 
 
 def bake_takes(
@@ -31,11 +64,15 @@ def bake_takes(
     scene: str | None = None,
     character: str | None = None,
     changes: dict[str, Any] | None = None,
+    tasks: Sequence[Task] = (),
+    already_there: bool = False,
+    find: bool = False,
+    wishes: Wishes = Wishes(),  # noqa: B008  nothing changes it
     takes: int = 1,
     weights: "Weights | None" = None,
     device: str | None = None,
     progress: Callable[[float], None] = lambda share: None,
-) -> tuple[Path, job.Result]:
+) -> Written:
     """Bake this many ``takes`` of one character and save; the first one plays, the others are
     Actions in the file.
 
@@ -43,7 +80,12 @@ def bake_takes(
     is needed where another one is active in the file, ``character`` names the armature where the
     scene has several. ``changes`` override the character's own settings (fields of ``Settings``).
     Each further take has the next seed, and temperature 1 where none is set. ``device``: None runs
-    the network on NumPy, else on that torch device. Returns the file written and the ``Result``.
+    the network on NumPy, else on that torch device.
+
+    ``tasks`` are planned and keyed first (``directing.tasks``), from where the root stands or with
+    ``already_there`` from where the first one is done; ``find``: the furniture along the root's
+    path is found as by *Find Furniture*. ``wishes``: the takes are put onto a rig, and what is
+    delivered is written into a folder beside the scene's file, of its name.
 
     Whatever ``progress`` raises, until the new file is whole, leaves everything as it was. Raises
     InputError where a file cannot be opened or written, or there is nothing to bake onto.
@@ -75,14 +117,51 @@ def bake_takes(
                 f"'{written}' is a library of the scene; give the output another name."
             )
 
-    chosen = _scene(scene)
+    folder = written.with_suffix("") if wishes.anything else None
+    if folder is not None:
+        require_replaceable(folder, DELIVERED)
+
+    chosen, changes = _scene(scene), dict(changes or {})
     with _active(chosen):
         armature = _character(chosen, character)
-        settings = job.settings_of(armature, chosen, **{"take_count": takes, **(changes or {})})
-        result = run_to_end(job.steps(bpy.context, settings, weights, device=device), progress)
+        rig = rig_named(chosen, wishes.rig) if wishes.rig else None
+        directed = None
+        if tasks:
+            assigned = Assignment(armature, tasks, already_there)
+            (directed,) = direct(bpy.context, [assigned])
+            warnings += directed.warnings
+            changes = {"frame_start": directed.first, "frame_end": directed.last} | changes
+        if find:
+            warnings += find_furniture(bpy.context, armature).warnings
 
-    save_scene(written, lambda: progress(1.0))
-    return written, replace(result, warnings=warnings + result.warnings)
+        settings = job.settings_of(armature, chosen, **{"take_count": takes, **changes})
+        generated = _GENERATED if wishes.anything or rig else 1.0
+        result = run_to_end(
+            job.steps(bpy.context, settings, weights, device=device),
+            lambda share: progress(generated * share),
+        )
+        person = Played(armature, result.takes, result.actions, directed.plan if directed else None)
+        if rig is not None:
+            person, said = onto_rig(bpy.context, person, rig)
+            warnings += said
+
+        if folder is None:
+            save_scene(written, lambda: progress(1.0))
+        else:
+            with whole_folder(folder, DELIVERED) as part:
+                warnings += run_to_end(
+                    deliver.steps(chosen, [person], part, wishes),
+                    lambda share: progress(generated + (1.0 - generated) * share),
+                )
+                listed = sorted(
+                    each.relative_to(part).as_posix() for each in part.rglob("*") if each.is_file()
+                )
+                listing = {"scene": written.name, "files": listed}
+                save_text(part / DELIVERED, json.dumps(listing, indent=1, ensure_ascii=False))
+                save_scene(written, lambda: progress(1.0))
+
+    result = replace(result, warnings=warnings + result.warnings)
+    return Written(written, result, folder, directed)
 
 
 def save_scene(file: Path, last: Callable[[], None] = lambda: None, **options: Any) -> None:

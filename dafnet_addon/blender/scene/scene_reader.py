@@ -202,6 +202,7 @@ class _Tracks:
         self._places = places
 
         self.modes: list[str] = []
+        self.head_follows: list[str] = []
         self.influences: dict[str, list[float]] = {role: [] for role in targets}
         self.root: list[np.ndarray] = []
         self.targets: dict[str, list[np.ndarray]] = {role: [] for role in targets}
@@ -213,6 +214,7 @@ class _Tracks:
         """Note the frame that the scene shows now."""
         own = self.armature.dafnet
         self.modes.append(own.mode)
+        self.head_follows.append(own.head_follows)
         self.root.append(array(self._root.evaluated_get(depsgraph).matrix_world))
         for role, target in self._targets.items():
             evaluated = target.evaluated_get(depsgraph)
@@ -234,9 +236,14 @@ class _Tracks:
             matrices = rigid_matrices(
                 np.array(self.targets[role]), unit, f"{_TARGETS[role]} '{target.name}'"
             )
-            given[role] = matrices[:, :3, 3]
-            if _is_turned(target, np.array(self.local[role])):
-                given[f"{role}_rotation"] = matrices[:, :3, :3]
+            follows = np.array(self.head_follows if role == "head" else ["ALL"])
+            given[role] = np.where((follows != "TURN")[:, None], matrices[:, :3, 3], np.nan)
+            turned = _is_turned(target, np.array(self.local[role]))
+            turns = (follows == "TURN") | ((follows == "ALL") & turned)
+            if turns.any():
+                given[f"{role}_rotation"] = np.where(
+                    turns[:, None, None], matrices[:, :3, :3], np.nan
+                )
             if min(self.influences[role]) < 1.0:
                 given[f"{role}_influence"] = np.array(self.influences[role])
 
