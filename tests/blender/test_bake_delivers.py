@@ -27,21 +27,21 @@ def saved(folder: Path) -> Path:
     return file
 
 
-def bake(capfd: pytest.CaptureFixture[str], *words: Any, status: int = 0) -> Any:
-    capfd.readouterr()
+def bake(capsys: pytest.CaptureFixture[str], *words: Any, status: int = 0) -> Any:
+    capsys.readouterr()
     assert cli.main(["bake", *map(str, words), "--json"]) == status
-    said = capfd.readouterr()
+    said = capsys.readouterr()
     return said.err if status else json.loads(said.out)
 
 
 def test_tasks_and_furniture(
-    blender: ModuleType, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    blender: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     stage = Stage(furnished=False)
     stage.seat("Stool", stage.scene.collection, location=(0.6, 1.4, 0.0))
     file, tasks, out = saved(tmp_path), tmp_path / "tasks.toml", tmp_path / "out.blend"
     tasks.write_text(TASKS, encoding="utf-8")
-    report = bake(capfd, file, "-o", out, "--tasks", tasks, "--find")
+    report = bake(capsys, file, "-o", out, "--tasks", tasks, "--find")
     sits, gets_up = report["tasks"]
     assert sits["task"] == "sit on Stool" and sits["seat"] == "Stool" and sits["start"] <= 2
     assert report["takes"][0]["frames"] == gets_up["stop"] - 1 and report["delivered"] is None
@@ -55,20 +55,20 @@ def test_tasks_and_furniture(
     assert np.hypot(pelvis.x - 0.6, pelvis.y - 1.4) < 0.25 and pelvis.z < 0.7
 
     (tmp_path / "wrong.toml").write_text('tasks = [{ sit_on = "Stol" }]', encoding="utf-8")
-    said = bake(capfd, file, "-o", out, "--tasks", tmp_path / "wrong.toml", status=1)
+    said = bake(capsys, file, "-o", out, "--tasks", tmp_path / "wrong.toml", status=1)
     assert "'Ann': Task 1, 'sit on Stol': 'Stol' is not the name of any furniture there" in said
-    said = bake(capfd, file, "-o", out, "--already-there", status=1)
+    said = bake(capsys, file, "-o", out, "--already-there", status=1)
     assert "--already-there is about tasks" in said
 
 
 def test_all_is_delivered_beside_the_scene(
-    blender: ModuleType, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    blender: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Shot()
     humanoids.mixamo(bpy).name = "Mix"
     file, out = saved(tmp_path), tmp_path / "made" / "out.blend"
     words = ("--truth", "--render", "masks", "--every", 6, "--export", "FBX", "--takes", 2)
-    report = bake(capfd, file, "-o", out, *words, "--rig", "Mix")
+    report = bake(capsys, file, "-o", out, *words, "--rig", "Mix")
     folder = tmp_path / "made" / "out"
     assert report["delivered"] == str(folder)
     files = json.loads((folder / "delivered.json").read_text(encoding="utf-8"))["files"]
@@ -89,10 +89,10 @@ def test_all_is_delivered_beside_the_scene(
     assert keys_of(bpy.data.objects["Mix"]) and len(bpy.data.scenes) == 1
 
     # Once more takes the place of the earlier one; what is not ours is never touched.
-    bake(capfd, file, "-o", out, "--truth")
+    bake(capsys, file, "-o", out, "--truth")
     assert not (folder / "export").exists() and (folder / "truth").is_dir()
     (folder / "delivered.json").unlink()
-    said = bake(capfd, file, "-o", out, "--truth", status=1)
+    said = bake(capsys, file, "-o", out, "--truth", status=1)
     assert "holds something else than an earlier run's output" in said
 
 
@@ -107,11 +107,11 @@ def test_all_is_delivered_beside_the_scene(
 def test_what_cannot_be_done_is_said_and_nothing_is_written(
     blender: ModuleType,
     tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str],
     words: tuple[str, ...],
     said: str,
 ) -> None:
     Stage()
     file = saved(tmp_path)
-    assert said in bake(capfd, file, "-o", tmp_path / "out.blend", *words, status=1)
+    assert said in bake(capsys, file, "-o", tmp_path / "out.blend", *words, status=1)
     assert [each.name for each in tmp_path.iterdir()] == ["scene.blend"]
