@@ -42,8 +42,8 @@ repository: zip
 	scripts/repository.sh .venv/bin/python build/repository build/dafnet-*.zip
 
 # build/site: docs as pages that need nothing from elsewhere; it fails at a dead link.
-docs: .venv-docs/.docs
-	.venv-docs/bin/mkdocs build --quiet
+docs: .venv/.test
+	NO_MKDOCS_2_WARNING=1 .venv/bin/python -m mkdocs build --quiet
 
 # Real Blenders (4.3 and 5.2) in windows under a virtual screen, driven with mouse and keys; the pictures of docs/guide.md. As root.
 window: setup
@@ -61,7 +61,7 @@ system:
 	@touch $@
 
 .venv/.test: pyproject.toml .venv/.demo
-	.venv/$(PIP) '$(TORCH)' 'numpy>=1.26,<2' matplotlib pytest trimesh rtree scipy safetensors tensorboard ruff mypy hypothesis distributed openjd-cli pyyaml
+	.venv/$(PIP) '$(TORCH)' 'numpy>=1.26,<2' matplotlib pytest trimesh rtree scipy safetensors tensorboard ruff mypy hypothesis distributed openjd-cli pyyaml 'mkdocs-material==9.*'
 	@touch $@
 
 # Both generations of NumPy are in use: 4.2 takes either.
@@ -72,10 +72,5 @@ system:
 	$(@D)/$(PIP) $(HOST) pytest trimesh rtree scipy hypothesis
 	@touch $@
 
-.venv-docs/.docs: | system
-	$(PYTHON) -m venv .venv-docs
-	.venv-docs/$(PIP) 'mkdocs-material==9.*' 'numpy>=1.26'
-	@touch $@
-
 clean:
-	rm -rf .venv .venv-4.2 .venv-5.0 .venv-docs build out
+	rm -rf .venv .venv-4.2 .venv-5.0 build out

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from dataclasses import fields
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
@@ -61,6 +62,29 @@ def test_bake_saves_the_keys_that_the_operator_makes(
     assert by_command.keys() == by_operator.keys() and len(by_command) > 90
     for key, values in by_operator.items():
         np.testing.assert_array_equal(by_command[key], values, err_msg=str(key))
+
+
+def test_a_device_runs_the_network_on_torch_or_says_why_not(
+    blender: ModuleType,
+    scene_file: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    played_by = []
+    for device in ([], ["--device", "cpu"]) if find_spec("torch") else ():
+        out = tmp_path / f"{len(played_by)}.blend"
+        assert cli.main(["bake", str(scene_file), "-o", str(out), *device]) == 0
+        bpy.ops.wm.open_mainfile(filepath=str(out))
+        played_by.append(played())
+    for key, values in played_by[0].items() if played_by else ():
+        np.testing.assert_allclose(played_by[1][key], values, atol=1e-3, err_msg=str(key))
+
+    capsys.readouterr()
+    out = tmp_path / "none.blend"
+    assert cli.main(["bake", str(scene_file), "-o", str(out), "--device", "abacus"]) == 1
+    said = capsys.readouterr().err
+    assert said.count("dafnet: ") == 1 and ("torch" in said or "'abacus' cannot be used" in said)
+    assert not out.exists()
 
 
 def test_several_takes_are_kept_and_the_first_one_plays(
