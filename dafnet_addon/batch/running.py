@@ -1,5 +1,6 @@
 """A list of shots is made: those that are not there yet, or would be others now."""
 
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
@@ -37,7 +38,8 @@ class Batch:
     program: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "output", self.output.absolute())  # wherever shots are made
+        # wherever shots are made
+        object.__setattr__(self, "output", Path(os.path.abspath(self.output)))
 
     def folder(self, name: str) -> Path:
         """That of a shot."""

@@ -147,10 +147,10 @@ def test_killed_batches_are_measured(tmp_path: Path, blender: ModuleType) -> Non
     """A small version of what ``dafnet bench scale`` does with a hundred scenes."""
     if blender.app.binary_path:
         pytest.skip("runs Blender's Python module in processes of its own")
+    command = [sys.executable, "-m", "dafnet_addon", "bench", "scale", "--only", "kills"]
     small = ["--scenes", "4", "--takes", "2", "--frames", "15", "--kills", "3", "--rounds", "1"]
     done = subprocess.run(
-        [sys.executable, "-m", "dafnet_addon", "bench", "scale", "--only", "kills", *small]
-        + ["-o", str(tmp_path)],
+        [*command, *small, "-o", str(tmp_path)],
         cwd=ROOT,
         capture_output=True,
         text=True,
