@@ -21,6 +21,9 @@ DOCS = ROOT / "docs"
 ELSEWHERE = {
     "weights.md": "weights_stub/README.md",
     "weights-licence.md": "LICENSE-WEIGHTS.md",
+    "farm.md": "farm/README.md",
+    "farm-openjd.md": "farm/openjd/README.md",
+    "farm-flamenco.md": "farm/flamenco/README.md",
     "contributing.md": "CONTRIBUTING.md",
     "changes.md": "CHANGELOG.md",
 }
@@ -138,6 +141,9 @@ _MODULES = (
     ("director/seats.py", "Where one sits"),
     ("director/walks.py", "The way to a seat"),
     ("core/metrics.py", "Metrics"),
+    ("batch/lists.py", "Lists of shots"),
+    ("batch/running.py", "Batches"),
+    ("core/manifest.py", "What a shot was made of"),
     ("core/errors.py", "Errors"),
 )
 """The modules of the Python reference, in the order of reading."""
