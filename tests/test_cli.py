@@ -1,12 +1,14 @@
 """The command's words, exit codes and errors."""
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
 
 from dafnet_addon.cli import main
 from dafnet_addon.commands import COMMANDS
+from dafnet_addon.commands.console import open_streams
 from dafnet_addon.core.weights import load_weights
 from kit.places import ROOT
 
@@ -46,3 +48,13 @@ def test_every_command_is_a_file_of_its_name() -> None:
     names = {command.name for command in COMMANDS}
     files = {file.stem for file in (ROOT / "dafnet_addon" / "commands").glob("*.py")}
     assert files - {"__init__", "command", "console"} == names
+
+
+def test_standard_streams_that_are_missing_are_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a program with windows, whose streams are None."""
+    monkeypatch.setattr(sys, "stdout", None)
+    monkeypatch.setattr(sys, "stderr", None)
+    open_streams()
+    with sys.stdout, sys.stderr:
+        print("heard by nobody")
+        print("nor this", file=sys.stderr)

@@ -35,8 +35,11 @@ def open_streams() -> None:
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)
+            missing = getattr(sys, name) is None  # as in a program with windows
         except OSError:
-            # The system gives it the lowest free number, which is this one.
+            missing = True
+        if missing:
+            # The system gives it the lowest free number, which is this one where it was closed.
             setattr(sys, name, open(os.devnull, "w" if number else "r", encoding="utf-8"))  # noqa: SIM115
 
 
