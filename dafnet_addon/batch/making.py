@@ -17,10 +17,12 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, BinaryIO
 
-from ..core.errors import InputError
+from ..core.errors import DafnetError, InputError
 from ..core.files import save_text
+from ..core.manifest import content_hash, read_manifest, words_hash
 from ..core.stopping import ENDS_WITH_STDIN
 from ..core.text import printable
+from ..core.weights import shipped_weights
 
 try:
     import fcntl
@@ -136,11 +138,10 @@ def make(order: Order, processes: Processes | None = None) -> Outcome:
     """Make a shot; what became of it is an ``Outcome``, whatever it is."""
     started = time.monotonic()
     try:
-        sentence = _made(order, processes or Processes())
-        state = "failed" if sentence else "made"
+        state, sentence = _made(order, processes or Processes())
     except BlockingIOError:
         state, sentence = "busy", "Another run makes it just now; run again when that has ended."
-    except InputError as error:
+    except DafnetError as error:
         state, sentence = "failed", str(error)
     except OSError as error:
         what = printable(error.filename or "A file", 200)
@@ -148,11 +149,18 @@ def make(order: Order, processes: Processes | None = None) -> Outcome:
     return Outcome(order.name, state, sentence, time.monotonic() - started, order.log)
 
 
-def _made(order: Order, processes: Processes) -> str:
-    """Make a shot; why it was not made, "" where it was."""
+def _made(order: Order, processes: Processes) -> tuple[str, str]:
+    """Make a shot, unless another run has made it since it was asked for; its state, and why it was
+    not made.
+    """
     order.log.parent.mkdir(parents=True, exist_ok=True)
     with order.log.open("ab") as log:
         _lock(log)
+        manifest = read_manifest(order.folder)
+        weights = content_hash(order.weights or shipped_weights())
+        if manifest and not manifest.what_changed(words_hash(order.words), weights):
+            return "unchanged", ""
+
         log.truncate(0)
         words = order.log.with_suffix(".json")
         save_text(words, json.dumps(order.words, indent=2))
@@ -170,7 +178,7 @@ def _made(order: Order, processes: Processes) -> str:
         ) as process:
             said = _listen(process, log)
             code = process.wait()
-    return "" if code == 0 else _why(code, said)
+    return ("made", "") if code == 0 else ("failed", _why(code, said))
 
 
 def _lock(log: BinaryIO) -> None:

@@ -127,6 +127,13 @@ def test_no_right_to_write(tmp_path: Path) -> None:
         made(batch(tmp_path, shot("a")))
 
 
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a place where not even root may")
+def test_a_place_that_nobody_may_write_to(tmp_path: Path) -> None:
+    nowhere = Batch(batch(tmp_path, shot("a")).shots, Path("/proc/dafnet/out"), program=PROGRAM)
+    with pytest.raises(InputError, match="cannot be written"):
+        made(nowhere)
+
+
 def test_a_process_that_ends_without_a_word(tmp_path: Path) -> None:
     found = made(batch(tmp_path, shot("a", "silent")))
     assert found["a"].sentence == "Its process ended with code 3 and no reason; look into its log."
@@ -273,6 +280,8 @@ def test_an_order_can_be_made_alone(tmp_path: Path) -> None:
     of = batch(tmp_path, shot("a"))
     outcome = make(of.order(of.shots[0]))
     assert (outcome.state, outcome.sentence) == ("made", "") and outcome.seconds > 0.0
+    assert make(of.order(of.shots[0])).state == "unchanged", "another run has made it meanwhile"
+    (of.folder("a") / MANIFEST).write_text("{}", encoding="utf-8")
     ended = Processes()
     ended.end()
     assert "was stopped" in make(of.order(of.shots[0]), ended).sentence
