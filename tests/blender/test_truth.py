@@ -229,6 +229,19 @@ def test_masks_depth_and_keypoints_agree(shot: Shot, tmp_path: Path) -> None:
         np.testing.assert_allclose(points[there, :2], known["coco_2d"][0, k][there], atol=0.01)
 
 
+def test_cameras_of_nearly_one_name_have_folders_of_their_own(shot: Shot, tmp_path: Path) -> None:
+    """Where upper and lower case are one, too, and where a name is a device's."""
+    for name in ("side", "Side.", "aux"):
+        camera = bpy.data.objects.new(name, bpy.data.objects["Side"].data)
+        camera.matrix_world = bpy.data.objects["Side"].matrix_world
+        shot.scene.collection.objects.link(camera)
+    shot.scene.render.engine = "CYCLES"
+    shot.scene.cycles.samples = 1
+    shot.truth(tmp_path, every=50, render=("masks",))
+    folders = [folder.name for folder in (tmp_path / "frames" / "take_1").iterdir()]
+    assert len({name.lower() for name in folders}) == 4 and "aux" not in folders
+
+
 def test_what_cannot_be_delivered_is_said(shot: Shot, tmp_path: Path) -> None:
     bpy.data.objects.remove(shot.camera)
     (said,) = shot.deliver(tmp_path, render=("frames",))

@@ -30,7 +30,15 @@ from ..rig.reading import (
 )
 from ..scene.playback import frame_kept
 
-__all__ = ["Body", "Played", "facing_of", "file_names", "playing", "takes_to_play"]
+__all__ = [
+    "Body",
+    "Played",
+    "distinct_names",
+    "facing_of",
+    "file_names",
+    "playing",
+    "takes_to_play",
+]
 
 
 @dataclass(frozen=True)
@@ -98,13 +106,20 @@ def playing(scene: bpy.types.Scene, people: Sequence[Played], number: int) -> It
 
 def file_names(people: Sequence[Played]) -> list[str]:
     """A name of a file for each of them, without an ending, all different."""
-    names: list[str] = []
-    for person in people:
-        cleaned = name = portable_name(bpy.path.clean_name(person.name))
-        while name.lower() in (each.lower() for each in names):
-            name = f"{cleaned}_{len(names) + 1}"
-        names.append(name)
-    return names
+    return distinct_names([person.name for person in people])
+
+
+def distinct_names(names: Sequence[str]) -> list[str]:
+    """For each of these names one that a file can have on any system, without an ending, all
+    different there, also where upper and lower case are one.
+    """
+    found: list[str] = []
+    for each in names:
+        cleaned = name = portable_name(bpy.path.clean_name(each))
+        while name.lower() in (other.lower() for other in found):
+            name = f"{cleaned}_{len(found) + 1}"
+        found.append(name)
+    return found
 
 
 def facing_of(armature: bpy.types.Object) -> np.ndarray:

@@ -18,13 +18,13 @@ import numpy as np
 
 from ...core.coco import COCO, COCO_BONES
 from ...core.errors import InputError
-from ...core.files import portable_name, save_text, whole_file
+from ...core.files import save_text, whole_file
 from ...core.images import save_numbers
 from ..character.armature import metres_per_unit
 from ..compat import node_tree_of, output_image, output_numbers
 from ..scene.playback import frame_kept
 from .cameras import OUTSIDE, cameras_of, picture_size
-from .people import Played, file_names, playing
+from .people import Played, distinct_names, file_names, playing
 from .truth import Truth, looked_at, numbered
 
 __all__ = ["render_steps"]
@@ -60,6 +60,7 @@ def render_steps(
     if not cameras:
         return (f"The scene '{scene.name}' has no camera, so nothing is rendered; add one.",)
 
+    places = [folder / name for name in distinct_names([camera.name for camera in cameras])]
     boxes: dict[tuple[int, int], list[_Box | None]] = {}
     with ExitStack() as undo:
         undo.enter_context(frame_kept(scene))
@@ -70,7 +71,7 @@ def render_steps(
         numbers = undo.enter_context(_Numbers(scene, people)) if measured else None
         for k, frame in enumerate(frames):
             for j, camera in enumerate(cameras):
-                file = folder / portable_name(bpy.path.clean_name(camera.name)) / f"{frame:04d}.png"
+                file = places[j] / f"{frame:04d}.png"
                 if pictures:
                     with whole_file(file) as part:
                         _render(pictures, camera, frame, part)
@@ -83,13 +84,10 @@ def render_steps(
                         save_numbers(file.with_name(f"{file.stem}_depth.png"), distances)
                 yield (k + (j + 1) / len(cameras)) / len(frames)
 
-    for j, camera in enumerate(cameras):
+    for j, place in enumerate(places):
         found = [boxes.get((j, k)) for k in range(len(frames))]
         coco = _coco(truth, file_names(people), j, found, picture_size(scene))
-        save_text(
-            folder / portable_name(bpy.path.clean_name(camera.name)) / "keypoints.json",
-            json.dumps(coco),
-        )
+        save_text(place / "keypoints.json", json.dumps(coco))
     return ()
 
 
