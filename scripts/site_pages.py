@@ -192,9 +192,15 @@ def _public(tree: ast.Module) -> set[str]:
 
 
 def _paragraphs(node: ast.AST) -> str:
-    """A docstring as Markdown."""
+    """A docstring as Markdown; its examples as code."""
     assert isinstance(node, ast.ClassDef | ast.FunctionDef | ast.Module)
-    return re.sub(r"``([^`]+)``", r"`\1`", ast.get_docstring(node) or "")
+    said = []
+    for block in (ast.get_docstring(node) or "").split("\n\n"):
+        if block.startswith(">>>"):
+            said.append(f"```pycon\n{block}\n```")
+        else:
+            said.append(re.sub(r"``([^`]+)``", r"`\1`", block))
+    return "\n\n".join(said)
 
 
 def _signature(node: ast.ClassDef | ast.FunctionDef) -> str:
