@@ -25,6 +25,12 @@ from .takes import (
     DAFNET_OT_play_take,
     DAFNET_OT_reject_take,
 )
+from .tasks import (
+    DAFNET_OT_add_task,
+    DAFNET_OT_move_task,
+    DAFNET_OT_plan_tasks,
+    DAFNET_OT_remove_task,
+)
 from .walk_to import DAFNET_OT_walk_to
 
 __all__ = ["CLASSES"]
@@ -34,6 +40,10 @@ CLASSES = (
     DAFNET_OT_generate,
     DAFNET_OT_cancel,
     DAFNET_OT_walk_to,
+    DAFNET_OT_add_task,
+    DAFNET_OT_remove_task,
+    DAFNET_OT_move_task,
+    DAFNET_OT_plan_tasks,
     DAFNET_OT_play_take,
     DAFNET_OT_reject_take,
     DAFNET_OT_keep_accepted,

@@ -1,19 +1,20 @@
 """Generate takes and bake them onto the character."""
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from typing import Any
 
 import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ..dafnet_addon.blender.character.armature import character_of
+from ..dafnet_addon.blender.character.armature import character_of, selected_characters
 from ..dafnet_addon.blender.character.settings import COMES_AND_GOES, HELD
 from ..dafnet_addon.blender.character.takes import active_take, draw_of, frames_of
 from ..dafnet_addon.blender.overlay import display
 from ..dafnet_addon.blender.pipeline import job
 from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.core.errors import InputError
+from ..dafnet_addon.core.progress import run_to_end
 from .base import DafnetOperator, idle
 from .long import LongOperator
 
@@ -24,8 +25,8 @@ _CALM_LEGS = 1.0
 
 
 class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
-    """Generate the character's motion from its root, targets and furniture, and bake it into new
-    actions
+    """Generate the motion of the selected characters from their roots, targets and furniture, and
+    bake it into new actions
     """
 
     bl_idname = "dafnet.generate"
@@ -112,13 +113,28 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
             lower_temperature=draw.lower_temperature or _CALM_LEGS,
         )
 
+    def _people(self, context: bpy.types.Context) -> list[job.Settings]:
+        """The settings of all selected characters; further ones only for new takes."""
+        characters = selected_characters(context)
+        if self.task != "NEW" or len(characters) == 1:
+            return [self._settings(context)]
+        return job.distinct_seeds([job.settings_of(o, context.scene) for o in characters])
+
     def run(self, context: bpy.types.Context) -> None:
         """Generate without showing progress."""
-        self.report_result(job.run(context, self._settings(context)))
+        self.report_result(run_to_end(self._job(context)))
 
-    def steps(self, context: bpy.types.Context) -> Generator[float, None, job.Result]:
+    def steps(self, context: bpy.types.Context) -> Generator[float, None, tuple[job.Result, ...]]:
         """Generate and show each frame as it is made."""
-        return job.run.steps(context, self._settings(context), watch=self._watch)
+        return self._job(context, self._watch)
+
+    def _job(
+        self, context: bpy.types.Context, watch: Callable[[int, np.ndarray], None] | None = None
+    ) -> Generator[float, None, tuple[job.Result, ...]]:
+        people = self._people(context)
+        if len(people) > 1:
+            return job.run_all.steps(context, people, watch)
+        return _alone(job.run.steps(context, people[0], watch=watch))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Start the job and show the frames as they are made."""
@@ -133,18 +149,25 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
         super().cancel(context)
         display.hide_live_pose()
 
-    def report_result(self, result: job.Result) -> None:
+    def report_result(self, result: tuple[job.Result, ...]) -> None:
         """Say what was generated, and pass the warnings on."""
-        for warning in result.warnings:
+        for warning in dict.fromkeys(each for one in result for each in one.warnings):
             self.report({"WARNING"}, warning)
-        seconds = sum(result.seconds.values())
-        takes = (
-            f"'{result.action.name}'" if len(result.takes) == 1 else f"{len(result.takes)} takes"
-        )
-        self.report({"INFO"}, f"{len(result.take)} frames in {seconds:.1f} s: {takes}")
+        seconds = sum(sum(one.seconds.values()) for one in result)
+        frames, takes = len(result[0].take), sum(len(one.takes) for one in result)
+        made = f"'{result[0].action.name}'" if takes == 1 else f"{takes} takes"
+        for_all = f" for {len(result)} characters" if len(result) > 1 else ""
+        self.report({"INFO"}, f"{frames} frames in {seconds:.1f} s: {made}{for_all}")
 
     def _watch(self, _frame: int, joints: np.ndarray) -> None:
         self._running.joints = joints
+
+
+def _alone(
+    steps: Generator[float, None, job.Result],
+) -> Generator[float, None, tuple[job.Result, ...]]:
+    result = yield from steps
+    return (result,)
 
 
 class DAFNET_OT_cancel(DafnetOperator, bpy.types.Operator):

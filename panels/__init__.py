@@ -6,6 +6,7 @@ from .presets import DAFNET_MT_presets, DAFNET_PT_presets
 from .rig import DAFNET_PT_rig, DAFNET_UL_rig
 from .setup import DAFNET_MT_add, DAFNET_PT_setup, add_menu
 from .takes import DAFNET_PT_clean_up, DAFNET_PT_takes, DAFNET_UL_takes
+from .tasks import DAFNET_PT_tasks, DAFNET_UL_tasks
 
 __all__ = ["CLASSES", "add_menu"]
 
@@ -15,6 +16,8 @@ CLASSES = (
     DAFNET_PT_character,
     DAFNET_PT_setup,
     DAFNET_MT_add,
+    DAFNET_UL_tasks,
+    DAFNET_PT_tasks,
     DAFNET_UL_takes,
     DAFNET_PT_takes,
     DAFNET_PT_clean_up,

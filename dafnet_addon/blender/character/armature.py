@@ -22,6 +22,7 @@ __all__ = [
     "missing_bones",
     "objects_of",
     "character_and_goal",
+    "selected_characters",
 ]
 
 _CHAIN = {
@@ -90,17 +91,27 @@ def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
     """The character that the active object is or belongs to: its armature, its body, its root or
     one of its targets.
     """
-    active = context.object
-    if active is None:
-        return None
-    if active.type == "ARMATURE":
-        return active if is_character(active) else None
-    if active.parent and is_character(active.parent):
-        return active.parent
+    return _owner(context.scene, context.object) if context.object else None
 
-    for candidate in context.scene.objects:
+
+def selected_characters(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The active character, and then those to which selected objects belong, by their names."""
+    found = [_owner(context.scene, each) for each in context.selected_objects]
+    others = sorted({each for each in found if each is not None}, key=lambda o: o.name)
+    active = character_of(context)
+    return [*([active] if active else []), *(each for each in others if each != active)]
+
+
+def _owner(scene: bpy.types.Scene, part: bpy.types.Object) -> bpy.types.Object | None:
+    """The character that an object is or belongs to."""
+    if part.type == "ARMATURE":
+        return part if is_character(part) else None
+    if part.parent and is_character(part.parent):
+        return part.parent
+
+    for candidate in scene.objects:
         own = candidate.dafnet
-        if candidate.type == "ARMATURE" and active in (
+        if candidate.type == "ARMATURE" and part in (
             own.root,
             *(getattr(own, role) for role in TARGETS),
         ):

@@ -19,6 +19,7 @@ from ...core.solids import SOFTEST
 from ..rig import properties as rig_properties
 from .settings import COMES_AND_GOES, HELD, MAX_TAKES
 from .takes import PACKED
+from .task_rows import TaskRow
 
 __all__ = ["CharacterSettings", "TakeSettings", "ensure_registered", "register", "unregister"]
 
@@ -266,6 +267,20 @@ class CharacterSettings(bpy.types.PropertyGroup):
     active_take: IntProperty(
         name="Take", options=set(), description="The take that the buttons below act on"
     )
+    tasks: CollectionProperty(
+        type=TaskRow, options=set(), description="What this character is to do, in this order"
+    )
+    active_task: IntProperty(
+        name="Task", options=set(), description="The task that the buttons below act on"
+    )
+    already_there: BoolProperty(
+        name="Already There",
+        options=set(),
+        description=(
+            "At first the character is where its first task is done, seated for example, instead "
+            "of where its root stands"
+        ),
+    )
     planned: StringProperty(
         options={"HIDDEN"}, description="What tells the keys that were planned from edited ones"
     )
@@ -452,7 +467,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
     )
 
 
-_GROUPS = (TakeFinding, TakeSettings, TakeLink, CharacterSettings)
+_GROUPS = (TakeFinding, TakeSettings, TakeLink, TaskRow, CharacterSettings)
 
 
 def register() -> None:

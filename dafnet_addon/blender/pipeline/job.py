@@ -4,9 +4,9 @@ A job knows objects by name only and looks them up at each stage, since they may
 undone while it runs.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -31,7 +31,17 @@ from .rollback import state_restorer, undone_on_failure
 if TYPE_CHECKING:
     from ...core.weights import Weights
 
-__all__ = ["Result", "Settings", "clean_up_again", "draws_of", "settings_of", "steps", "run"]
+__all__ = [
+    "Result",
+    "Settings",
+    "clean_up_again",
+    "distinct_seeds",
+    "draws_of",
+    "run",
+    "run_all",
+    "settings_of",
+    "steps",
+]
 
 _READ = 0.1
 """Progress once the scene is read."""
@@ -80,6 +90,21 @@ def draws_of(settings: Settings) -> list[Draw]:
     further = settings.temperature or _FURTHER_TAKES
     seeds = range(settings.seed + 1, settings.seed + settings.take_count)
     return [first, *(Draw(seed=seed, temperature=further, held=held) for seed in seeds)]
+
+
+def distinct_seeds(people: Sequence[Settings]) -> list[Settings]:
+    """The settings of several characters, whose takes have seeds of their own: who has a seed that
+    another one has before her gets the next that is free.
+    """
+    used: set[int] = set()
+    found = []
+    for settings in people:
+        seed = settings.seed
+        while used & {*range(seed, seed + settings.take_count)}:
+            seed += 1
+        used |= {*range(seed, seed + settings.take_count)}
+        found.append(replace(settings, seed=seed))
+    return found
 
 
 def _clean_up(settings: Settings) -> CleanUp:
@@ -154,6 +179,31 @@ def run(
 
 
 steps = run.steps
+
+
+@stepwise
+def run_all(
+    context: bpy.types.Context,
+    people: Sequence[Settings],
+    watch: Callable[[int, np.ndarray], None] | None = None,
+) -> Generator[float, None, tuple[Result, ...]]:
+    """``run`` for several characters, one after another: all get their takes, or none does. The
+    seeds become their settings.
+    """
+    weights = load_weights(weights_path(context))
+    results: list[Result] = []
+    with ExitStack() as undo:
+        for k, settings in enumerate(people):
+            names: list[str] = []
+            undo.callback(_remove_bake, settings, names, state_restorer(_character(settings)))
+            one = run.steps(context, settings, weights, watch=watch)
+            result = yield from within(one, k / len(people), (k + 1) / len(people))
+            names += [action.name_full for action in result.actions]
+            results.append(result)
+        undo.pop_all()
+    for settings in people:
+        _character(settings).dafnet.seed = settings.seed
+    return tuple(results)
 
 
 def _kept_take(settings: Settings) -> tuple[Take | None, int]:
