@@ -153,12 +153,18 @@ _GERMAN = {
 }
 
 
+_LANGUAGES = {"de_DE": _GERMAN}
+"""The tables by Blender's names of their languages."""
+
+
 def register() -> None:
     """Give Blender the tables."""
-    table = {
-        (context, word): said for word, said in _GERMAN.items() for context in ("*", "Operator")
+    contexts = ("*", "Operator")
+    tables = {
+        language: {(context, word): said for word, said in table.items() for context in contexts}
+        for language, table in _LANGUAGES.items()
     }
-    bpy.app.translations.register(__package__, {"de_DE": table})
+    bpy.app.translations.register(__package__, tables)
 
 
 def unregister() -> None:

@@ -14,6 +14,7 @@ import tomllib
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
+from typing import TypeGuard
 
 import pytest
 
@@ -195,7 +196,7 @@ def translated() -> list[str]:
         for node in ast.walk(tables)
         if isinstance(node, ast.Dict)
         for key in node.keys
-        if isinstance(key, ast.Constant) and key.value != "de_DE"
+        if isinstance(key, ast.Constant) and not re.fullmatch("[a-z]{2,3}_[A-Z]{2}", key.value)
     ]
 
 
@@ -204,6 +205,22 @@ def test_what_is_translated_is_said_somewhere() -> None:
     sources = "\n".join(file.read_text(encoding="utf-8") for file in interface_files())
     assert len(translated()) > 50
     assert not [word for word in translated() if f'"{word}"' not in sources]
+
+
+def test_every_language_has_every_word() -> None:
+    tree = ast.parse((ROOT / "dafnet_addon/blender/translations.py").read_text(encoding="utf-8"))
+    tables = [ast.literal_eval(node.value) for node in tree.body if _is_table(node)]
+    assert tables and all(table.keys() == tables[0].keys() for table in tables)
+    assert all(said.strip() for table in tables for said in table.values())
+
+
+def _is_table(node: ast.stmt) -> TypeGuard[ast.Assign]:
+    """Whether a statement gives words in a language."""
+    return (
+        isinstance(node, ast.Assign)
+        and isinstance(node.value, ast.Dict)
+        and ast.unparse(node.targets[0]) != "_LANGUAGES"
+    )
 
 
 BLENDERS_OWN = {
