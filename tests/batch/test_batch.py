@@ -11,7 +11,8 @@ import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from types import ModuleType, SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -294,3 +295,19 @@ def test_a_fault_of_ours_ends_the_batch(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr("dafnet_addon.batch.local.make", fails)
     with pytest.raises(ZeroDivisionError):
         made(batch(tmp_path, shot("a") + shot("b")))
+
+
+def test_inside_blender_blender_makes_the_shots(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "bpy", raising=False)
+    assert making.program() == (sys.executable, "-m", "dafnet_addon")
+    for path, expected in (("", sys.executable), ("/opt/blender/blender", "/opt/blender/blender")):
+        app = SimpleNamespace(binary_path=path)
+        monkeypatch.setitem(sys.modules, "bpy", cast(ModuleType, SimpleNamespace(app=app)))
+        assert making.program()[0] == expected
+    assert making.program()[1:] == ("--background", "--command", "dafnet")
+
+
+def test_where_files_cannot_be_locked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(making, "fcntl", None)
+    of = batch(tmp_path, shot("a"))
+    assert make(of.order(of.shots[0])).state == "made"
