@@ -5,13 +5,13 @@ other.
 import json
 from base64 import b64encode
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from ..core.files import save_text
-from ..core.manifest import current_version, read_manifest
+from ..core.manifest import Manifest, current_version, read_manifest
 from ..core.text import duration, printable
 from .making import Outcome
 from .running import Batch
@@ -65,9 +65,23 @@ def _row(batch: Batch, outcome: Outcome) -> dict[str, Any]:
             "seconds": dict(manifest.seconds),
             "metrics": dict(manifest.metrics),
             "warnings": list(manifest.warnings),
+            "faults": list(_faults(manifest)),
             "content": dict(manifest.content),
         }
     return row
+
+
+def _faults(manifest: Manifest) -> Iterator[str]:
+    """What an eye would find wrong with the takes, as their verdicts say it; nothing of what is not
+    a verdict.
+    """
+    for person in manifest.people:
+        takes = person.get("verdict")
+        for k, findings in enumerate(takes if isinstance(takes, list) else (), 1):
+            for each in findings if isinstance(findings, list) else ():
+                if isinstance(each, dict) and each.get("good") is False:
+                    name = printable(person.get("name", ""), 100)
+                    yield f"{name}, take {k}: {printable(each.get('text', ''), 500)}"
 
 
 def _how_bad(row: dict[str, Any]) -> tuple[Any, ...]:
@@ -75,7 +89,8 @@ def _how_bad(row: dict[str, Any]) -> tuple[Any, ...]:
     state = _WORST.index(row["state"]) if row["state"] in _WORST else len(_WORST)
     metrics = row.get("metrics", {})
     values = (-float(metrics.get(name) or 0.0) for name in _COLUMNS)
-    return state, -len(row.get("warnings", ())), *values, row["name"]
+    faults, warnings = (len(row.get(name, ())) for name in ("faults", "warnings"))
+    return state, -faults, -warnings, *values, row["name"]
 
 
 def save_report(
@@ -140,7 +155,8 @@ def _line(
         value = metrics.get(name)
         values.append("" if value is None else form.format(factor * value))
 
-    remarks = [row["sentence"]] if row["sentence"] else row.get("warnings", [])
+    told = [*row.get("faults", []), *row.get("warnings", [])]
+    remarks = [row["sentence"]] if row["sentence"] else told
     said = "<br>".join(escape(printable(each, 500)) for each in remarks)
     if row["log"] and row["state"] == "failed":
         said += f' <a href="logs/{escape(row["name"])}.log">log</a>'

@@ -87,6 +87,22 @@ def test_the_worst_come_first_and_nothing_is_loaded(tmp_path: Path) -> None:
     assert json.loads((out / "report.json").read_text(encoding="utf-8")) == told
 
 
+def test_what_an_eye_would_find_wrong_stands_first(tmp_path: Path) -> None:
+    sits = {"word": "sits", "text": "Sits on 'Chair'", "good": True}
+    hovers = {"word": "hovers 9 cm", "text": "Hovers 9 cm over 'Sofa'", "good": False}
+    people = [{"name": "Ann", "verdict": [[sits], [hovers, sits]]}]
+    outcomes = [
+        made(tmp_path, "warned", warnings=["The root jumps."] * 3),
+        made(tmp_path, "hovers", people=people),
+        made(tmp_path, "odd", people=[{"name": 3, "verdict": "none"}]),
+    ]
+    told = report(Batch((), tmp_path), outcomes, 1.0)
+    assert [row["name"] for row in told["shots"]] == ["hovers", "warned", "odd"]
+    assert told["shots"][0]["faults"] == ["Ann, take 2: Hovers 9 cm over 'Sofa'"]
+    page = save_report(Batch((), tmp_path), told).read_text(encoding="utf-8")
+    assert Page(page).rows[1][-1] == "Ann, take 2: Hovers 9 cm over 'Sofa'"
+
+
 def test_shots_are_counted() -> None:
     assert counted({"made": 1}) == "1 shot: 1 made"
     assert counted({"made": 2, "failed": 1}) == "3 shots: 2 made, 1 failed"

@@ -1,7 +1,7 @@
 """From a shot to a folder: the scene with everybody in it, and what is known of it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
 from time import perf_counter
@@ -289,6 +289,7 @@ def _said_of(part: _Part, played: Played, scene: bpy.types.Scene) -> dict[str, A
             }
             for take in played.takes
         ],
+        "verdict": [[asdict(finding) for finding in take.verdict] for take in played.takes],
         "tasks": [
             {
                 "task": said(entry.task),
