@@ -25,6 +25,7 @@ _ROUND_SEAT = 1.4  # metres around a seat in which anything may be in the way
 _BODY = (0.50, 1.36)  # metres over the floor, from thighs to chest
 _OVER_SEAT = 0.12  # metres over a seat's top that belong to it
 _CLEAR = 0.18  # metres from the body's axis that need no other way to a seat
+_BY_OTHERS = 0.52  # metres from others' roots
 _SLIPS_BY = 0.02  # metres from it, at least
 
 
@@ -35,10 +36,15 @@ def pair(point: np.ndarray | Sequence[float]) -> tuple[float, float]:
 
 @stepwise
 def way_in(
-    room: Room, name: str, own: Sequence[Box | Mesh], seat: SeatPlace
+    room: Room,
+    name: str,
+    own: Sequence[Box | Mesh],
+    seat: SeatPlace,
+    standing: Sequence[Box] = (),
 ) -> Generator[float, None, tuple[np.ndarray, ...]]:
     """Points (2,) by which one comes to a ``seat`` of the piece ``name``, made of its ``own``
-    solids; none where one comes straight. Raises InputError where all three ways are barred.
+    solids; none where one comes straight. Where it can be, not past those who are ``standing`` or
+    sitting there. Raises InputError where all three ways are barred.
     """
     ahead = forward_of(seat.yaw)
     across = np.array([ahead[1], -ahead[0]])
@@ -56,25 +62,31 @@ def way_in(
         points.append((solid.name, found[(over > lowest) & (over < _BODY[1]), :2]))
         yield 0.5
 
+    others = np.array([box.center[:2] for box in standing]).reshape(-1, 2)
     goal = Stop(pair(seat.position), seat.yaw, 0.0, seated=True)
     sides = [(seat.position + side * across,) for side in (_SIDE, -_SIDE)]
     options: list[tuple[np.ndarray, ...]] = [(), *sides]
-    clear, blockers = [], []
+    clear, free, blockers = [], [], []
     for via in options:
         begin = via[0] if via else seat.position + _FRONT * ahead
         start = Stop(pair(begin), seat.yaw, 0.0)
         way = route(start, *map(pair, via[1:]), goal).path.position[::2, :2]
+        passes = _gap(way, others) >= _BY_OTHERS
         gaps = [(_gap(way, some), which) for which, some in points]
         gap, which = min(gaps, default=(np.inf, ""))
         if via:
             stands = yield from has_room(room, begin[None], 0.2)
             gap = gap if stands[0] else -1.0
         clear.append(gap)
+        free.append(passes)
         blockers.append(which)
-        if clear[0] >= _CLEAR:
+        if clear[0] >= _CLEAR and free[0]:
             return ()
 
-    best = int(np.argmax(clear))
+    able = [k for k, gap in enumerate(clear) if gap >= _SLIPS_BY]
+    if clear[0] >= _CLEAR and not any(free[k] for k in able):
+        return ()
+    best = max(range(len(clear)), key=lambda k: (clear[k] >= _SLIPS_BY and free[k], clear[k]))
     if clear[best] < _SLIPS_BY:
         raise InputError(
             f"'{blockers[0]}' stands where one comes to sit on '{name}'; pull '{name}' out, "

@@ -26,7 +26,8 @@ from .track import Targets
 __all__ = ["Crowd", "Planned", "over_shot", "plan_crowd"]
 
 _SPACE = 0.32  # metres around somebody who stands and waits to begin
-_STEP = 0.95  # metres between those who wait beside one another, so that one can leave
+_STEP = 0.85  # metres between those who wait beside one another, so that one can leave
+_QUEUE = 8
 _RINGS = 8
 
 
@@ -169,9 +170,10 @@ def _start_of(
         middle = np.array(who.start)
 
     # One behind the other, seen from the room: else who waits would bar the door.
-    spots = np.concatenate([_ring(middle[:2], k) for k in range(_RINGS)])
-    ahead = normalised(_middle(room) - middle[:2])
-    spots = spots[(spots - middle[:2]) @ ahead < 0.1]
+    behind = -normalised(_middle(room) - middle[:2])
+    queue = middle[:2] + _STEP * np.arange(_QUEUE)[:, None] * behind
+    spots = np.concatenate([queue, *(_ring(middle[:2], k) for k in range(1, _RINGS))])
+    spots = spots[(spots - middle[:2]) @ behind > -0.1]
     taken = np.array([plan.path.position[0, :2] for plan in others]).reshape(-1, 2)
     away = np.linalg.norm(spots[:, None] - taken, axis=2).min(axis=1, initial=np.inf)
     spots = spots[away > _STEP - 0.01]
@@ -189,7 +191,7 @@ def _said(start: tuple[float, ...] | str) -> str:
 
 
 def _ring(middle: np.ndarray, k: int) -> np.ndarray:
-    angles = np.linspace(0.0, 2.0 * np.pi, 6 * k, endpoint=False) if k else np.zeros(1)
+    angles = np.linspace(0.0, 2.0 * np.pi, 6 * k, endpoint=False)
     return np.asarray(middle + k * _STEP * np.stack([np.cos(angles), np.sin(angles)], axis=1))
 
 

@@ -19,6 +19,7 @@ APART = 0.5
 
 _STAYS = 0.15  # metres within which somebody counts as standing still
 _WATCHED = 15.0  # seconds for which he has to
+_SOON = (0.0, 5.0, 10.0, 15.0)  # seconds from now at which it is looked who stands still
 _TALL = 0.85  # metres; half the height of one who is walked round
 _WIDE = 0.34  # metres; half the width of one, since ways cut corners
 
@@ -38,6 +39,7 @@ class Others:
             for plan in plans
             for hold in plan.holds
         ]
+        self._wider = np.array([0.5 * APART * (plan.scale / size - 1.0) for plan in plans])
         self._paths = []
         for plan in plans:
             first = round(plan.begins * fps)
@@ -68,24 +70,29 @@ class Others:
 
     def gap(self, path: np.ndarray, first: int) -> np.ndarray:
         """Metres (N,) to the nearest of them along a path (N, 2) that begins at frame ``first`` of
-        the shot; infinite without any.
+        the shot, as if they were as wide as oneself; infinite without any.
         """
         there = self.at(first + np.arange(len(path)))
-        return np.linalg.norm(there - path, axis=2).min(axis=0, initial=np.inf)
+        away = np.linalg.norm(there - path, axis=2) - self._wider[:, None]
+        return np.asarray(away.min(axis=0, initial=np.inf))
 
     def last_frame(self) -> int:
         """Of the shot, in which any of them moves."""
         return max((first + len(path) for first, path in self._paths), default=0)
 
     def standing(self, first: int, besides: Sequence[np.ndarray]) -> list[Box]:
-        """Those who stay where they are for a while from frame ``first`` on, as what one goes
-        round; not those right ``besides`` where one comes from or goes to (2,).
+        """Those who stay where they are, or are soon going to, for a while from frame ``first`` on,
+        as what one goes round; not those right ``besides`` where one comes from or goes to (2,).
         """
-        found = []
-        for path in self.at(first + np.arange(0, round(_WATCHED * self._fps), 5)):
-            middle = path[0]
-            near = min(float(np.linalg.norm(place - middle)) for place in besides)
-            if np.linalg.norm(path - middle, axis=1).max() < _STAYS and near > APART + 0.05:
-                center = np.array([*middle, self._floor + _TALL])
-                found.append(Box(center, np.array([_WIDE, _WIDE, _TALL]), name="somebody"))
+        found: list[Box] = []
+        watched = np.arange(0, round(_WATCHED * self._fps), 5)
+        for soon in _SOON:
+            for path in self.at(first + round(soon * self._fps) + watched):
+                middle = path[0]
+                near = min(float(np.linalg.norm(place - middle)) for place in besides)
+                stays = np.linalg.norm(path - middle, axis=1).max() < _STAYS
+                known = any(np.linalg.norm(box.center[:2] - middle) < _STAYS for box in found)
+                if stays and near > APART + 0.05 and not known:
+                    center = np.array([*middle, self._floor + _TALL])
+                    found.append(Box(center, np.array([_WIDE, _WIDE, _TALL]), name="somebody"))
         return found

@@ -5,7 +5,8 @@ Canonical metres, world.
 """
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from .places import Place, seated_pelvis, standing_pelvis
 from .plans import Hold
 from .room import Piece, Room
 from .seats import SeatPlace
-from .track import Track
+from .track import LETS_GO, Track
 from .walks import NoWay, unit_doubt, way_round
 
 __all__ = ["SPEED", "Person", "Way"]
@@ -39,6 +40,8 @@ _STANDS_BEFORE = 0.6  # metres before a seat, where one stands who has got up
 _PATIENCE = 30.0  # seconds that one waits for others
 _LOOKS_AGAIN = 0.25  # seconds between two tries to go
 _BRUSHES = 0.01  # metres by which two may come closer
+_FAR_BEYOND = 10.0  # metres beyond start and goal in which a way is looked for in the end
+_WIDER = (0.0, 0.1, 0.2)  # metres to each side that who stands is made wider: ways cut corners
 _HALT = 0.4  # seconds on a bed's edge before one lies down
 _LIES_DOWN = 3.5  # seconds
 
@@ -132,7 +135,9 @@ class Person:
         if self.track is None:
             return Way(RootPath(np.zeros((0, 3)), np.zeros(0)), goal)
         left = yield from within(self._sides_of_own_seat(), 0.0, 0.2)
-        comes = yield from within(way_in.steps(self.room, piece.name, piece.solids, seat), 0.2, 0.5)
+        standing = self._standing(seat.position)
+        job = way_in.steps(self.room, piece.name, piece.solids, seat, standing)
+        comes = yield from within(job, 0.2, 0.5)
         made = self._routed(self.leaves(), left, comes, goal, False, SPEED)
         return (yield from within(made, 0.5, 1.0))
 
@@ -154,7 +159,8 @@ class Person:
         if spot is None:
             return ()
         own = self.room.pieces().get(self.seat_name)
-        found = yield from way_in.steps(self.room, self.seat_name, own.solids if own else (), spot)
+        solids, standing = own.solids if own else (), self._standing(spot.position)
+        found = yield from way_in.steps(self.room, self.seat_name, solids, spot, standing)
         return found[::-1]
 
     def _routed(
@@ -168,23 +174,45 @@ class Person:
     ) -> Generator[float, None, Way]:
         out = left[-1] if len(left) else _before(here)
         back = comes[0] if len(comes) else _before(goal)
-        here_and_there = [np.array(here.position), np.array(goal.position)]
-        standing = self.others.standing(round(self.now * self.fps), here_and_there)
-        try:
-            corners = yield from within(self._corners(out, back, standing), 0.0, 0.5)
-        except NoWay:
-            if not standing:
-                raise
-            # Whoever stands in the way may be slipped by, or leave in time.
-            corners = yield from within(self._corners(out, back, []), 0.5, 0.9)
+        standing = self._standing(np.array(goal.position))
+        best, widest = None, -np.inf
+        for k, wider in enumerate(_WIDER if standing else _WIDER[:1]):
+            try:
+                job = self._corners(out, back, [_widened(box, wider) for box in standing])
+                corners = yield from within(job, 0.2 * k, 0.2 * k + 0.2)
+            except NoWay:
+                if best is not None:
+                    break
+                if not standing:
+                    raise
+                # Whoever stands in the way may be slipped by, or leave in time.
+                corners = yield from within(self._corners(out, back, []), 0.6, 0.9)
 
-        via = [*map(pair, left), *corners, *map(pair, comes)]
-        via = _apart(here, via, goal)
+            way = self._along(here, [*left, *corners, *comes], goal, as_one_comes, speed)
+            gap = _gap(way, standing)
+            if gap > widest:
+                best, widest = way, gap
+            if gap > APART:
+                break
+
+        assert best is not None
+        return best
+
+    def _along(
+        self, here: Stop, points: Sequence[Any], goal: Stop, as_one_comes: bool, speed: float
+    ) -> Way:
+        """The way from one stop over ``points`` (2,) to another."""
+        via = _apart(here, list(map(pair, points)), goal)
         if as_one_comes:
             last = np.array(via[-1] if via else here.position)
             goal = Stop(goal.position, facing(np.array(goal.position) - last), 0.0)
         path = route(here, *via, goal, speed=speed, fps=self.fps, floor=self.room.floor).path
         return Way(RootPath(path.position[1:], path.yaw[1:]), goal)
+
+    def _standing(self, goal: np.ndarray) -> list[Box]:
+        """Who stands or sits on the way to a ``goal`` (2,)."""
+        places = [np.array(self.leaves().position), goal]
+        return self.others.standing(round(self.now * self.fps), places)
 
     def _corners(
         self, start: np.ndarray, goal: np.ndarray, standing: Sequence[Box]
@@ -195,6 +223,11 @@ class Person:
         over_floor = np.column_stack([points, np.ones(len(points))])
         try:
             return (yield from way_round.steps(over_floor, start, goal, self.size))
+        except NoWay:
+            yield 0.5
+        try:  # out of a door that is farther away than both
+            job = way_round.steps(over_floor, start, goal, self.size, _FAR_BEYOND)
+            return (yield from job)
         except NoWay as error:
             doubt = unit_doubt(self.room.solids, [start, goal], self.room.floor, self.size)
             if doubt:
@@ -222,7 +255,7 @@ class Person:
         if self.track is None:
             self.appear(way.goal.position, way.goal.yaw)
             return
-        later = self.here.frames + round(self._getting_up() * self.fps)
+        later = self.here.frames + round(self._seconds_before_leaving() * self.fps)
         wait = self._wait_for(way, later)
         if self.bed is not None:
             self._get_up_from(self.bed)
@@ -284,8 +317,10 @@ class Person:
         self.here.let_go()
         self.bed = None
 
-    def _getting_up(self) -> float:
-        return _LIES_DOWN if self.bed is not None else 0.0
+    def _seconds_before_leaving(self) -> float:
+        if self.bed is not None:
+            return _LIES_DOWN + LETS_GO
+        return self.here.letting_go()
 
     def _swing(self, bed: Bed) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
         """From sitting on a bed's edge to lying: root (N, 2), (N,), head and hands (N, 3).
@@ -354,6 +389,17 @@ class Person:
             "Somebody else stays in the way, or comes there later; begin at another time, or go "
             "elsewhere."
         )
+
+
+def _widened(box: Box, by: float) -> Box:
+    return replace(box, half_size=box.half_size + by * np.array([1.0, 1.0, 0.0]))
+
+
+def _gap(way: Way, standing: Sequence[Box]) -> float:
+    """Metres between a way and the middles of those who stand there."""
+    path = way.path.position[:, :2]
+    gaps = [np.linalg.norm(path - box.center[:2], axis=1).min(initial=np.inf) for box in standing]
+    return float(min(gaps, default=np.inf))
 
 
 def _footprint(box: Box) -> np.ndarray:

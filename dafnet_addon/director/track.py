@@ -15,9 +15,10 @@ from ..core.series import minimum_jerk, runs, smoothstep
 from ..core.skeleton import END_EFFECTORS
 from .movements import look_matrices
 
-__all__ = ["Targets", "Track"]
+__all__ = ["LETS_GO", "Targets", "Track"]
 
-_LETS_GO = 0.7  # seconds in which a hand or head goes back to where it would be
+LETS_GO = 0.7
+"""Seconds in which a hand or head goes back to where it would be."""
 _BLEND = 0.4  # seconds of the mode EE before and after anything counts in it
 _APART = 2.5  # seconds between two uses of a hand, within which it goes from one to the other
 
@@ -115,10 +116,14 @@ class Track:
         for name, along in values.items():
             self._uses[name].append(_Use(self.frames - len(along), along, round(lead * self.fps)))
 
+    def letting_go(self) -> float:
+        """Seconds that hands and head need to go back, before the root leaves."""
+        led = any(uses and uses[-1].stop >= self.frames for uses in self._uses.values())
+        return LETS_GO if led else 0.0
+
     def let_go(self) -> None:
         """Give hands and head the time to go back, before the root leaves."""
-        if any(uses and uses[-1].stop >= self.frames for uses in self._uses.values()):
-            self.rest(_LETS_GO)
+        self.rest(self.letting_go())
 
     def targets(self, size: float) -> Targets:
         """What is asked of hands and head at all frames, in metres of which a canonical one is
@@ -179,6 +184,6 @@ class Track:
         self, values: np.ndarray, share: np.ndarray, before: _Use, after: _Use | None
     ) -> None:
         end = self.frames if after is None else after.start
-        frames = np.arange(before.stop, min(end, before.stop + round(_LETS_GO * self.fps)))
-        way = 1.0 - minimum_jerk((frames - before.stop + 1) / (_LETS_GO * self.fps + 1))
+        frames = np.arange(before.stop, min(end, before.stop + round(LETS_GO * self.fps)))
+        way = 1.0 - minimum_jerk((frames - before.stop + 1) / (LETS_GO * self.fps + 1))
         values[frames], share[frames] = before.values[-1], way

@@ -161,15 +161,20 @@ def _clear(blocked: np.ndarray, a: np.ndarray, b: np.ndarray) -> bool:
 
 @stepwise
 def way_round(
-    points: np.ndarray, start: np.ndarray, goal: np.ndarray, size: float = 1.0
+    points: np.ndarray,
+    start: np.ndarray,
+    goal: np.ndarray,
+    size: float = 1.0,
+    beyond: float = _AROUND,
 ) -> Generator[float, None, list[tuple[float, float]]]:
     """Corners (x, y) of a short way from ``start`` (2,) to ``goal`` (2,), without these, around
     furniture with surface ``points`` (N, 3), z over the floor.
 
     Raises InputError where there is no way, or the goal is too far away. ``size``: of the
-    character, over 1.75 m, by which messages give lengths.
+    character, over 1.75 m, by which messages give lengths. ``beyond``: metres beyond start and goal
+    in which the way is looked for.
     """
-    return (yield from _way([points], start, goal, 0.0, size))
+    return (yield from _way([points], start, goal, 0.0, size, beyond))
 
 
 @stepwise
@@ -208,7 +213,12 @@ class NoWay(InputError):
 
 
 def _way(
-    parts: Sequence[np.ndarray], start: np.ndarray, goal: np.ndarray, floor: float, size: float
+    parts: Sequence[np.ndarray],
+    start: np.ndarray,
+    goal: np.ndarray,
+    floor: float,
+    size: float,
+    beyond: float = _AROUND,
 ) -> Generator[float, None, list[tuple[float, float]]]:
     """``way_round`` points in ``parts``, whose z is over the world's zero."""
     both = np.stack([start, goal])
@@ -218,7 +228,7 @@ def _way(
             f"right? Choose one within {_FARTHEST * size:.0f} m, or walk there in parts."
         )
 
-    field = height_field(np.zeros((0, 3)), *around(both), _CELL)
+    field = height_field(np.zeros((0, 3)), *around(both, beyond), _CELL)
     for k, part in enumerate(parts):
         over = part - np.array([0.0, 0.0, floor])
         field.add(over[(over[:, 2] > KNEE_LOW) & (over[:, 2] < HEAD_HIGH)])
@@ -333,11 +343,13 @@ def unit_doubt(
     )
 
 
-def around(places: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def around(
+    places: Sequence[np.ndarray] | np.ndarray, beyond: float = _AROUND
+) -> tuple[np.ndarray, np.ndarray]:
     """Two corners (2,) of the floor, between which ways from one of the places (2,) to the next are
     looked for.
     """
-    return np.min(places, axis=0) - _AROUND, np.max(places, axis=0) + _AROUND
+    return np.min(places, axis=0) - beyond, np.max(places, axis=0) + beyond
 
 
 def _ahead(stop: Stop, metres: float) -> np.ndarray:

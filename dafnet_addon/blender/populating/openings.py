@@ -15,7 +15,7 @@ from ..pipeline.batch import open_file
 from ..showcase.rooms import FPS, ROOMS, build
 from .importing import READ, added_objects
 
-__all__ = ["open_room"]
+__all__ = ["empty_scene", "open_room"]
 
 _AISLE = 1.2
 """Metres between pieces that are set side by side."""
@@ -29,7 +29,7 @@ def open_room(shot: Shot) -> tuple[tuple[Path, ...], tuple[str, ...]]:
     """
     path = shot.path(shot.room)
     if shot.room in ROOMS and not path.is_file():
-        _empty()
+        empty_scene()
         build(bpy.context.scene, shot.room)
         return (), ()
 
@@ -45,7 +45,7 @@ def open_room(shot: Shot) -> tuple[tuple[Path, ...], tuple[str, ...]]:
                 f"The folder '{path}' has no pieces of furniture; put {', '.join(READ)} files "
                 "there."
             )
-        _empty()
+        empty_scene()
         _furnish(pieces)
         return tuple(pieces), ()
 
@@ -54,12 +54,13 @@ def open_room(shot: Shot) -> tuple[tuple[Path, ...], tuple[str, ...]]:
         ensure_registered()
         return (path, *_libraries()), warnings
 
-    _empty()
+    empty_scene()
     added_objects(bpy.context, path, bpy.context.scene.collection, "the room")
     return (path,), ()
 
 
-def _empty() -> None:
+def empty_scene() -> None:
+    """Open a scene without anything in it."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     ensure_registered()
     render = bpy.context.scene.render

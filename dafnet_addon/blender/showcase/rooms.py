@@ -12,7 +12,7 @@ from ...demo import Place
 from .demo_room import FURNITURE, Part, Triple, add_piece, four_legs, new_collection
 from .preview import look_at
 
-__all__ = ["FPS", "ROOMS", "build"]
+__all__ = ["FPS", "ROOMS", "build", "build_hall"]
 
 FPS = 30
 
@@ -188,8 +188,8 @@ def _cafe() -> Layout:
         ("Sofa", FURNITURE["Sofa"], Place((3.35, -2.05), radians(90.0))),
         ("Counter", _COUNTER, Place((-2.05, 1.70), pi)),
         ("Coffee Machine", _ON_COUNTER, Place((-2.55, 1.66), pi)),
-        ("Stool", _BAR_STOOL, Place((-1.55, 0.98), 0.0)),
-        ("Stool", _BAR_STOOL, Place((-2.45, 0.98), 0.0)),
+        ("Stool", _BAR_STOOL, Place((-1.35, 0.98), 0.0)),
+        ("Stool", _BAR_STOOL, Place((-2.65, 0.98), 0.0)),
         ("Menu", _MENU, Place((-2.05, 2.93), pi)),
         ("Plant", _PLANT, Place((3.55, 2.55), 0.0)),
         ("Plant", _PLANT, Place((-3.60, -2.55), 0.6)),
@@ -199,7 +199,7 @@ def _cafe() -> Layout:
         pieces=tuple(pieces),
         shell={
             "Floor": (Part("Floor", (8.2, 6.2, 0.10), (0, 0, -0.05), bevel=0.0),),
-            "Pavement": (Part("Concrete", (3.4, 7.5, 0.06), (-5.8, -0.6, -0.05), bevel=0.0),),
+            "Pavement": (Part("Concrete", (6.0, 7.5, 0.06), (-7.1, -0.6, -0.05), bevel=0.0),),
             "Rug": (Part("Rug", (2.3, 1.7, 0.010), (2.3, -1.95, 0.005), bevel=0.003),),
             "Wall Back": _wall((8.2, 0.10, 2.6), (0, 3.05, 1.30)),
             "Wall Left": _wall((0.10, 3.9, 2.6), (-4.05, 1.05, 1.30)),
@@ -215,14 +215,14 @@ def _cafe() -> Layout:
 
 _PITCH = 1.40  # metres from row to row, so that people pass before those who sit
 _WIDTH = 0.62  # metres from seat to seat
-_ROWS = 6
 _AISLE = 1.3  # metres in the middle
 
 
-def _cinema() -> Layout:
+def _cinema(row_count: int = 6) -> Layout:
+    """Rows of ten seats."""
     half = 0.5 * _AISLE
     across = [half + (k + 0.5) * _WIDTH for k in range(5)]
-    rows = [-_PITCH * row for row in range(_ROWS)]
+    rows = [-_PITCH * row for row in range(row_count)]
     pieces = [
         ("Seat", _CINEMA_SEAT, Place((side * x, y), 0.0))
         for y in rows
@@ -299,7 +299,15 @@ ROOMS: dict[str, Callable[[], Layout]] = {"cafe": _cafe, "cinema": _cinema, "off
 
 def build(scene: bpy.types.Scene, name: str) -> None:
     """Furnish an empty scene as one of ``ROOMS``, with a camera and lights."""
-    layout = ROOMS[name]()
+    _build(scene, ROOMS[name]())
+
+
+def build_hall(scene: bpy.types.Scene, rows: int) -> None:
+    """Furnish an empty scene as a cinema of so many rows of ten seats."""
+    _build(scene, _cinema(rows))
+
+
+def _build(scene: bpy.types.Scene, layout: Layout) -> None:
     scene.render.fps, scene.render.fps_base = FPS, 1.0
 
     shell = new_collection(scene, "Room")
