@@ -7,7 +7,16 @@ from typing import Any
 
 from ..core.checks import MAX_SEED
 from ..core.text import printable
-from .command import Command, Progress, Result, add_weights, number
+from ..core.wishes import Wishes
+from .command import (
+    Command,
+    Progress,
+    Result,
+    add_weights,
+    add_wishes,
+    number,
+    wishes_of,
+)
 from .console import MAX_SHOWN
 
 __all__ = ["COMMAND"]
@@ -25,7 +34,16 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--takes", type=number(int, 1), metavar="N", help="of everybody, instead of the file's"
     )
+    add_wishes(parser)
     add_weights(parser)
+
+
+def _changes(options: argparse.Namespace) -> dict[str, Any]:
+    """What the options say in place of the file, by its words."""
+    wished, usual = asdict(wishes_of(options)), asdict(Wishes())
+    changes = {word: value for word, value in wished.items() if value != usual[word]}
+    given = {word: getattr(options, word) for word in _OVERRIDES}
+    return changes | {word: value for word, value in given.items() if value is not None}
 
 
 def _run(options: argparse.Namespace, progress: Progress) -> Result:
@@ -35,9 +53,7 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
     made = populate(
         options.file,
         options.output,
-        changes={
-            word: value for word in _OVERRIDES if (value := getattr(options, word)) is not None
-        },
+        changes=_changes(options),
         weights=load_weights(options.weights) if options.weights else None,
         progress=progress,
     )

@@ -122,7 +122,7 @@ def read_shot(file: Path) -> Shot:
     return shot_of(read_tables(file, "shots"), file.parent)
 
 
-_WISHED = tuple(each.name for each in fields(Wishes))
+_WISHED = tuple(each.name for each in fields(Wishes) if each.name != "rig")
 _OWN = ("room", "seed", "seconds", "takes", "temperature", "cast", "people", "fewer")
 
 
@@ -131,6 +131,11 @@ def shot_of(data: Mapping[str, Any], folder: Path = Path()) -> Shot:
 
     Raises InputError, which names the word and the nearest one that is known, for what cannot be.
     """
+    if "rig" in data:
+        raise InputError(
+            "The shot has a 'rig', which is for one character alone; name the rig's file in the "
+            'cast: [cast] files = ["hero.blend"].'
+        )
     said = require_known(data, (*_OWN, *_WISHED), "The shot")
     room = said.get("room")
     if not isinstance(room, str) or not room.strip():

@@ -31,6 +31,8 @@ def test_people_sit_on_seats_of_their_own(blender: Any, tmp_path: Path) -> None:
     assert len(set(seats)) == 3 and all(seat.startswith("Chair") for seat in seats)
     for person, seat in zip(made.people, seats, strict=True):
         armature = blender.data.objects[person["armature"]]
+        assert armature.dafnet.furniture.name == "Furniture"
+        assert armature.dafnet.root.animation_data.action is not None, "the plan can be edited"
         place = np.array(blender.data.objects[seat].location)
         pelvis = bone_heads(armature, 30, ["pelvis"])[0]
         assert np.linalg.norm(pelvis[:2] - place[:2]) < 0.15
@@ -77,8 +79,18 @@ def test_what_is_not_ours_stays(blender: Any, tmp_path: Path) -> None:
     assert [each.name for each in tmp_path.iterdir()] == ["letter.txt"]
 
 
+def test_ground_truth_lies_beside_the_scene(blender: Any, tmp_path: Path) -> None:
+    words = cafe({"count": 2, "tasks": [{**SITS, "choose": "random"}]}, takes=2)
+    made = populate(words, tmp_path / "out", changes={"truth": True, "every": 15})
+    assert {each.name for each in (tmp_path / "out").iterdir()} == {SCENE, MANIFEST, "truth"}
+    assert {each.name for each in (tmp_path / "out/truth").iterdir()} == {"take_1", "take_2"}
+    for person in made.people:
+        assert len(person["actions"]) == len(set(person["seeds"])) == 2
+    assert len(made.content) == len(set(made.content.values())) == 4
+
+
 @pytest.mark.slow
 def test_the_example_of_the_cafe(blender: Any, tmp_path: Path) -> None:
     made = populate(ROOT / "examples/cafe.toml", tmp_path / "out")
     assert {each.name for each in (tmp_path / "out").iterdir()} == {SCENE, MANIFEST}
-    assert len(made.people) == 10 and not made.warnings
+    assert len(made.people) == 12 and not made.warnings

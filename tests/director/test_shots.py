@@ -71,6 +71,7 @@ def test_tasks_are_drawn_by_their_shares() -> None:
         ({}, {"fewer": 1}, "'fewer' is 1; write true or false"),
         ({}, {"cast": {"file": "x"}}, "The cast does not know 'file'; did you mean 'files'?"),
         ({}, {"cast": {"files": [1]}}, "not paths"),
+        ({}, {"rig": "Armature"}, "name the rig's file in the cast"),
         ({}, {"render": "framse"}, "did you mean 'frames'?"),
         ({"taks": []}, {}, "A group of people does not know 'taks'; did you mean 'tasks'?"),
         ({"tasks": [{"sit_om": "x"}]}, {}, "did you mean 'sit_on'?"),

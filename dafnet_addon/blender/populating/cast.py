@@ -11,11 +11,13 @@ from ...core.errors import InputError
 from ...core.generate import Draw
 from ...core.skeleton import STATURE
 from ...core.take import Controls, Take
+from ...director.plans import Plan
 from ...director.shots import Shot, Somebody
 from ..character.armature import create_character, is_character, metres_per_unit
 from ..character.mannequin import body_material
 from ..character.takes import add_take, play_take
 from ..compat import assign_action
+from ..directing.plan_keys import key_plan
 from ..pipeline.baker import bake, require_bakeable
 from ..rig.baker import bake_onto_rig
 from ..rig.detection import detect_map
@@ -23,7 +25,7 @@ from ..rig.properties import map_of
 from ..rig.sizing import leg_ratio
 from .importing import added_objects
 
-__all__ = ["Player", "dismiss", "hire", "play"]
+__all__ = ["Player", "dismiss", "embodied", "hire", "play"]
 
 _BUILDS = (0.9, 1.12)
 """How thick trunks and limbs are over the usual, between which a build is drawn."""
@@ -101,6 +103,24 @@ def _from_file(context: bpy.types.Context, file: Path, who: Somebody) -> bpy.typ
     return max(usable, key=lambda each: len(each.data.bones))
 
 
+def embodied(
+    context: bpy.types.Context, player: Player, plan: Plan | None, furniture: bpy.types.Collection
+) -> Player:
+    """The same, with the mannequin that plays him where nobody else does. The plan's root, targets
+    and modes are keyed on a character of ours, so that they can be edited.
+
+    All are to be made before any is baked, since Blender looks at the whole scene for each.
+    """
+    armature = player.armature
+    if armature is None:
+        armature = _mannequin(context, player.who)
+        armature.dafnet.furniture = furniture
+    if plan is not None and is_character(armature):
+        first, unit = context.scene.frame_start, metres_per_unit(context.scene)
+        key_plan(context, armature, plan, first=first, unit=unit)
+    return replace(player, armature=armature)
+
+
 def play(
     context: bpy.types.Context,
     player: Player,
@@ -114,8 +134,7 @@ def play(
     for each.
     """
     armature = player.armature
-    if armature is None:
-        armature = _mannequin(context, player.who)
+    assert armature is not None
     if is_character(armature):
         return armature, _own(context, armature, takes, draws, controls, first)
 

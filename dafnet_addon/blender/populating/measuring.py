@@ -102,8 +102,7 @@ def sixty_people(
     below ``folder``.
 
     Gives ``seconds`` of the clock and ``processor_seconds`` from words to files, ``stages``, the
-    ``megabytes`` of memory that the process ever took (0 where the system does not tell), ``people``
-    and ``frames``.
+    ``megabytes`` of memory that the process ever took, ``people`` and ``frames``.
     """
     return _measured(_viewers("cinema", 60, 8), folder / "sixty", progress)
 

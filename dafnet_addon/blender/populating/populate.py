@@ -34,9 +34,9 @@ from ..delivery.deliver import deliver
 from ..delivery.people import Played
 from ..pipeline.batch import save_scene
 from ..scene.scene_reader import read_scene
-from .cast import Player, dismiss, hire, play
+from .cast import Player, dismiss, embodied, hire, play
 from .openings import open_room
-from .surroundings import room_of
+from .surroundings import furniture_of_room, room_of
 
 if TYPE_CHECKING:
     from ...core.weights import Weights
@@ -117,13 +117,18 @@ def populate(
         lambda share: progress(_between(_PLANNED, _GENERATED, share)),
     )
     clock.done("generating")
+    clock.seconds["of which network"] = round(
+        sum(take.seconds["sampling"] / len(made) for made in takes for take in made), 3
+    )
 
     scene.frame_end = scene.frame_start + len(parts[0].controls) - 1
     played = []
-    for part, made in zip(parts, takes, strict=True):
+    furniture = furniture_of_room(scene)
+    players = [embodied(context, part.player, part.plan, furniture) for part in parts]
+    for player, part, made in zip(players, parts, takes, strict=True):
         armature, actions = play(
             context,
-            part.player,
+            player,
             takes=made,
             draws=part.draws,
             controls=part.controls,

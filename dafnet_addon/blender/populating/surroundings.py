@@ -12,7 +12,10 @@ from ...director.room import Room
 from ..character.armature import is_character, metres_per_unit
 from ..scene.furniture import meshes_in
 
-__all__ = ["room_of", "standing_objects"]
+__all__ = ["furniture_of_room", "room_of", "standing_objects"]
+
+FURNITURE = "Furniture"
+"""The name of the collection that furniture lies in."""
 
 
 def standing_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
@@ -27,6 +30,20 @@ def standing_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
         elif any(m.type == "ARMATURE" and m.object is not None for m in each.modifiers):
             bodies.add(each)
     return {each for each in scene.objects if each.visible_get()} - bodies
+
+
+def furniture_of_room(scene: bpy.types.Scene) -> bpy.types.Collection:
+    """The collection "Furniture", where the room has one, else a new one of all that stands in
+    it.
+    """
+    found = next((each for each in scene.collection.children if each.name == FURNITURE), None)
+    if found is None:
+        found = bpy.data.collections.new(FURNITURE)
+        for each in standing_objects(scene):
+            if each.type == "MESH":
+                found.objects.link(each)
+        scene.collection.children.link(found)
+    return found
 
 
 def room_of(context: bpy.types.Context) -> Room:
