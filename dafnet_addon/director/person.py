@@ -42,7 +42,6 @@ _LOOKS_AGAIN = 0.25  # seconds between two tries to go
 _BRUSHES = 0.01  # metres by which two may come closer
 _FAR_BEYOND = 10.0  # metres beyond start and goal in which a way is looked for in the end
 _WIDER = (0.0, 0.1, 0.2)  # metres to each side that who stands is made wider: ways cut corners
-_SQUEEZES = 0.06  # metres by which they may where there is no better time to go
 _HALT = 0.4  # seconds on a bed's edge before one lies down
 _LIES_DOWN = 3.5  # seconds
 
@@ -376,7 +375,6 @@ class Person:
         stay = max(0, last - first)
         end = np.array(way.goal.position)
         whole = np.concatenate([path, np.tile(end, (stay + 1, 1))])
-        best, widest = 0.0, 0.0
         for delay in np.arange(0.0, _PATIENCE, _LOOKS_AGAIN):
             waits = round(delay * self.fps)
             gone = np.concatenate([np.tile(here, (waits, 1)), whole])
@@ -386,11 +384,7 @@ class Person:
             wanted = np.where(leaving, min(APART, float(gap[0])), APART)
             if (gap >= wanted - _BRUSHES).all():
                 return float(delay)
-            if float(gap.min()) > widest:
-                best, widest = float(delay), float(gap.min())
 
-        if widest > APART - _SQUEEZES:  # nobody has to stay for ever for a shoulder's breadth
-            return best
         raise Occupied(
             "Somebody else stays in the way, or comes there later; begin at another time, or go "
             "elsewhere."

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from dafnet_addon import InputError
+from dafnet_addon.director.crowds import plan_crowd
 from dafnet_addon.director.others import APART
 from dafnet_addon.director.planner import plan_tasks
 from dafnet_addon.director.plans import Plan
 from dafnet_addon.director.room import Room
+from dafnet_addon.director.shots import Somebody
 from dafnet_addon.director.tasks import SitOn, StandUp, Task, Wait, WalkTo
 from kit.rooms import block, chair, office
 
@@ -108,22 +110,27 @@ def test_who_never_leaves_a_door_bars_it_and_that_is_said() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_five_people_mind_one_another(seed: int) -> None:
+    """Those who are planned first know where the others begin."""
     rng = np.random.default_rng(seed)
-    plans: list[Plan] = []
-    days: list[list[Task]] = [
-        [SitOn("Chair.*", seconds=3, choose="random"), StandUp(), WalkTo("Counter")],
-        [WalkTo("Whiteboard"), Wait(2), SitOn("Chair.*", seconds=3, choose="random")],
-        [WalkTo("Counter"), Wait(1), WalkTo("Lamp")],
+    days: list[tuple[Task, ...]] = [
+        (SitOn("Chair.*", seconds=3, choose="random"), StandUp(), WalkTo("Counter")),
+        (WalkTo("Whiteboard"), Wait(2), SitOn("Chair.*", seconds=3, choose="random")),
+        (WalkTo("Counter"), Wait(1), WalkTo("Lamp")),
     ]
-    for k, day in enumerate((0, 1, 2, 2, 0)):
-        plan = plan_tasks(
-            office(),
-            days[day],
-            start=(0.8 * k - 1.6, -2.6),
+    people = [
+        Somebody(
+            name=f"Person {k}",
             seed=seed,
             height=float(rng.uniform(1.55, 1.9)),
             begins=float(rng.uniform(0.0, 3.0)),
-            others=plans,
+            start=(0.8 * k - 1.6, -2.6),
+            heading=0.0,
+            tasks=days[day],
+            character=None,
+            cast=None,
+            take_seeds=(0,),
         )
-        plans.append(plan)
+        for k, day in enumerate((0, 1, 2, 2, 0))
+    ]
+    plans = [each.plan for each in plan_crowd(office(), people, 30.0).people]
     assert _closest(plans) > 0.46
