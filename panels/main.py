@@ -114,6 +114,10 @@ class DAFNET_PT_character(bpy.types.Panel):
             layout.prop(settings, "upper_body_source", icon="ARMATURE_DATA")
             if settings.upper_body_source is None:
                 layout.prop(settings, "upper_body_take", icon="ACTION")
+            else:
+                row = layout.row(align=True)
+                row.prop(settings, "source_offset")
+                row.prop(settings, "source_loops", toggle=True)
         if animated:
             layout.prop(settings, "blend_frames")
 

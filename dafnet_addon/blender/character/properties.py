@@ -232,6 +232,18 @@ class CharacterSettings(bpy.types.PropertyGroup):
         options=set(),
         description="Take whose upper body is copied when no source armature is chosen",
     )
+    source_offset: IntProperty(
+        name="Offset",
+        default=0,
+        options=set(),
+        description="Frames by which the source plays later here than in the scene",
+    )
+    source_loops: BoolProperty(
+        name="Loop",
+        default=False,
+        options=set(),
+        description="Play the source's action over and over, from its first frame to its last",
+    )
     use_scene_range: BoolProperty(
         name="Scene Range",
         default=True,

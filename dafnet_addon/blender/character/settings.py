@@ -39,8 +39,9 @@ class Settings:
     ``mode``: None reads the armature's property frame by frame, a mode overrides it.
     ``frame_start`` and ``frame_end`` are both generated. ``take_count``: takes to make;
     ``lower_seed``, ``lower_temperature``: the legs' own; None for those of the upper body.
-    ``kept``: the action of a take whose motion stays before the scene's frame ``kept_until``.
-    ``plant_feet`` and those below it: strengths of the clean-up.
+    ``source_offset``: frames by which the upper body's source plays later; ``source_loops``: over
+    and over. ``kept``: the action of a take whose motion stays before the scene's frame
+    ``kept_until``. ``plant_feet`` and those below it: strengths of the clean-up.
     """
 
     armature: str
@@ -54,6 +55,8 @@ class Settings:
     foot_right: str | None = None
     upper_body_source: str | None = None
     upper_body_take: str | None = None
+    source_offset: int = 0
+    source_loops: bool = False
     mode: str | None = None
     frame_start: int = 1
     frame_end: int = 250
@@ -86,6 +89,7 @@ class Settings:
                 "set the end after the start."
             )
 
+        whole(self.source_offset, "The source's offset", -_LAST_FRAME, _LAST_FRAME)
         whole(self.frame_end - self.frame_start + 1, "The length of the frame range", 1, MAX_FRAMES)
         whole(self.take_count, "The number of takes", 1, MAX_TAKES)
         for seed in (self.seed, self.lower_seed or 0):
@@ -115,7 +119,16 @@ def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides:
         "frame_end": scene.frame_end if own.use_scene_range else own.frame_end,
         **{
             name: getattr(own, name)
-            for name in ("seed", "temperature", "noise", "take_count", "blend_frames", *CLEAN_UP)
+            for name in (
+                "seed",
+                "temperature",
+                "noise",
+                "take_count",
+                "blend_frames",
+                "source_offset",
+                "source_loops",
+                *CLEAN_UP,
+            )
         },
     }
 

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import InputError
-from ...core.progress import stepwise
+from ...core.progress import stepwise, within
 from ...core.skeleton import JOINTS
 from ...core.solids import Scene
 from ...core.take import Controls
@@ -29,6 +29,7 @@ from .furniture import Furniture, array, furniture_of
 from .lookup import find_object, find_scene
 from .playback import play_steps
 from .upper_body import (
+    frames_of_source,
     rigid_matrices,
     upper_body_of_source,
     upper_body_of_take,
@@ -116,6 +117,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     # Furniture is read at the first frame; simulations that began earlier have shaped it by then.
     simulations += [each for each in dependencies.simulations(members) if each.since < frames[0]]
     tracks = _Tracks(armature, root=root, targets=targets, source=source, places=places)
+    seen, at = frames_of_source(settings, source, frames) if source else (frames, np.arange(0))
 
     def look(frame: int, depsgraph: bpy.types.Depsgraph, shaped: set[bpy.types.Object]) -> None:
         if frame == frames[0]:
@@ -125,8 +127,17 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
         elif furniture:
             furniture.add(depsgraph, shaped)
         tracks.add(depsgraph)
+        if seen == frames:
+            tracks.add_source(depsgraph)
 
-    yield from play_steps(context, frames, simulations, look)
+    def look_at_source(_frame: int, depsgraph: bpy.types.Depsgraph, _shaped: Any) -> None:
+        tracks.add_source(depsgraph)
+
+    job = play_steps(context, frames, simulations, look)
+    yield from within(job, 0.0, 0.9 if seen == frames else 0.5)
+    if seen != frames:
+        job = play_steps(context, seen, dependencies.simulations(sources), look_at_source)
+        yield from within(job, 0.5, 0.9)
 
     modes = [settings.mode] * len(frames) if settings.mode else tracks.modes
     warnings = tuple(_warnings(armature, furniture, dependencies, simulations))
@@ -140,6 +151,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
             tracks,
             dependencies,
             source_map=source_map,
+            at=at,
             modes=modes,
             root=root_matrices,
             unit=unit,
@@ -222,6 +234,8 @@ class _Tracks:
             self.targets[role].append(array(evaluated.matrix_world))
             self.local[role].append(array(evaluated.matrix_local))
 
+    def add_source(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Note how the upper body's source is in the frame that the scene shows now."""
         if self.source:
             evaluated = self.source.evaluated_get(depsgraph)
             self.bodies.append(array(evaluated.matrix_world))
@@ -256,6 +270,7 @@ def _upper_body(
     dependencies: Dependencies,
     *,
     source_map: RigMap | None,
+    at: np.ndarray,
     modes: list[str],
     root: np.ndarray,
     unit: float,
@@ -286,6 +301,7 @@ def _upper_body(
         source_map,
         bones=np.array(tracks.bones),
         bodies=np.array(tracks.bodies),
+        at=at,
         unit=unit,
         root=root,
         size=size,

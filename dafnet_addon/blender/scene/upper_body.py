@@ -27,7 +27,13 @@ from ..rig.properties import map_of
 from ..rig.reading import joints_of
 from .lookup import find_action, find_object
 
-__all__ = ["rigid_matrices", "upper_body_of_source", "upper_body_of_take", "upper_body_source"]
+__all__ = [
+    "frames_of_source",
+    "rigid_matrices",
+    "upper_body_of_source",
+    "upper_body_of_take",
+    "upper_body_source",
+]
 
 _LIMB_TOLERANCE = 8.0
 """Degrees in the mean that limbs of a copied upper body may be off before the user is warned."""
@@ -54,6 +60,29 @@ def upper_body_source(
     rig_map = map_of(source)
     require_usable(source, rig_map)
     return source, rig_map
+
+
+def frames_of_source(
+    settings: Settings, source: bpy.types.Object, frames: range
+) -> tuple[range, np.ndarray]:
+    """The frames of the scene in which the source has to be seen, and which of them is copied at
+    each frame (T,) of the shot, by its offset and loop.
+
+    ``InputError``: it is to loop, and plays no action of two frames or more.
+    """
+    wanted = np.array(frames) - settings.source_offset
+    if settings.source_loops:
+        action = source.animation_data.action if source.animation_data else None
+        first, last = (round(frame) for frame in action.frame_range) if action else (0, 0)
+        if last <= first:
+            raise InputError(
+                f"The upper body's source '{source.name}' plays no action that could loop; give it "
+                "one, or switch Loop off."
+            )
+        wanted = first + (wanted - first) % (last - first)
+
+    span = range(int(wanted.min()), int(wanted.max()) + 1)
+    return span, wanted - span[0]
 
 
 def upper_body_of_take(
@@ -92,6 +121,7 @@ def upper_body_of_source(
     *,
     bones: np.ndarray,
     bodies: np.ndarray,
+    at: np.ndarray,
     unit: float,
     root: np.ndarray,
     size: float,
@@ -100,8 +130,9 @@ def upper_body_of_source(
     """Upper body (T, 14, 3), world metres, on this character's ``root`` (T, 4, 4) and of its
     ``size``; and in words which limbs are off by how much, empty where none is.
 
-    ``bones`` (T, 22, 4, 4): the source's bones in its own space; ``bodies`` (T, 4, 4): its object's
-    matrices; both in Blender units.
+    ``bones`` (N, 22, 4, 4): the source's bones in its own space; ``bodies`` (N, 4, 4): its object's
+    matrices; both in Blender units, in the frames in which it was seen; ``at`` (T,): which of them
+    are copied.
     """
     what = f"upper body's source '{source.name}'"
     there = np.array([rig_map is None or rig_map.place(name) is not None for name in JOINTS])
@@ -135,7 +166,7 @@ def upper_body_of_source(
         if degrees > _LIMB_TOLERANCE
     )
     local = ratio * to_root(path, joints[:, list(UPPER)])
-    return _on_own_root(root, fps, local), f"{far} off" if far else ""
+    return _on_own_root(root, fps, local[at]), f"{far} off" if far else ""
 
 
 def _on_own_root(root: np.ndarray, fps: float, local: np.ndarray) -> np.ndarray:

@@ -67,6 +67,35 @@ def test_full_mode_refuses_what_it_does_not_know(stage: RigStage) -> None:
         read_scene(bpy.context, settings)
 
 
+def test_a_source_plays_later_and_over_and_over(stage: RigStage) -> None:
+    """What is copied at a frame is what is copied without them at the frame that they lead to; the
+    frames of the scene are read again for it, and the current one comes back.
+    """
+    stage.play("write")
+    bob, ann = stage.ann, create_character(bpy.context, "Ann")
+    ann.dafnet.upper_body_source, ann.dafnet.mode = bob, "FULL"
+    stage.scene.frame_start, stage.scene.frame_end = 1, 30
+    stage.scene.frame_set(7)
+
+    def read(frames: tuple[int, int] = (1, 30), **asked: Any) -> np.ndarray:
+        first, last = frames
+        settings = settings_of(ann, stage.scene, frame_start=first, frame_end=last, **asked)
+        return read_scene(bpy.context, settings).controls.upper_body
+
+    plain = read()
+    later = read((11, 30), source_offset=10)
+    assert np.abs(later - plain[:20]).max() < 0.01
+    length = len(stage.take) - 1
+    over = read((1, length + 20), source_offset=-5, source_loops=True)
+    assert np.abs(over[length : length + 15] - over[:15]).max() < 1e-6
+    assert np.abs(over[:25] - plain[5:]).max() < 0.01
+    assert stage.scene.frame_current == 7
+
+    bob.animation_data_clear()
+    with pytest.raises(InputError, match="plays no action that could loop"):
+        read(source_loops=True)
+
+
 ENDS = {
     "upper arms": ((16, 18), (17, 19)),
     "forearms": ((18, 20), (19, 21)),
