@@ -80,7 +80,8 @@ def packed(take: Take, controls: Controls) -> bytes:
             if isinstance(value, RootPath):
                 arrays |= {f"{name}.position": value.position, f"{name}.yaw": value.yaw}
             elif isinstance(value, np.ndarray):
-                arrays[name] = value
+                if len(value) or name not in _LATER:
+                    arrays[name] = value
             elif value is not None:
                 plain[name] = _sayable(value)
 

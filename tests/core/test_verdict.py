@@ -32,7 +32,9 @@ def test_who_sits_well_is_told_so_and_the_file_keeps_it() -> None:
     assert [each.word for each in take.verdict] == ["sits"] and take.verdict[0].good
     assert "'Stool'" in take.verdict[0].text
     assert unpacked(packed(take, CONTROLS))[0].verdict == take.verdict
-    assert unpacked(packed(replace(take, verdict=()), CONTROLS))[0].verdict == ()
+    bare = replace(take, verdict=(), touches=np.zeros((0, 4)))
+    kept = unpacked(packed(bare, CONTROLS))[0]
+    assert kept.verdict == () and kept.touches.shape == (0, 4)
 
 
 def test_hovering_sinking_and_standing_are_told_apart() -> None:
