@@ -39,7 +39,7 @@ def main(folder: Path, output: Path, frame: int | None = None, take: int = 1) ->
     frame = frames[len(frames) // 2] if frame is None else frame
     index = frames.index(frame)
 
-    picture = folder / "frames" / f"take_{take}" / camera["name"] / f"{frame:04d}.png"
+    picture = folder / "frames" / f"take_{take}" / camera["folder"] / f"{frame:04d}.png"
     figure = pyplot.figure(figsize=(camera["width"] / 100, camera["height"] / 100), dpi=200)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()

@@ -1,13 +1,14 @@
 """``dafnet bake``: motion for the character of a .blend file, without a window."""
 
 import argparse
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import InputError
 from ..core.take import MODES
 from ..core.text import printable
+from ..core.wishes import Wishes
 from ..director.task_lists import read_task_file
 from ..director.tasks import said
 from .command import (
@@ -19,7 +20,7 @@ from .command import (
     add_wishes,
     frame_range,
     number,
-    wishes_of,
+    wished,
 )
 from .console import MAX_SHOWN
 
@@ -174,7 +175,7 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
         tasks=read_task_file(options.tasks) if options.tasks else (),
         already_there=options.already_there,
         find=options.find,
-        wishes=replace(wishes_of(options), rig=options.rig),
+        wishes=Wishes(rig=options.rig, **wished(options)),
     )
     result = written.result
 

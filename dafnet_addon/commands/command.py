@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.checks import MAX_SEED
-from ..core.wishes import EXPORTED, RENDERED, ROOT_MOTIONS, Wishes
+from ..core.wishes import EXPORTED, RENDERED, ROOT_MOTIONS
 
 __all__ = [
     "MAX_PROCESSES",
@@ -20,7 +20,7 @@ __all__ = [
     "add_wishes",
     "frame_range",
     "number",
-    "wishes_of",
+    "wished",
 ]
 
 Progress = Callable[[float], None]
@@ -77,21 +77,22 @@ def add_weights(parser: argparse.ArgumentParser) -> None:
 
 
 def add_wishes(parser: argparse.ArgumentParser) -> None:
-    """What is delivered of a shot besides the scene; ``wishes_of`` reads it."""
+    """What is delivered of a shot besides the scene; ``wished`` reads it."""
     parser.add_argument(
-        "--truth", action="store_true", help="ground truth: joints, contacts, tasks … as numbers"
+        "--truth",
+        action="store_true",
+        default=None,
+        help="ground truth: joints, contacts, tasks … as numbers",
     )
     parser.add_argument(
         "--render",
         nargs="+",
         metavar="WHAT",
-        default=(),
         help=f"pictures by the scene's cameras: {', '.join(RENDERED)}",
     )
     parser.add_argument(
         "--every",
         type=number(int, 1),
-        default=1,
         metavar="N",
         help="cameras look at every N-th frame only",
     )
@@ -99,26 +100,19 @@ def add_wishes(parser: argparse.ArgumentParser) -> None:
         "--export",
         nargs="+",
         metavar="FORMAT",
-        default=(),
         help=f"a file for each character and take: {', '.join(EXPORTED)}",
     )
     parser.add_argument(
         "--root-motion",
         choices=ROOT_MOTIONS,
-        default="bone",
-        help="with --export: what carries the character over the floor",
+        help="with --export: what carries the character over the floor; a bone if left out",
     )
 
 
-def wishes_of(options: argparse.Namespace) -> Wishes:
-    """What the options of ``add_wishes`` say. Raises InputError for a word that is not known."""
-    return Wishes(
-        truth=options.truth,
-        render=options.render,
-        every=options.every,
-        export=options.export,
-        root_motion=options.root_motion,
-    )
+def wished(options: argparse.Namespace) -> dict[str, Any]:
+    """The words of ``Wishes`` that the options of ``add_wishes`` say."""
+    words = ("truth", "render", "every", "export", "root_motion")
+    return {word: value for word in words if (value := getattr(options, word)) is not None}
 
 
 def number(

@@ -7,16 +7,7 @@ from typing import Any
 
 from ..core.checks import MAX_SEED
 from ..core.text import printable
-from ..core.wishes import Wishes
-from .command import (
-    Command,
-    Progress,
-    Result,
-    add_weights,
-    add_wishes,
-    number,
-    wishes_of,
-)
+from .command import Command, Progress, Result, add_weights, add_wishes, number, wished
 from .console import MAX_SHOWN
 
 __all__ = ["COMMAND"]
@@ -40,10 +31,8 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _changes(options: argparse.Namespace) -> dict[str, Any]:
     """What the options say in place of the file, by its words."""
-    wished, usual = asdict(wishes_of(options)), asdict(Wishes())
-    changes = {word: value for word, value in wished.items() if value != usual[word]}
     given = {word: getattr(options, word) for word in _OVERRIDES}
-    return changes | {word: value for word, value in given.items() if value is not None}
+    return wished(options) | {word: value for word, value in given.items() if value is not None}
 
 
 def _run(options: argparse.Namespace, progress: Progress) -> Result:

@@ -3,6 +3,7 @@ tasks, contacts, penetration; masks and depth agree with it, and nothing of the 
 """
 
 import json
+import runpy
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -23,6 +24,7 @@ from mathutils import Vector
 
 from kit.delivered import Shot, numbers_in
 from kit.messages import one_sentence
+from kit.places import ROOT
 from kit.stage import bone_heads
 
 OUTSIDE, HIDDEN, SEEN = 0, 1, 2
@@ -240,6 +242,23 @@ def test_cameras_of_nearly_one_name_have_folders_of_their_own(shot: Shot, tmp_pa
     shot.truth(tmp_path, every=50, render=("masks",))
     folders = [folder.name for folder in (tmp_path / "frames" / "take_1").iterdir()]
     assert len({name.lower() for name in folders}) == 4 and "aux" not in folders
+
+
+def test_the_example_draws_it_over_a_frame(shot: Shot, tmp_path: Path) -> None:
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    pyplot.switch_backend("agg")
+    shot.scene.render.engine = "CYCLES"
+    shot.scene.cycles.samples = 1
+    shot.deliver(tmp_path, truth=True, render=("frames",), every=6)
+    draw = runpy.run_path(str(ROOT / "examples" / "read_truth.py"))["main"]
+    (said,) = draw(tmp_path, tmp_path / "drawn.png", 11)
+    assert said.startswith("Ann: without a task; touches ") and said.endswith("joints seen")
+    frame = pyplot.imread(tmp_path / "frames" / "take_1" / "Side" / "0011.png")
+    drawn = pyplot.imread(tmp_path / "drawn.png")[::2, ::2, :3]
+    blue = drawn[..., 2] - drawn[..., 0] > 0.4
+    assert drawn.shape[:2] == frame.shape[:2] and 50 < blue.sum() < 1500, "a stick figure"
+    rows, columns = np.nonzero(blue)
+    assert np.ptp(rows) > 30 and np.ptp(columns) < 60
 
 
 def test_what_cannot_be_delivered_is_said(shot: Shot, tmp_path: Path) -> None:

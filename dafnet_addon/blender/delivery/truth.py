@@ -30,7 +30,7 @@ from ..populating.surroundings import standing_objects
 from ..scene.dependencies import Dependencies
 from ..scene.furniture import Furniture, meshes_in, rendered
 from .cameras import DEPTHS, Sights, View, cameras_of, view_of
-from .people import Body, Played, file_names, playing
+from .people import Body, Played, distinct_names, file_names, playing
 
 __all__ = ["Truth", "looked_at", "numbered", "truth_of", "write_truth"]
 
@@ -347,17 +347,23 @@ def _shared(
             for person, name in zip(people, file_names(people), strict=True)
         ],
         "objects": {str(k): name for k, (name, _) in objects.items()},
-        "cameras": [_camera(look, unit) for look in looks],
+        "cameras": [
+            _camera(look, unit, name)
+            for look, name in zip(
+                looks, distinct_names([look.camera.name for look in looks]), strict=True
+            )
+        ],
     }
 
 
-def _camera(look: _Looks, unit: float) -> dict[str, Any]:
+def _camera(look: _Looks, unit: float, folder: str) -> dict[str, Any]:
     metres = np.array([1.0, 1.0, 1.0, unit])
     places = [view.to_camera * metres for view in look.views]
     for place in places:
         place[3, 3] = 1.0
     return {
         "name": look.camera.name,
+        "folder": folder,
         "width": look.views[0].size[0],
         "height": look.views[0].size[1],
         "intrinsics": _plain(np.array([view.intrinsics() for view in look.views])),
