@@ -36,6 +36,8 @@ _FASTER = 1.7
 _EARLY = 0.7
 """Of the time that a quiet run takes: until then all kills are done."""
 _TICK = 0.02  # seconds
+_TAKE = ": "
+"""Between a scene's name and its take's."""
 
 
 @dataclass(frozen=True)
@@ -110,8 +112,9 @@ def _made(shots: Path, output: Path, *more: object) -> float:
 
 
 def _contents(output: Path) -> dict[str, str]:
-    """A hash of the keys of each take, by scene and action. Raises RuntimeError for a scene that is
-    half-written, and for what is left over beside them.
+    """A hash of the keys of each action and of each take, by scene and name.
+
+    Raises RuntimeError for a scene that is half-written, and for what is left over beside them.
     """
     from dafnet_addon.blender.pipeline.contents import key_hashes
 
@@ -119,11 +122,18 @@ def _contents(output: Path) -> dict[str, str]:
     for each in sorted(output.iterdir()):
         if not each.is_dir() or each.name == "logs":
             continue
-        if each.name.startswith(".") or read_manifest(each) is None:
+        manifest = read_manifest(each)
+        if each.name.startswith(".") or manifest is None:
             raise RuntimeError(f"'{each}' is half-written or left over")
         for action, digest in key_hashes(each / "scene.blend").items():
             found[f"{each.name}/{action}"] = digest
+        found |= {f"{each.name}{_TAKE}{take}": digest for take, digest in manifest.content.items()}
     return found
+
+
+def _takes(contents: dict[str, str]) -> int:
+    """How many takes are among contents."""
+    return sum(_TAKE in name for name in contents)
 
 
 def _children(process: int) -> list[int]:
@@ -147,7 +157,7 @@ def kills(options: Options) -> Iterator[Row]:
     expected = _contents(quiet)
     chance = random.Random(options.seed)
 
-    told, holds = [], len(expected) == options.scenes * options.takes
+    told, holds = [], _takes(expected) == options.scenes * options.takes
     for turn in range(1, options.rounds + 1):
         output = options.folder / f"killed_{turn}"
         drivers, tasks = _killed(shots, output, options, seconds, chance)
@@ -163,14 +173,14 @@ def kills(options: Options) -> Iterator[Row]:
         holds = holds and same and process.returncode == 0
         told.append(
             f"{drivers} drivers and {tasks} processes killed, then {runs} run to the end: "
-            f"{len(found)} takes, {'the same' if same else 'NOT the same'}"
+            f"{_takes(found)} takes, {'the same' if same else 'NOT the same'}"
         )
 
     yield Row(
         f"{options.scenes} scenes of {options.takes} takes of {options.frames} frames, killed "
         f"{options.kills} times, {options.rounds} times over",
         "all takes, none twice, none half-written, as in one quiet run",
-        f"quiet: {len(expected)} takes in {duration(seconds)}; " + "; ".join(told),
+        f"quiet: {_takes(expected)} takes in {duration(seconds)}; " + "; ".join(told),
         holds,
     )
 

@@ -68,7 +68,9 @@ def test_shots_are_made_by_populate(jobs: Path, tmp_path: Path) -> None:
     assert first is not None and first.takes == 2 and len(first.content) == 2
     assert [Path(each).name for each in first.inputs] == ["small.blend"]
     before = {name: key_hashes(out / name / "scene.blend") for name in ("scene_001", "scene_002")}
-    assert len({digest for hashes in before.values() for digest in hashes.values()}) == 4
+    second = read_manifest(out / "scene_002")
+    assert second is not None
+    assert len({*first.content.values(), *second.content.values()}) == 4, "no two takes are alike"
 
     process = started(jobs, "-o", out, "--only", "scene_*")
     process.communicate()
