@@ -94,7 +94,7 @@ def look(batch: Batch) -> Iterator[Outcome]:
         manifest = read_manifest(batch.folder(shot.name))
         changed = manifest and manifest.what_changed(shot.words_hash, weights)
         if manifest and not changed:
-            yield Outcome(shot.name, "unchanged", seconds=sum(manifest.seconds.values()))
+            yield Outcome(shot.name, "unchanged", seconds=manifest.all_seconds)
         elif said := _last_sentence(batch.log(shot.name)):
             yield Outcome(shot.name, "failed", said, log=batch.log(shot.name))
         else:

@@ -61,6 +61,12 @@ class Manifest:
     content: Mapping[str, str] = field(default_factory=dict)
     version: str = field(default_factory=lambda: current_version())
 
+    @property
+    def all_seconds(self) -> float:
+        """Of all stages; what is told as "of which …" is a part of another."""
+        parts = self.seconds.items()
+        return sum(spent for stage, spent in parts if not stage.startswith("of which "))
+
     def save(self, folder: Path) -> None:
         """Write it into the shot's folder. Raises InputError where the disk refuses."""
         save_text(folder / MANIFEST, json.dumps(asdict(self), indent=2))

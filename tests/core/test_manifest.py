@@ -26,7 +26,7 @@ def made(tmp_path: Path) -> tuple[Manifest, Path]:
         takes=3,
         weights="abc",
         inputs={str(room): content_hash(room)},
-        seconds={"network": 1.5},
+        seconds={"reading": 0.5, "generating": 2.0, "of which network": 1.5},
         metrics={"foot_sliding_per_frame": 0.1},
         warnings=("It is dark.",),
         people=({"name": "Ann"},),
@@ -40,6 +40,7 @@ def test_it_is_read_back(tmp_path: Path) -> None:
     shot.save(tmp_path)
     found = read_manifest(tmp_path)
     assert found is not None and found.version == current_version()
+    assert found.all_seconds == 2.5
     assert (found.seed, found.inputs, found.metrics) == (7, shot.inputs, shot.metrics)
     assert list(found.warnings) == ["It is dark."] and found.people[0]["name"] == "Ann"
 
