@@ -4,11 +4,12 @@ Dask hands them out, and hands out anew what a worker was making that is gone. E
 process of its own, started by the worker; it ends when the worker does.
 """
 
+import gc
 import logging
 import secrets
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
@@ -42,13 +43,17 @@ def cluster_workers(address: str, output: Path) -> Iterator[Workers]:
     from distributed import Client
 
     with _quiet():
-        try:
+        client = None
+        with suppress(OSError, ValueError, TimeoutError):
             client = Client(address, timeout=_ANSWERS, set_as_default=False)
-        except (OSError, ValueError, TimeoutError) as error:
+        if client is None:
+            # What is left of it ends here, and not while another one starts: the two would wait for
+            # one another.
+            gc.collect()
             raise InputError(
                 f"No Dask scheduler answers at '{printable(address, 100)}'; start one with 'dask "
                 "scheduler', or check the address."
-            ) from error
+            )
 
         with client:
             _check(client, address, output)
