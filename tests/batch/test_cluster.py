@@ -59,8 +59,13 @@ def scheduler(tmp_path: Path) -> Iterator[str]:
     file = tmp_path / "scheduler.json"
     options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
     with started(*_DASK, *options, "--scheduler-file", str(file)):
-        wait_until(file.exists, 60.0)
-        yield str(json.loads(file.read_text(encoding="utf-8"))["address"])
+        yield address_in(file)
+
+
+def address_in(file: Path) -> str:
+    """The address in a scheduler's file, once all of that is written."""
+    wait_until(lambda: file.exists() and file.read_text(encoding="utf-8").endswith("}"), 60.0)
+    return str(json.loads(file.read_text(encoding="utf-8"))["address"])
 
 
 @contextmanager
@@ -138,8 +143,7 @@ def test_a_scheduler_that_is_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
     of = batch(tmp_path, shot("quick") + shot("slow", seconds=60.0))
     with started(*_DASK, *options, "--scheduler-file", str(file)) as process:
-        wait_until(file.exists, 60.0)
-        address = json.loads(file.read_text(encoding="utf-8"))["address"]
+        address = address_in(file)
         with worker(address):
 
             def kill() -> None:
