@@ -257,7 +257,7 @@ def test_linked_and_overridden_characters(
     )
     bpy.context.view_layer.objects.active = shot.ann
     said = shot.refused()
-    assert "is linked or a library override; make it local" in said
+    assert "is linked, or an override that may not be edited; make an editable" in said
     code, _, err = shot.command(capsys, "--character", shot.ann.name_full)
     assert (code, err) == (1, f"dafnet: {said}")
 

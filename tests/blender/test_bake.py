@@ -328,7 +328,7 @@ def test_what_cannot_be_baked_is_refused_and_left_alone(blender, tmp_path) -> No
     linked = wanted.objects[0]
     blender.context.scene.collection.objects.link(linked)
     refused("linked", character=linked)
-    refused("linked", character=linked.override_create())
+    refused("were moved", character=linked.override_create())
 
 
 def test_a_longer_take_is_baked_in_as_many_calls(blender) -> None:

@@ -24,6 +24,10 @@ from .task_rows import TaskRow
 __all__ = ["CharacterSettings", "TakeSettings", "ensure_registered", "register", "unregister"]
 
 
+_LOCALLY = {"LIBRARY_OVERRIDABLE"}
+"""What a library override of a character keeps in its own file."""
+
+
 def _is_armature(_settings: "CharacterSettings", candidate: bpy.types.Object) -> bool:
     return candidate.type == "ARMATURE" and candidate != _settings.id_data
 
@@ -124,13 +128,14 @@ class TakeSettings(bpy.types.PropertyGroup):
 class TakeLink(bpy.types.PropertyGroup):
     """A row in a character's list of takes."""
 
-    action: PointerProperty(type=bpy.types.Action, options=set())
+    action: PointerProperty(type=bpy.types.Action, options=set(), override=_LOCALLY)
 
 
 class CharacterSettings(bpy.types.PropertyGroup):
     """Settings of one character."""
 
     mode: EnumProperty(
+        override=_LOCALLY,
         name="Mode",
         default="FREE",
         description="What drives the upper body. Keyframe it to change it during the shot",
@@ -150,6 +155,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ],
     )
     furniture: PointerProperty(
+        override=_LOCALLY,
         name="Furniture",
         type=bpy.types.Collection,
         options=set(),
@@ -159,6 +165,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     root: PointerProperty(
+        override=_LOCALLY,
         name="Root",
         type=bpy.types.Object,
         poll=_is_not_the_character,
@@ -166,6 +173,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         description="Animated object on the ground under the pelvis: X right, Y forward, Z up",
     )
     head: PointerProperty(
+        override=_LOCALLY,
         name="Head",
         type=bpy.types.Object,
         poll=_is_not_the_character,
@@ -176,6 +184,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     hand_left: PointerProperty(
+        override=_LOCALLY,
         name="Left Hand",
         type=bpy.types.Object,
         poll=_is_not_the_character,
@@ -186,6 +195,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     hand_right: PointerProperty(
+        override=_LOCALLY,
         name="Right Hand",
         type=bpy.types.Object,
         poll=_is_not_the_character,
@@ -196,6 +206,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     foot_left: PointerProperty(
+        override=_LOCALLY,
         name="Left Foot",
         type=bpy.types.Object,
         poll=_is_not_the_character,
@@ -206,6 +217,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     foot_right: PointerProperty(
+        override=_LOCALLY,
         name="Right Foot",
         type=bpy.types.Object,
         poll=_is_not_the_character,
@@ -216,6 +228,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     upper_body_source: PointerProperty(
+        override=_LOCALLY,
         name="Source",
         type=bpy.types.Object,
         poll=_is_armature,
@@ -226,6 +239,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     upper_body_take: PointerProperty(
+        override=_LOCALLY,
         name="Take",
         type=bpy.types.Action,
         poll=_is_take,
@@ -233,30 +247,42 @@ class CharacterSettings(bpy.types.PropertyGroup):
         description="Take whose upper body is copied when no source armature is chosen",
     )
     source_offset: IntProperty(
+        override=_LOCALLY,
         name="Offset",
         default=0,
         options=set(),
         description="Frames by which the source plays later here than in the scene",
     )
     source_loops: BoolProperty(
+        override=_LOCALLY,
         name="Loop",
         default=False,
         options=set(),
         description="Play the source's action over and over, from its first frame to its last",
     )
     use_scene_range: BoolProperty(
+        override=_LOCALLY,
         name="Scene Range",
         default=True,
         options=set(),
         description="Generate the frames from the scene's start to its end",
     )
     frame_start: IntProperty(
-        name="Start", default=1, options=set(), description="First frame to generate"
+        override=_LOCALLY,
+        name="Start",
+        default=1,
+        options=set(),
+        description="First frame to generate",
     )
     frame_end: IntProperty(
-        name="End", default=250, options=set(), description="Last frame to generate"
+        override=_LOCALLY,
+        name="End",
+        default=250,
+        options=set(),
+        description="Last frame to generate",
     )
     seed: IntProperty(
+        override=_LOCALLY,
         name="Seed",
         default=0,
         min=0,
@@ -264,6 +290,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         description=("Another number gives another take, if the temperature is above zero"),
     )
     take_count: IntProperty(
+        override=_LOCALLY,
         name="Takes",
         default=1,
         min=1,
@@ -275,17 +302,32 @@ class CharacterSettings(bpy.types.PropertyGroup):
             "temperature 1 if the temperature is 0"
         ),
     )
-    takes: CollectionProperty(type=TakeLink, options=set(), description="Takes of this character")
+    takes: CollectionProperty(
+        type=TakeLink,
+        options=set(),
+        override={*_LOCALLY, "USE_INSERTION"},
+        description="Takes of this character",
+    )
     active_take: IntProperty(
-        name="Take", options=set(), description="The take that the buttons below act on"
+        override=_LOCALLY,
+        name="Take",
+        options=set(),
+        description="The take that the buttons below act on",
     )
     tasks: CollectionProperty(
-        type=TaskRow, options=set(), description="What this character is to do, in this order"
+        override={*_LOCALLY, "USE_INSERTION"},
+        type=TaskRow,
+        options=set(),
+        description="What this character is to do, in this order",
     )
     active_task: IntProperty(
-        name="Task", options=set(), description="The task that the buttons below act on"
+        override=_LOCALLY,
+        name="Task",
+        options=set(),
+        description="The task that the buttons below act on",
     )
     already_there: BoolProperty(
+        override=_LOCALLY,
         name="Already There",
         options=set(),
         description=(
@@ -294,9 +336,12 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     planned: StringProperty(
-        options={"HIDDEN"}, description="What tells the keys that were planned from edited ones"
+        override=_LOCALLY,
+        options={"HIDDEN"},
+        description="What tells the keys that were planned from edited ones",
     )
     blend_frames: IntProperty(
+        override=_LOCALLY,
         name="Blend",
         default=10,
         min=0,
@@ -305,6 +350,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         description="Number of frames over which the body blends into the new mode",
     )
     head_influence: FloatProperty(
+        override=_LOCALLY,
         name="Head Influence",
         default=1.0,
         min=0.0,
@@ -316,6 +362,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     head_follows: EnumProperty(
+        override=_LOCALLY,
         name="Head Follows",
         default="ALL",
         description="What of the head's target counts. Keyframe it to change it during the shot",
@@ -326,6 +373,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ],
     )
     hand_left_influence: FloatProperty(
+        override=_LOCALLY,
         name="Left Hand Influence",
         default=1.0,
         min=0.0,
@@ -337,6 +385,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     hand_right_influence: FloatProperty(
+        override=_LOCALLY,
         name="Right Hand Influence",
         default=1.0,
         min=0.0,
@@ -348,6 +397,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     foot_left_influence: FloatProperty(
+        override=_LOCALLY,
         name="Left Foot Influence",
         default=1.0,
         min=0.0,
@@ -359,6 +409,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     foot_right_influence: FloatProperty(
+        override=_LOCALLY,
         name="Right Foot Influence",
         default=1.0,
         min=0.0,
@@ -370,6 +421,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     temperature: FloatProperty(
+        override=_LOCALLY,
         name="Temperature",
         default=0.0,
         min=0.0,
@@ -383,6 +435,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     noise: EnumProperty(
+        override=_LOCALLY,
         name="Noise",
         default=COMES_AND_GOES,
         options=set(),
@@ -398,12 +451,14 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ],
     )
     guess_softness: BoolProperty(
+        override=_LOCALLY,
         name="Guess Softness",
         default=True,
         options=set(),
         description="Guess how soft this piece of furniture is from its name and shape",
     )
     softness: FloatProperty(
+        override=_LOCALLY,
         name="Softness",
         default=0.0,
         min=0.0,
@@ -418,6 +473,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     plant_feet: FloatProperty(
+        override=_LOCALLY,
         name="Plant Feet",
         default=1.0,
         min=0.0,
@@ -430,6 +486,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     rest_on_seats: FloatProperty(
+        override=_LOCALLY,
         name="Rest on Seats",
         default=1.0,
         min=0.0,
@@ -442,6 +499,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     reach_targets: FloatProperty(
+        override=_LOCALLY,
         name="Reach Targets",
         default=1.0,
         min=0.0,
@@ -454,6 +512,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     clear_furniture: FloatProperty(
+        override=_LOCALLY,
         name="Clear Furniture",
         default=0.0,
         min=0.0,
@@ -466,6 +525,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     smooth: FloatProperty(
+        override=_LOCALLY,
         name="Smooth",
         default=0.0,
         min=0.0,
@@ -486,7 +546,9 @@ def register() -> None:
     """Add the settings to every object and every action."""
     for cls in _GROUPS:
         bpy.utils.register_class(cls)
-    bpy.types.Object.dafnet = PointerProperty(type=CharacterSettings, name="DAFNet")
+    bpy.types.Object.dafnet = PointerProperty(
+        type=CharacterSettings, name="DAFNet", override=_LOCALLY
+    )
     bpy.types.Action.dafnet = PointerProperty(type=TakeSettings, name="DAFNet")
     rig_properties.register()
 

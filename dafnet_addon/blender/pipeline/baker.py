@@ -42,9 +42,11 @@ def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
         raise InputError(
             f"'{armature.name}' is not an armature; select a character made with Add Character."
         )
-    if armature.library or armature.override_library:
+    override = armature.override_library
+    if armature.library or (override and override.is_system_override):
         raise InputError(
-            f"The armature '{armature.name}' is linked or a library override; make it local first."
+            f"The armature '{armature.name}' is linked, or an override that may not be edited; "
+            "make an editable library override of it, or make it local."
         )
 
     if armature.parent:
