@@ -106,7 +106,7 @@ def real_piece(piece: "Piece") -> Placed | None:
 
     mesh = Mesh(piece.vertices, piece.triangles, name=piece.title)
     try:
-        place = seat_of([mesh], np.array([0.0, -3.0]), 0.0, piece.title)
+        place = seat_of([mesh], np.array([0.0, -3.0]), 0.0, piece.title, tables=True)
     except InputError:
         return None
 

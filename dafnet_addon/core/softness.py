@@ -16,7 +16,15 @@ from .occupancy import distance, tops_under
 from .root import RootPath
 from .solids import Box, Mesh, Scene
 
-__all__ = ["LIES_LOWER", "OVER_HARD", "SOFTNESS", "Support", "guessed", "support_under"]
+__all__ = [
+    "LIES_LOWER",
+    "OVER_HARD",
+    "SOFTNESS",
+    "Support",
+    "guessed",
+    "kind_by_name",
+    "support_under",
+]
 
 OVER_HARD = 0.14
 """Metres by which a seated pelvis joint is over a hard and level top."""
@@ -77,11 +85,11 @@ def guessed(solid: Box | Mesh, top: float) -> float:
     """The softness (metres) that a solid's name and shape tell; ``top``: height over the floor of
     its surface that carries a body.
     """
-    kind = _kind_by_name(solid.name) or _kind_by_shape(solid, top)
+    kind = kind_by_name(solid.name) or _kind_by_shape(solid, top)
     return SOFTNESS.get(kind, _UNKNOWN)
 
 
-def _kind_by_name(name: str) -> str:
+def kind_by_name(name: str) -> str:
     """The kind of furniture that a name tells, "" if none."""
     words = re.findall(r"[^\W\d_]+", name.lower())
     words.append("".join(words))

@@ -15,6 +15,7 @@ from ..core.root import forward_of
 from ..core.softness import guessed
 from .room import Piece, axes_from_above, top_view
 from .seats import SeatPlace, seat_of
+from .surfaces import height_field
 
 __all__ = ["Bed", "bed_of"]
 
@@ -22,6 +23,7 @@ _CELL = 0.03  # metres
 _HEAD_ROOM = 0.82  # metres from a lying pelvis to the head's end of a bed
 _FEET_ROOM = 0.80  # metres from it to the other end, at least
 _INTO_BED = 0.30  # metres that a pelvis moves in from the edge where it sat
+_UPPER = 0.7  # metres over a bed, above which things hang over it
 _NARROW = 0.55  # metres from it to the edge, at most
 
 
@@ -61,12 +63,15 @@ def bed_of(
 
     found = []
     for seat in sides:
+        # what is over the bed, such as an upper bunk, is not part of it
+        under = points[points[:, 2] < seat.height + _UPPER]
+        field = height_field(under, points[:, :2].min(0), points[:, :2].max(0), field.cell)
         level = np.argwhere(np.abs(field.top - seat.height) < 0.08)
         softness = max(
             guessed(solid, seat.height - floor) if solid.softness is None else solid.softness
             for solid in piece.solids
         )
-        bed = _lain(field.middles(level), points, seat, longer, softness)
+        bed = _lain(field.middles(level), under, seat, longer, softness)
         if bed:
             found.append(bed)
     if not found:

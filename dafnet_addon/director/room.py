@@ -13,7 +13,7 @@ from ..core.nearby import bounds
 from ..core.progress import stepwise, within
 from ..core.solids import Box, Mesh, Scene
 from ..core.text import nearest_known, printable
-from .seats import rectangle_axes
+from .outlines import rectangle_axes
 from .surfaces import HeightField, height_field, parts_of_surfaces
 
 __all__ = ["HEAD_HIGH", "KNEE_LOW", "Piece", "Room", "axes_from_above", "top_view"]

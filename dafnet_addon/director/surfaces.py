@@ -12,7 +12,15 @@ from ..core.progress import run_to_end, stepwise, within
 from ..core.rotations import rotate
 from ..core.solids import BOX_CORNERS, BOX_TRIANGLES, Box, Mesh
 
-__all__ = ["HeightField", "boxes_of", "height_field", "parts_of_surfaces", "surface_points"]
+__all__ = [
+    "Columns",
+    "HeightField",
+    "boxes_of",
+    "columns",
+    "height_field",
+    "parts_of_surfaces",
+    "surface_points",
+]
 
 _MAX_POINTS = 4_000_000
 """Larger furniture is sampled more coarsely."""
@@ -164,3 +172,69 @@ def height_field(points: np.ndarray, low: np.ndarray, high: np.ndarray, cell: fl
     field = HeightField(np.asarray(low, float), cell, np.full(size, -np.inf))
     field.add(points)
     return field
+
+
+_LAYER = 0.03
+"""Metres of height of one layer of columns."""
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What stands over each cell of the floor: ``field`` of what is highest up to some height, and
+    ``layers`` (X, Y) uint64, in which bit k says whether anything is from k to k + 1 layers of 3 cm
+    over the floor.
+    """
+
+    field: HeightField
+    layers: np.ndarray
+
+    @staticmethod
+    def between(low: float, high: float) -> np.uint64:
+        """The bits of the layers from ``low`` to ``high`` metres over the floor."""
+        first, last = (int(np.clip(round(z / _LAYER), 0, 64)) for z in (low, high))
+        return np.uint64((1 << max(last, first)) - (1 << first))
+
+    def at(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The heights and the layers (…) of the cells in which points (…, 2) lie; nothing outside
+        the field.
+        """
+        cells = self.field.index(points)
+        inside = ((cells >= 0) & (cells < self.layers.shape)).all(axis=-1)
+        at = tuple(np.moveaxis(np.where(inside[..., None], cells, 0), -1, 0))
+        return (
+            np.where(inside, self.field.top[at], -np.inf),
+            np.where(inside, self.layers[at], np.uint64(0)),
+        )
+
+
+@stepwise
+def columns(
+    parts: Sequence[np.ndarray], floor: float, cell: float, highest: float, most: int
+) -> Generator[float, None, Columns | None]:
+    """The columns of surface points in ``parts`` (N, 3), without the floor; heights are over
+    ``floor``, and ``highest`` is that of the field. None where nothing is left. ``cell``: metres,
+    more where there would be more than ``most`` cells.
+    """
+    kept, corners = [], []
+    for part in parts:
+        part = part - (0.0, 0.0, floor)
+        part = part[(part[:, 2] > 0.02) & (part[:, 2] < 64 * _LAYER)]
+        if len(part):
+            kept.append(part)
+            corners += [part[:, :2].min(0), part[:, :2].max(0)]
+        yield 0.0
+
+    if not kept:
+        return None
+
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    cell = max(cell, float(np.sqrt((high - low).prod() / most)))
+    field = height_field(np.zeros((0, 3)), low, high, cell)
+    layers = np.zeros(field.top.shape, np.uint64)
+    for k, part in enumerate(kept):
+        field.add(part[part[:, 2] < highest])
+        bits = np.left_shift(np.uint64(1), (part[:, 2] / _LAYER).astype(np.uint64))
+        np.bitwise_or.at(layers, tuple(field.index(part[:, :2]).T), bits)
+        yield k / len(kept)
+
+    return Columns(field, layers)

@@ -12,9 +12,9 @@ from ..core.errors import InputError
 from ..core.paths import facing
 from ..core.progress import stepwise
 from ..core.root import forward_of
+from .outlines import rectangle_axes
 from .places import Place, Surface
 from .room import Piece, Room, top_view
-from .seats import rectangle_axes
 from .surfaces import height_field
 
 __all__ = ["Top", "beside_top", "known_top", "surface_before", "top_of"]

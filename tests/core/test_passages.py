@@ -15,7 +15,7 @@ from dafnet_addon.core.paths import Route, Stop, facing, route
 from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.root import RootPath
 from dafnet_addon.core.solids import BOX_TRIANGLES
-from dafnet_addon.director.seats import seat_of
+from dafnet_addon.director.seats import NoSeat, seat_of
 from dafnet_addon.director.walks import walk_to
 from kit.places import LIBRARY
 
@@ -179,7 +179,11 @@ def test_real_seats_are_sat_on_without_a_word() -> None:
         arrays = np.load(LIBRARY / f"{piece['name']}.npz")
         mesh = Mesh(arrays["vertices"].astype(float), arrays["triangles"], name=piece["name"])
         scene, _ = prepared(Scene((mesh,)), 0.0)
-        spot = seat_of([mesh], np.array((2.5, -1.5)), name=piece["name"])
+        try:
+            spot = seat_of([mesh], np.array((2.5, -1.5)), name=piece["name"])
+        except NoSeat:
+            assert piece["name"] == "armchair_007", "a lounger, 13 cm over the ground"
+            continue
         seat = Stop((float(spot.position[0]), float(spot.position[1])), spot.yaw, 2.0, seated=True)
         path = walk_to([mesh], Stop((2.5, -1.5), 0.0, 0.3), seat).path
         met |= {each.name for each in passages(scene, path, 30.0, seats_along(scene, path, 30.0))}

@@ -92,8 +92,10 @@ def test_one_sits_on_a_beds_edge_and_not_on_its_pillow():
         assert abs(ahead[1]) < 0.05 and ahead @ towards > 0, "on a long edge, towards where one is"
         assert abs(found.position @ ahead + found.edge - 0.5) < 0.03 and found.edge < 0.25
         assert not found.back and abs(found.height - 0.5) < 0.01
-    foot = seat_of([mattress, boards[0]], np.array([0.3, -4.0]))
-    assert np.cos(foot.yaw - np.pi) > 0.99 and foot.position[1] < -0.7
+    open_end = seat_of([mattress, boards[0]], np.array([0.3, -4.0]))
+    assert abs(np.sin(open_end.yaw)) > 0.99 and abs(open_end.position[1]) < 0.2, (
+        "nor across its end"
+    )
 
 
 def test_a_sofas_long_part_is_no_bed():
@@ -101,7 +103,7 @@ def test_a_sofas_long_part_is_no_bed():
     back = _box((-1.2, 0.35, 0.0), (1.2, 0.5, 0.85))
     found = seat_of([*seat, back], np.array([0.0, -4.0]))
     assert found.back and np.cos(found.yaw - np.pi) > 0.99
-    assert found.position[0] < 0.5 and abs(found.position[1] - 0.15) < 0.05
+    assert found.position[0] < 0.5 and 0.3 < found.edge < 0.38, "the shins hang before the edge"
 
 
 def test_who_rests_over_a_seat_sits():

@@ -288,7 +288,7 @@ def _seats(piece: Piece, grid: DistanceGrid) -> list[Seat]:
     mesh = Mesh(piece.vertices, piece.triangles, name=piece.title)
     for side in _SIDES_TO_COME_FROM:
         try:
-            place = seat_of([mesh], side, 0.0, piece.title)
+            place = seat_of([mesh], side, 0.0, piece.title, tables=True)
         except InputError:
             return []
 

@@ -123,7 +123,7 @@ def _sent(
     place = np.array(walk["place"])
     start = Stop((float(place[0]), float(place[1])), walk["yaw"], _BEFORE)
     try:
-        spot = seat_of(solids, place, 0.0, piece.title)
+        spot = seat_of(solids, place, 0.0, piece.title, tables=True)
         end = Stop((float(spot.position[0]), float(spot.position[1])), spot.yaw, _SECONDS, True)
         made = walk_to(solids, start, end)
     except InputError:
