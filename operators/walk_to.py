@@ -3,7 +3,7 @@
 from collections.abc import Generator
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ..dafnet_addon.blender.character.armature import character_and_goal
 from ..dafnet_addon.blender.directing.walking import Walk, walk
@@ -30,7 +30,8 @@ class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
             (
                 "SEAT",
                 "Sit on Selected",
-                "Walk to the selected piece of furniture and sit down on it",
+                "Walk to the selected piece of furniture and sit down on it; the 3D cursor, if it "
+                "is on it, says where and to which side",
             ),
             ("CURSOR", "Walk to Cursor", "Walk to the 3D cursor and stand there"),
         ],
@@ -51,6 +52,14 @@ class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
         description="Walking speed, in metres per second for a body of 1.75 m",
     )
 
+    tables: BoolProperty(
+        name="On Tables", description="Sit on a table or a desk as well, if that is selected"
+    )
+    pull_out: BoolProperty(
+        name="Pull Out",
+        description="Move a seat out that is tucked under a table, so that the character fits",
+    )
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """There is a character to send, and none is being generated."""
@@ -65,4 +74,12 @@ class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
         if self.goal == "SEAT" and seat is None:
             raise InputError("Select one object to sit on, and nothing else but the character.")
         goal = seat if self.goal == "SEAT" else None
-        return walk.steps(context, character, goal, self.seconds, self.speed)
+        return walk.steps(
+            context,
+            character,
+            goal,
+            self.seconds,
+            self.speed,
+            tables=self.tables,
+            pull_out=self.pull_out,
+        )

@@ -73,7 +73,8 @@ class Stop:
     seated or standing.
 
     ``sits_down``, ``gets_up``: seconds that most of the way to a seat and from it takes, from 10 to
-    90 % of the pelvis' height.
+    90 % of the pelvis' height. ``before``: metres straight in front of a seat from which one comes
+    to it and to which one goes, less where something stands there.
     """
 
     position: Point
@@ -83,6 +84,7 @@ class Stop:
     name: str = ""
     sits_down: float = SITS_DOWN
     gets_up: float = GETS_UP
+    before: float = BEFORE_SEAT
 
 
 @dataclass(frozen=True)
@@ -202,11 +204,11 @@ def _leg(origin: Stop, via: Sequence[Point], goal: Stop, cruise: float, fps: flo
     """
     points: list[np.ndarray] = [np.asarray(origin.position, float)]
     if origin.seated:
-        points.append(points[0] + AFTER_SEAT * forward_of(origin.yaw))
+        points.append(points[0] + min(AFTER_SEAT, origin.before) * forward_of(origin.yaw))
 
     points += [np.asarray(p, float) for p in via]
     if goal.seated:
-        points.append(np.asarray(goal.position, float) + BEFORE_SEAT * forward_of(goal.yaw))
+        points.append(np.asarray(goal.position, float) + goal.before * forward_of(goal.yaw))
 
     points.append(np.asarray(goal.position, float))
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)

@@ -23,6 +23,7 @@ _BOARD_ROOM = 0.55  # metres that have to be free before it
 _BEFORE_BOARD = 0.45  # metres from a body to the board that it writes on
 _WRITTEN = (1.05, 1.65)  # metres over the floor, between which one writes
 _TALL = 0.44  # metres of a board that are written on
+_INSIDE = 0.26  # metres from a board's end to who writes on it; lines are that wide to a side
 
 
 @stepwise
@@ -81,8 +82,8 @@ def _faces(
             if not face[row, start:stop].any():
                 continue
             first, last = (
-                origin[1] + _BOARD_CELL * start + 0.2,
-                origin[1] + _BOARD_CELL * stop - 0.2,
+                origin[1] + _BOARD_CELL * start + _INSIDE,
+                origin[1] + _BOARD_CELL * stop - _INSIDE,
             )
             places = np.linspace(first, last, 1 + int(max(0.0, last - first) / 0.7))
             if near is not None:

@@ -1,14 +1,15 @@
 """Tasks of the whole body: to walk, to sit down, to lie down, to stand up, to wait."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.progress import within
 from ..core.root import forward_of
 from .beds import Bed, bed_of
 from .choosing import Chooser, Done, Job, Taken
-from .places import Place, beside, known_seats
+from .places import Place, before_a_top, beside, known_seats
 from .room import Piece
 from .seats import SeatPlace
 from .tasks import LieOn, SitOn, StandUp, Wait, WalkAlong, WalkTo
@@ -86,7 +87,9 @@ def sit_on(chooser: Chooser, task: SitOn) -> Job[Done]:
         middle = piece.box().mean(axis=0)[:2]
         yaw = chooser.faced(task.facing, middle)
         towards = chooser.where() if yaw is None else middle + 99.0 * forward_of(yaw)
-        done = yield from take_seat(chooser, piece, towards, task.choose, near)
+        asked = task.on == piece.name
+        seats = yield from within(_seats(chooser, piece, towards, near, yaw, asked), 0.0, 0.4)
+        done = yield from within(_take(chooser, piece, seats, task.choose), 0.4, 1.0)
         chooser.person.here.rest(task.seconds)
         return done
 
@@ -102,8 +105,39 @@ def take_seat(
     fits: Callable[[SeatPlace], bool] = lambda seat: True,
 ) -> Job[Done]:
     """Sit down on a place of a piece that is free and ``fits``; see ``places.seats_on``."""
+    job = known_seats(chooser.person.room, piece, towards, near, chooser.person.size)
+    seats = yield from within(job, 0.0, 0.4)
+    return (yield from within(_take(chooser, piece, seats, choose, fits), 0.4, 1.0))
+
+
+def _seats(
+    chooser: Chooser,
+    piece: Piece,
+    towards: np.ndarray,
+    near: np.ndarray | None,
+    yaw: float | None,
+    tables: bool,
+) -> Job[list[SeatPlace]]:
+    """The places on a piece; on what has no back, facing the table or bar that it stands at, where
+    no ``yaw`` and no place are asked for.
+    """
+    room, size = chooser.person.room, chooser.person.size
+    seats = yield from known_seats(room, piece, towards, near, size, tables)
+    if yaw is None and near is None and not seats[0].back:
+        top = yield from before_a_top(room, piece, seats[0])
+        if top is not None:
+            seats = yield from known_seats(room, piece, top, near, size, tables)
+    return seats
+
+
+def _take(
+    chooser: Chooser,
+    piece: Piece,
+    seats: Sequence[SeatPlace],
+    choose: str,
+    fits: Callable[[SeatPlace], bool] = lambda seat: True,
+) -> Job[Done]:
     person = chooser.person
-    seats = yield from known_seats(person.room, piece, towards, near, person.size)
     free = [seat for seat in seats if fits(seat) and not person.is_taken(seat.position)]
     for seat in free:
         if person.sits_at(seat.position):

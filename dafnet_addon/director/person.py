@@ -19,7 +19,7 @@ from ..core.series import smoothstep
 from ..core.softness import LIES_LOWER, OVER_HARD
 from ..core.solids import Box
 from ..core.trails import trail
-from .approach import pair, way_in
+from .approach import WayIn, fits, pair, way_in
 from .beds import Bed
 from .others import APART, Occupied, Others
 from .places import Place, seated_pelvis, standing_pelvis
@@ -119,12 +119,12 @@ class Person:
         """
         if self.track is None:
             return Way(RootPath(np.zeros((0, 3)), np.zeros(0)), Stop(pair(position), yaw or 0.0))
-        here = self.leaves()
         left = yield from within(self._sides_of_own_seat(), 0.0, 0.3)
+        here = replace(self.leaves(), before=left.before)
         goal = Stop(pair(position), here.yaw if yaw is None else yaw, 0.0)
         if not here.seated and np.linalg.norm(position - here.position) < _THERE:
             return Way(RootPath(np.zeros((0, 3)), np.zeros(0)), goal)
-        made = self._routed(here, left, (), goal, yaw is None, speed)
+        made = self._routed(here, left.via, (), goal, yaw is None, speed)
         return (yield from within(made, 0.3, 1.0))
 
     def way_to_seat(self, piece: Piece, seat: SeatPlace) -> Generator[float, None, Way]:
@@ -133,35 +133,39 @@ class Person:
         """
         goal = Stop(pair(seat.position), seat.yaw, 0.0, seated=True)
         if self.track is None:
+            yield from fits.steps(self.room, piece.name, piece.solids, seat)
             return Way(RootPath(np.zeros((0, 3)), np.zeros(0)), goal)
         left = yield from within(self._sides_of_own_seat(), 0.0, 0.2)
         standing = self._standing(seat.position)
         job = way_in.steps(self.room, piece.name, piece.solids, seat, standing)
-        comes = yield from within(job, 0.2, 0.5)
-        made = self._routed(self.leaves(), left, comes, goal, False, SPEED)
+        entry = yield from within(job, 0.2, 0.5)
+        goal = replace(goal, before=entry.before)
+        here = replace(self.leaves(), before=left.before)
+        made = self._routed(here, left.via, entry.via, goal, False, SPEED)
         return (yield from within(made, 0.5, 1.0))
 
     def way_up(self) -> Generator[float, None, Way]:
         """The way to stand before the seat that he is on, or beside it where a desk is before
         it.
         """
-        here = self.leaves()
         left = yield from self._sides_of_own_seat()
-        goal = left[-1] if left else here.position + _STANDS_BEFORE * forward_of(here.yaw)
+        here = replace(self.leaves(), before=left.before)
+        by = left.via
+        goal = by[-1] if by else here.position + _STANDS_BEFORE * forward_of(here.yaw)
         stop = Stop(pair(goal), here.yaw, 0.0)
-        via = map(pair, left[:-1])
+        via = map(pair, by[:-1])
         path = route(here, *via, stop, fps=self.fps, floor=self.room.floor).path
         return Way(RootPath(path.position[1:], path.yaw[1:]), stop)
 
-    def _sides_of_own_seat(self) -> Generator[float, None, tuple[np.ndarray, ...]]:
-        """Points (2,) by which he leaves the seat that he is on."""
+    def _sides_of_own_seat(self) -> Generator[float, None, WayIn]:
+        """How he leaves the seat that he is on."""
         spot = self.bed.seat if self.bed is not None else self.seat
         if spot is None:
-            return ()
+            return WayIn()
         own = self.room.pieces().get(self.seat_name)
         solids, standing = own.solids if own else (), self._standing(spot.position)
         found = yield from way_in.steps(self.room, self.seat_name, solids, spot, standing)
-        return found[::-1]
+        return replace(found, via=found.via[::-1])
 
     def _routed(
         self,
@@ -410,7 +414,7 @@ def _footprint(box: Box) -> np.ndarray:
 
 def _before(stop: Stop) -> np.ndarray:
     """Where (2,) one is on the way to or from a stop: before a seat, else at the stop itself."""
-    return np.array(stop.position) + (0.55 if stop.seated else 0.0) * forward_of(stop.yaw)
+    return np.array(stop.position) + (stop.before if stop.seated else 0.0) * forward_of(stop.yaw)
 
 
 def _apart(here: Stop, via: Sequence[tuple[float, float]], goal: Stop) -> list[tuple[float, float]]:

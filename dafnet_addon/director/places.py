@@ -21,6 +21,7 @@ __all__ = [
     "REACH",
     "Place",
     "Surface",
+    "before_a_top",
     "beside",
     "has_room",
     "known_seats",
@@ -31,6 +32,8 @@ __all__ = [
 ]
 
 _ELBOW_ROOM = 0.6  # metres between people on one seat or at one top
+_AT_TOP = 0.8  # metres between a pelvis and the table, desk or bar that one sits at
+_TOPS = (0.15, 0.45)  # metres over a seat, where these are
 _SPACING = 0.05  # metres between points of what stands in the way
 _ARM = float(np.linalg.norm(OFFSETS[[joint("left_elbow"), joint("left_wrist")]], axis=1).sum())
 _LEAN = 0.19  # metres that a trunk helps a hand
@@ -99,7 +102,12 @@ def has_room(
 
 
 def known_seats(
-    room: Room, piece: Piece, towards: np.ndarray, near: np.ndarray | None, size: float
+    room: Room,
+    piece: Piece,
+    towards: np.ndarray,
+    near: np.ndarray | None,
+    size: float,
+    tables: bool = False,
 ) -> Generator[float, None, list[SeatPlace]]:
     """``seats_on`` a piece of a room; looked for once on all of one shape that have a back, which
     tells the facing. A job.
@@ -107,7 +115,7 @@ def known_seats(
     shape, place = piece.shape()
     key = ("seats", shape)
     if near is not None or key not in room.known.shapes:
-        found = yield from seats_on.steps(piece, towards, room.floor, near, size)
+        found = yield from seats_on.steps(piece, towards, room.floor, near, size, tables)
         if near is None and all(seat.back for seat in found):
             room.known.shapes[key] = [_moved(seat, -place) for seat in found]
         return found
@@ -118,6 +126,25 @@ def _moved(seat: SeatPlace, by: np.ndarray) -> SeatPlace:
     return replace(seat, position=seat.position + by)
 
 
+def before_a_top(
+    room: Room, piece: Piece, seat: SeatPlace
+) -> Generator[float, None, np.ndarray | None]:
+    """Where (2,) the table, the desk or the bar is that a seat without a back stands at, and that
+    one therefore faces; None where there is none. A job.
+    """
+    low, high = (seat.height + over for over in _TOPS)
+    best, nearest = None, _AT_TOP
+    for name, points in (yield from room.surfaces()).items():
+        if name == piece.name:
+            continue
+        at = points[(points[:, 2] > low) & (points[:, 2] < high), :2]
+        gaps = np.linalg.norm(at - seat.position, axis=1)
+        if len(gaps) and gaps.min() < nearest:
+            nearest = float(gaps.min())
+            best = at[gaps < nearest + 0.05].mean(axis=0).astype(float)
+    return best
+
+
 @stepwise
 def seats_on(
     piece: Piece,
@@ -125,13 +152,13 @@ def seats_on(
     floor: float,
     near: np.ndarray | None = None,
     size: float = 1.0,
+    tables: bool = False,
 ) -> Generator[float, None, list[SeatPlace]]:
     """Where people sit on a piece, as many as fit, or the one place ``near`` (2,); see
     ``seats.seat_of``.
     """
-    found = yield from within(
-        seat_of.steps(piece.solids, towards, floor, piece.name, near, size), 0.0, 0.5
-    )
+    job = seat_of.steps(piece.solids, towards, floor, piece.name, near, size, tables)
+    found = yield from within(job, 0.0, 0.5)
     count = 1 + int(2.0 * found.aside / _ELBOW_ROOM)
     if near is not None or count == 1:
         return [found]
@@ -142,7 +169,7 @@ def seats_on(
     places = []
     for k, aside in enumerate(np.linspace(-found.aside, found.aside, count)):
         spot = middle + aside * across
-        job = seat_of.steps(piece.solids, towards, floor, piece.name, spot, size)
+        job = seat_of.steps(piece.solids, towards, floor, piece.name, spot, size, tables)
         places.append((yield from within(job, 0.5 + 0.5 * k / count, 0.5 + 0.5 * (k + 1) / count)))
     return places
 

@@ -410,10 +410,13 @@ def _fits(
     for stretch in stretches:
         first, end = line.aside[stretch[0]], line.aside[stretch[-1]]
         middle = 0.5 * (first + end)
-        room = max(0.0, 0.5 * (end - first) - (_ELBOWS - 0.4 * _HIPS))
+        # What ends by an arm is kept clear of it already.
+        by_arms = [line.carries(stretch[0] - 1), line.carries(stretch[-1] + 1)]
+        kept = _SHOULDERS + part.columns.field.cell if all(by_arms) else 0.4 * _HIPS
+        room = max(0.0, 0.5 * (end - first) - (_ELBOWS - kept))
         if near is not None:
             at = float(np.clip(near @ across, middle - room, middle + room))
-        elif room == 0.0:
+        elif room < 0.1:
             at = float(np.clip(line.middle, first, end))
         else:
             at = middle
@@ -468,6 +471,13 @@ class _Lines:
     def _columns(self, k: int, half: float) -> slice:
         reach = min(self._wide, round(half / self._cell))
         return slice(k + self._wide - reach, k + self._wide + reach + 1)
+
+    def carries(self, k: int) -> bool:
+        """Whether a line has enough of the seat under hips."""
+        if not 0 <= k < len(self.aside):
+            return False
+        hips = self._columns(k, _HIPS)
+        return bool((self._mask[:, hips].mean(axis=1) >= 0.6).any())
 
     def fit(self, k: int) -> _Fit | None:
         """How a body fits on line ``k``; None where it does not."""

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.paths import AFTER_SEAT, BEFORE_SEAT, Route, Stop, route
+from ..core.paths import AFTER_SEAT, Route, Stop, route
 from ..core.progress import stepwise, within
 from ..core.root import forward_of
 from ..core.series import MODEL_FPS
@@ -300,7 +300,8 @@ def walk_to(
             unit_doubt(solids, [np.array(start.position)], floor, size)
             or "The character is there already; choose another place to go to."
         )
-    leaves, comes = _ahead(start, AFTER_SEAT), _ahead(goal, BEFORE_SEAT)
+    leaves = _ahead(start, min(AFTER_SEAT, start.before))
+    comes = _ahead(goal, goal.before)
     (corners,) = yield from ways.steps(solids, [leaves, comes], floor=floor, size=size)
     return route(start, *corners, goal, speed=speed, fps=fps, floor=floor)
 

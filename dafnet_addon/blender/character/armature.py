@@ -14,6 +14,7 @@ from ...core.skeleton import JOINTS, OFFSETS, PARENTS, REST, STATURE, TARGETS, j
 from .mannequin import FACING, add_body
 
 __all__ = [
+    "bodies",
     "create_character",
     "character_of",
     "character_scale",
@@ -87,6 +88,19 @@ def objects_of(character: bpy.types.Object) -> set[bpy.types.Object]:
     } - {None}
 
 
+def bodies(scene: bpy.types.Scene) -> set[bpy.types.Object]:
+    """Characters and other armatures, with what is parented to them, deformed by them, or directs
+    them.
+    """
+    found: set[bpy.types.Object] = set()
+    for each in scene.objects:
+        if each.type == "ARMATURE":
+            found |= objects_of(each)
+        elif any(m.type == "ARMATURE" and m.object is not None for m in each.modifiers):
+            found.add(each)
+    return found
+
+
 def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
     """The character that the active object is or belongs to: its armature, its body, its root or
     one of its targets.
@@ -123,22 +137,31 @@ def _owner(scene: bpy.types.Scene, part: bpy.types.Object) -> bpy.types.Object |
 def character_and_goal(
     context: bpy.types.Context,
 ) -> tuple[bpy.types.Object | None, bpy.types.Object | None]:
-    """The character to direct and the mesh to send it to, as the selection says.
+    """The character to direct and the furniture to send it to, as the selection says.
 
-    The character is the active one, else a selected one, else the only one of the scene. The mesh
-    is the active or the only selected object that does not belong to a character.
+    The character is the active one, else a selected one, else the only one of the scene. The
+    furniture is the active or the only selected object that does not belong to a character: a mesh,
+    or an empty that holds meshes or a collection.
     """
     characters = [o for o in context.scene.objects if is_character(o)]
     chosen = [character_of(context), *(o for o in context.selected_objects if o in characters)]
     character = next(
         (o for o in chosen if o is not None), characters[0] if len(characters) == 1 else None
     )
-    meshes = [
-        o for o in context.selected_objects if o.type == "MESH" and o.parent not in characters
-    ]
+    parts = {part for each in characters for part in objects_of(each)}
+    meshes = [o for o in context.selected_objects if o not in parts and _holds_meshes(o)]
     active = context.object
     goal = active if active in meshes else meshes[0] if len(meshes) == 1 else None
     return character, goal
+
+
+def _holds_meshes(each: bpy.types.Object) -> bool:
+    """Whether an object is a mesh, or an empty that holds some."""
+    if each.type != "EMPTY":
+        return bool(each.type == "MESH")
+    return each.instance_collection is not None or any(
+        child.type == "MESH" for child in each.children_recursive
+    )
 
 
 def character_scale(armature: bpy.types.Object, unit: float = 1.0) -> float:

@@ -11,7 +11,7 @@ from ...core.progress import run_to_end
 from ...core.sensor import REACH
 from ...core.solids import Mesh
 from ...director.surfaces import surface_points
-from ..character.armature import character_scale, metres_per_unit, objects_of
+from ..character.armature import bodies, character_scale, metres_per_unit
 from ..character.settings import Settings, settings_of
 from ..scene.furniture import furniture_now
 from ..scene.lookup import find_object
@@ -59,7 +59,7 @@ def find_furniture(context: bpy.types.Context, armature: bpy.types.Object) -> Fo
     path = _path(context, settings, armature)
     unit = metres_per_unit(scene)
     size = character_scale(armature, unit)
-    candidates = [o for o in scene.objects if o not in _bodies(scene)]
+    candidates = [o for o in scene.objects if o not in bodies(scene)]
 
     collection = bpy.data.collections.new(f"{armature.name} Furniture")
     try:
@@ -140,19 +140,6 @@ def _path(context: bpy.types.Context, settings: Settings, armature: bpy.types.Ob
     return places_over_time(
         context, find_object(settings, settings.root, "root"), frames
     ) * metres_per_unit(scene)
-
-
-def _bodies(scene: bpy.types.Scene) -> set[bpy.types.Object]:
-    """Characters and other armatures, with what is parented to them, deformed by them, or directs
-    them.
-    """
-    found: set[bpy.types.Object] = set()
-    for each in scene.objects:
-        if each.type == "ARMATURE":
-            found |= objects_of(each)
-        elif any(m.type == "ARMATURE" and m.object is not None for m in each.modifiers):
-            found.add(each)
-    return found
 
 
 def _distance(meshes: list[Mesh], path: np.ndarray, size: float) -> float:

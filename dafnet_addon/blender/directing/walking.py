@@ -1,7 +1,7 @@
 """A character's walk around the furniture to a seat or to a place to stand, as keys on its root."""
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -11,14 +11,19 @@ from ...core.errors import InputError
 from ...core.passage import Passage, SatOn, listed, met_along
 from ...core.paths import BEFORE_SEAT, Route, Stop, facing
 from ...core.progress import stepwise, within
-from ...core.solids import Scene
-from ...director.seats import on_a_seat, seat_of
+from ...core.root import forward_of
+from ...core.solids import Box, Mesh, Scene
+from ...director.approach import Tucked, walk_to_seat
+from ...director.places import before_a_top
+from ...director.room import Piece, Room
+from ...director.seats import on_a_seat, seats_of
 from ...director.walks import unit_doubt, walk_to
 from ..character.armature import character_scale, metres_per_unit
 from ..character.settings import Settings, settings_of
 from ..scene.furniture import furniture_at
 from ..scene.lookup import find_collection, find_object, find_scene
 from .root_keys import key_route, keyable_root, last_key, unchanged_on_failure
+from .seat_pieces import add_furniture, collection_of, movable, move, piece_of, top_of
 
 __all__ = ["Start", "Walk", "extend_range", "rest_at", "start_of", "passage_warnings", "walk"]
 
@@ -105,6 +110,31 @@ def rest_at(start: Start) -> Generator[float, None, Stop]:
     return Stop((float(place[0]), float(place[1])), start.yaw, _BEFORE, seated=seated)
 
 
+@dataclass(frozen=True)
+class _Request:
+    """What is asked for of a seat: the ``names`` of the piece's objects, that which was chosen
+    first; ``cursor`` (2,), canonical metres: by which place on it; whether ``tables`` are seats;
+    whether the piece is pulled ``out`` where something stands over it.
+    """
+
+    names: Sequence[str]
+    cursor: np.ndarray
+    tables: bool
+    out: bool
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A ``route``, the furniture that it leads through, ``warnings``, and by how much the seat is
+    ``pulled`` (2,) out for it, canonical metres.
+    """
+
+    route: Route
+    met: tuple[Passage, ...]
+    warnings: tuple[str, ...] = ()
+    pulled: np.ndarray | None = None
+
+
 @stepwise
 def walk(
     context: bpy.types.Context,
@@ -112,38 +142,80 @@ def walk(
     seat: bpy.types.Object | None,
     seconds: float = 3.0,
     speed: float = 1.1,
+    tables: bool = False,
+    pull_out: bool = False,
 ) -> Generator[float, None, Walk]:
     """Let the character walk to ``seat`` and sit there for some ``seconds``, or, for None, to the
     3D cursor and stand.
 
-    The walk continues from the root's last key, else from the current frame; earlier keys stay. The
-    seat has to be in the character's furniture collection; where it has none, the seat's own
-    becomes that. ``InputError``: there is nothing to sit on, no way, no room before the seat, or
-    the root cannot be keyed. Then, or if the job is closed, nothing is changed.
+    All of the piece counts that the seat is a part of; where the cursor is on it, it says by which
+    place, and to which side. The walk continues from the root's last key, else from the current
+    frame; earlier keys stay. The seat has to be in the character's furniture collection; where it
+    has none, the seat's own becomes that, or a new one of all that stands around. ``pull_out``:
+    move a seat that is tucked under something. ``InputError``: there is nothing to sit on, no way,
+    no room before the seat, or the root cannot be keyed. Then, or if the job is closed, nothing is
+    changed.
     """
     scene, furniture = context.scene, armature.dafnet.furniture
+    made = None
     if seat is not None and furniture is None:
-        furniture = _collection_of(seat, armature, scene)
+        furniture = collection_of(seat, armature, scene)
+        if furniture is None:
+            furniture = add_furniture(seat, armature, scene)
+            made = furniture.name_full
+    try:
+        return (
+            yield from _walk(
+                context, armature, seat, furniture, made, seconds, speed, tables, pull_out
+            )
+        )
+    except BaseException:
+        added = next((c for c in bpy.data.collections if c.name_full == made), None)
+        if added is not None:
+            bpy.data.collections.remove(added)
+        raise
 
+
+def _walk(
+    context: bpy.types.Context,
+    armature: bpy.types.Object,
+    seat: bpy.types.Object | None,
+    furniture: bpy.types.Collection | None,
+    made: str | None,
+    seconds: float,
+    speed: float,
+    tables: bool,
+    pull_out: bool,
+) -> Generator[float, None, Walk]:
+    scene = context.scene
     settings = settings_of(armature, scene, furniture=furniture.name_full if furniture else None)
-    names = [seat.name, *(child.name for child in seat.children_recursive)] if seat else []
+    names = piece_of(seat) if seat is not None else []
     goal = np.array(scene.cursor.location, float)
+    if pull_out and seat is not None:
+        movable(top_of(seat))
 
     start = yield from within(start_of(context, settings), 0.0, _READ)
-    route, met, warnings = yield from within(
-        _route(start, names, goal[:2] * start.unit, seconds, speed), _READ, 1.0
-    )
+    asked = _Request(names, goal[:2] * start.unit, tables, pull_out)
+    found = yield from within(_route(start, asked, seconds, speed), _READ, 1.0)
 
     root = keyable_root(settings)
     character = find_object(settings, settings.armature, "character")
     own = find_collection(settings.furniture) if settings.furniture is not None else None
+    route, warnings = found.route, found.warnings
     with unchanged_on_failure(root):
         key_route(context, root, route, first=start.first, scale=1.0 / start.unit, fps=start.fps)
 
+    if found.pulled is not None:
+        piece = next(each for each in scene.objects if each.name == names[0])
+        move(top_of(piece), found.pulled / start.unit)
+        out = 100.0 * start.size * float(np.linalg.norm(found.pulled))
+        warnings = (f"Pulled '{top_of(piece).name}' out by {out:.0f} cm.", *warnings)
+    if made is not None:
+        scene.collection.children.link(own)
     character.dafnet.furniture = own
     last = start.first + len(route.path) - 1
     extended = extend_range(scene, character, last)
-    return Walk(start.first, last, extended, (*passage_warnings(met, start.first), *warnings))
+    return Walk(start.first, last, extended, (*passage_warnings(found.met, start.first), *warnings))
 
 
 def extend_range(scene: bpy.types.Scene, armature: bpy.types.Object, last: int) -> bool:
@@ -173,32 +245,17 @@ def passage_warnings(met: Sequence[Passage], first: int) -> tuple[str, ...]:
     )
 
 
-def _collection_of(
-    seat: bpy.types.Object, armature: bpy.types.Object, scene: bpy.types.Scene
-) -> bpy.types.Collection:
-    """The collection that a seat lies in, as the furniture of a character that has none yet."""
-    for collection in seat.users_collection:
-        if collection != scene.collection and armature.name not in collection.all_objects:
-            return collection
-    raise InputError(
-        f"'{seat.name}' lies in no collection of its own; put the furniture into one and choose it."
-    )
-
-
 def _route(
-    start: Start, names: Sequence[str], goal: np.ndarray, seconds: float, speed: float
-) -> Generator[float, None, tuple[Route, tuple[Passage, ...], tuple[str, ...]]]:
-    """The walk in metres of the canonical body to the seat, whose parts have these ``names``, or
-    where there are none to ``goal`` (2,); the furniture that it leads through; warnings.
+    start: Start, asked: _Request, seconds: float, speed: float
+) -> Generator[float, None, _Found]:
+    """The walk in metres of the canonical body to the seat that is wished for, or where none is, to
+    the cursor.
     """
     here = yield from within(rest_at(start), 0.0, 0.05)
-    if names:
-        route, passages = yield from within(
-            _route_to_seat(start, here, names, seconds, speed), 0.05, 1.0
-        )
-        return route, passages, ()
+    if asked.names:
+        return (yield from within(_route_to_seat(start, here, asked, seconds, speed), 0.05, 1.0))
 
-    solids, floor, size = start.scene.solids, start.floor, start.size
+    solids, floor, size, goal = start.scene.solids, start.floor, start.size, asked.cursor
     end = Stop((float(goal[0]), float(goal[1])), facing(goal - start.place[:2]), seconds)
     way = walk_to.steps(solids, here, end, speed, start.fps, floor, size)
     route = yield from within(way, 0.05, 0.6)
@@ -208,39 +265,86 @@ def _route(
     doubt = yield from within(
         unit_doubt.steps(solids, route.path.position[:, :2], floor, size), 0.95, 1.0
     )
-    return route, passages, (doubt,) if doubt else ()
+    return _Found(route, passages, (doubt,) if doubt else ())
 
 
 def _route_to_seat(
-    start: Start, here: Stop, names: Sequence[str], seconds: float, speed: float
-) -> Generator[float, None, tuple[Route, tuple[Passage, ...]]]:
-    """The walk from ``here`` to the seat, and the furniture that it leads through. ``InputError``
-    where something stands before the seat.
+    start: Start, here: Stop, asked: _Request, seconds: float, speed: float
+) -> Generator[float, None, _Found]:
+    """The walk from ``here`` to the seat. ``InputError`` where something stands before it, or where
+    a body would be.
     """
-    solids, floor, size = start.scene.solids, start.floor, start.size
-    seat, *_ = names
-    parts = [solid for solid in solids if solid.name in names]
+    name = asked.names[0]
+    parts = tuple(solid for solid in start.scene.solids if solid.name in asked.names)
     if not parts:
-        raise InputError(f"'{seat}' is not in the character's furniture collection; move it there.")
+        raise InputError(f"'{name}' is not in the character's furniture collection; move it there.")
 
-    spot = yield from within(
-        seat_of.steps(parts, start.place[:2], floor, seat, size=size), 0.0, 0.15
-    )
-    end = Stop((float(spot.position[0]), float(spot.position[1])), spot.yaw, seconds, seated=True)
-    way = walk_to.steps(solids, here, end, speed, start.fps, floor, size)
-    route = yield from within(way, 0.15, 0.6)
+    room = _room_of(start.scene.solids, start.floor, asked.names)
+    whole, chosen = room.pieces()[name], [s for s in parts if s.name == name]
+    near = _place_on(whole, asked.cursor)
+    if near is None and len({solid.name for solid in parts}) > 1 and chosen:
+        near = Piece(name, tuple(chosen)).box().mean(axis=0)[:2]
+    job = seats_of.steps(parts, start.place[:2], start.floor, name, near, start.size, asked.tables)
+    seats = yield from within(job, 0.0, 0.1)
+    done = 0.15
+    if near is None and not seats[0].back:
+        top = yield from within(before_a_top(room, whole, seats[0]), 0.1, 0.12)
+        if top is not None:
+            job = seats_of.steps(parts, top, start.floor, name, near, start.size, asked.tables)
+            seats = yield from within(job, 0.12, 0.15)
 
-    sat_on = SatOn(spot.position, spot.height, frozenset(solid.name for solid in parts))
-    met = met_along.steps(start.scene, route.path, start.fps, [sat_on])
+    pulled = None
+    while True:
+        goes = walk_to_seat.steps(room, whole, here, seats, seconds, speed, start.fps, start.size)
+        try:
+            route, spot = yield from within(goes, done, done + 0.2)
+            break
+        except Tucked as error:
+            if not asked.out or pulled is not None:
+                raise
+            done = 0.35
+            pulled = -error.out * forward_of(seats[0].yaw)
+            solids = _pulled_out(room.solids, whole, pulled)
+            room = _room_of(solids, start.floor, asked.names)
+            whole = room.pieces()[name]
+            seats = [replace(seats[0], position=seats[0].position + pulled)]
+
+    scene = Scene(tuple(room.solids))
+    sat_on = SatOn(spot.position, spot.height, frozenset(asked.names))
+    met = met_along.steps(scene, route.path, start.fps, [sat_on])
     passages = yield from within(met, 0.6, 1.0)
 
     gap = np.linalg.norm(route.path.position[:, :2] - spot.position, axis=1)
     sits_down_after = int(np.flatnonzero(gap > _SITTING_DOWN)[-1])
     for each in passages:
-        if each.stop - 1 > sits_down_after and each.name not in names:
+        if each.stop - 1 > sits_down_after and each.name not in asked.names:
             raise InputError(
-                f"'{each.name}' is in the way of sitting down on '{seat}'; pull "
-                f"'{seat}' out, or choose another seat."
+                f"'{each.name}' is in the way of sitting down on '{name}'; pull '{name}' out, or "
+                "choose another seat."
             )
 
-    return route, passages
+    return _Found(route, passages, pulled=pulled)
+
+
+def _place_on(piece: Piece, cursor: np.ndarray) -> np.ndarray | None:
+    """The cursor (2,), if it is on a piece seen from above."""
+    low, high = piece.box()[:, :2]
+    return cursor if ((cursor >= low) & (cursor <= high)).all() else None
+
+
+def _room_of(solids: Sequence[Box | Mesh], floor: float, names: Sequence[str]) -> Room:
+    """The room, in which all objects of these names are one piece, that of the first."""
+    return Room(tuple(solids), parts=dict.fromkeys(names, names[0]), floor=floor)
+
+
+def _pulled_out(solids: Sequence[Box | Mesh], piece: Piece, offset: np.ndarray) -> list[Box | Mesh]:
+    """The solids with those of a piece moved by an offset (2,)."""
+    shift = np.eye(4)
+    shift[:2, 3] = offset
+    own = {id(solid) for solid in piece.solids}
+    return [
+        replace(solid, matrix=shift @ solid.matrix)
+        if isinstance(solid, Mesh) and id(solid) in own
+        else solid
+        for solid in solids
+    ]

@@ -16,8 +16,10 @@ from mathutils import Matrix
 from ...core.errors import InputError
 from ...core.skeleton import TARGETS
 from ...core.solids import Mesh
-from ..character.armature import metres_per_unit
+from ..character.armature import is_character, metres_per_unit
 from ..character.settings import Settings
+from ..rig.detection import detect_map
+from ..rig.maps import NEEDED
 from .dependencies import Dependencies
 from .lookup import find_collection, find_object, find_scene
 from .playback import play_steps
@@ -175,7 +177,8 @@ class Furniture:
             (drawn_through | unrendered) & _cutters(scene)
         ) - self._carried
         self._doubtful = (drawn_through | unrendered) - self._helpers - self._carried
-        self.members = set(candidates) - self._carried - self._helpers
+        self._bodies = _bodies_of_rigs(candidates) - self._carried
+        self.members = set(candidates) - self._carried - self._helpers - self._bodies
 
         self._pieces: list[_Piece] = []
         self._shown: dict[bpy.types.Object, bool] = {}
@@ -292,6 +295,9 @@ class Furniture:
         if carried := self._named(self._carried - worn):
             yield f"Ignored as furniture, since the character moves it: {carried}."
 
+        if bodies := self._named(self._bodies):
+            yield f"Ignored as furniture, since it is somebody's body: {bodies}."
+
         if helpers := self._named(self._helpers):
             yield (
                 f"Ignored as helpers, since no render shows them: {helpers}; let renders show "
@@ -339,6 +345,20 @@ class Furniture:
             or np.abs(vertices - piece.vertices).max() > tolerance
         ):
             self._changed[piece.name] = None
+
+
+def _bodies_of_rigs(candidates: list[bpy.types.Object]) -> set[bpy.types.Object]:
+    """What the users' own people wear: deformed by, or parented to, an armature with the joints of
+    a person.
+    """
+
+    def rigs_of(each: bpy.types.Object) -> set[bpy.types.Object]:
+        found = {m.object for m in each.modifiers if m.type == "ARMATURE"} | {each.parent}
+        return {o for o in found if o is not None and o.type == "ARMATURE" and not is_character(o)}
+
+    rigs = set().union(*map(rigs_of, candidates)) if candidates else set()
+    people = {rig for rig in rigs if all(name in detect_map(rig).joints for name in NEEDED)}
+    return {each for each in candidates if rigs_of(each) & people}
 
 
 def _may_have_faces(member: bpy.types.Object) -> bool:
