@@ -24,6 +24,7 @@ _HEAD_ROOM = 0.82  # metres from a lying pelvis to the head's end of a bed
 _FEET_ROOM = 0.80  # metres from it to the other end, at least
 _INTO_BED = 0.30  # metres that a pelvis moves in from the edge where it sat
 _UPPER = 0.7  # metres over a bed, above which things hang over it
+_UPRIGHT = 0.90  # metres over a bed, that one who sits on its edge needs
 _NARROW = 0.55  # metres from it to the edge, at most
 
 
@@ -55,14 +56,18 @@ def bed_of(
         raise InputError(f"'{piece.name}' has nothing to lie on; choose a bed or a sofa.")
     longer, shorter = axes_from_above(field)
     for k, out in enumerate((shorter, -shorter)):
-        low = 0.5 * points[:, :2].min(0) + 0.5 * points[:, :2].max(0)
-        job = seat_of.steps(piece.solids, low + 9.0 * out, floor, piece.name, None, size)
+        middle = 0.5 * points[:, :2].min(0) + 0.5 * points[:, :2].max(0)
+        job = seat_of.steps(piece.solids, middle + 9.0 * out, floor, piece.name, None, size)
         seat = yield from within(job, 0.2 + 0.4 * k, 0.6 + 0.4 * k)
         if forward_of(seat.yaw) @ out > 0.9:
             sides.append(seat)
 
-    found = []
+    found, low = [], False
     for seat in sides:
+        over = points[np.linalg.norm(points[:, :2] - seat.position, axis=1) < 0.25, 2] - seat.height
+        if ((over > _UPPER) & (over < _UPRIGHT)).any():
+            low = True
+            continue
         # what is over the bed, such as an upper bunk, is not part of it
         under = points[points[:, 2] < seat.height + _UPPER]
         field = height_field(under, points[:, :2].min(0), points[:, :2].max(0), field.cell)
@@ -74,6 +79,10 @@ def bed_of(
         bed = _lain(field.middles(level), under, seat, longer, softness)
         if bed:
             found.append(bed)
+    if not found and low:
+        raise InputError(
+            f"What hangs over '{piece.name}' is too low to sit upright; choose another bed."
+        )
     if not found:
         raise InputError(
             f"'{piece.name}' is too short to lie on, or nobody can sit down on its long side; "
