@@ -166,16 +166,22 @@ GROUPS: dict[str, Callable[[HeldClip], str]] = {
 DRAWS = 2000
 
 
-def prepare_without_pieces(dataset: Path, folder: Path, out: Path) -> None:
-    """Make (or go on making) the dataset ``out``: as ``dataset``, of the same motion files, without
-    its real pieces. Raises InputError where that has none.
-    """
-    described = json.loads((dataset / "dataset.json").read_text(encoding="utf-8"))
+def described_with_pieces(dataset: Path) -> dict[str, Any]:
+    """What a dataset says of itself. Raises InputError where it was made without real pieces."""
+    described: dict[str, Any] = json.loads((dataset / "dataset.json").read_text(encoding="utf-8"))
     if "furniture" not in described:
         raise InputError(
             f"The dataset '{dataset}' has no real pieces; give one made with 'dafnet prepare "
             "--furniture'."
         )
+    return described
+
+
+def prepare_without_pieces(dataset: Path, folder: Path, out: Path) -> None:
+    """Make (or go on making) the dataset ``out``: as ``dataset``, of the same motion files, without
+    its real pieces. Raises InputError where that has none.
+    """
+    described = described_with_pieces(dataset)
     prepare(folder, out, described["windows"], cores(), described["seed"])
 
 

@@ -23,8 +23,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import life
-from benchmarks.ablation import train_on
-from dafnet_addon.core.errors import InputError
+from benchmarks.ablation import described_with_pieces, train_on
 from dafnet_addon.core.files import save_text
 from dafnet_addon.core.liveliness import BANDS
 from dafnet_addon.core.threads import cores
@@ -76,12 +75,7 @@ def _dataset_of(variant: Variant, dataset: Path, folder: Path, library: Path, ou
     """Make (or go on making) the dataset of a variant: its folder. Raises InputError where the
     whole one has no real pieces.
     """
-    described = json.loads((dataset / "dataset.json").read_text(encoding="utf-8"))
-    if "furniture" not in described:
-        raise InputError(
-            f"The dataset '{dataset}' has no real pieces; give one made with 'dafnet prepare "
-            "--furniture'."
-        )
+    described = described_with_pieces(dataset)
     if variant.made_alike:
         return dataset
 

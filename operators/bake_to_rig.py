@@ -7,12 +7,12 @@ import bpy
 from ..dafnet_addon.blender.rig.baker import bake_onto_rig
 from ..dafnet_addon.blender.rig.doubts import doubts
 from ..dafnet_addon.blender.rig.properties import character_for, map_of, rig_of
-from .base import DafnetOperator, idle
+from .base import RigOperator
 
 __all__ = ["DAFNET_OT_bake_to_rig"]
 
 
-class DAFNET_OT_bake_to_rig(DafnetOperator, bpy.types.Operator):
+class DAFNET_OT_bake_to_rig(RigOperator, bpy.types.Operator):
     """Bake the motion that the character plays, your edits included, into a new action on this
     armature
     """
@@ -20,14 +20,6 @@ class DAFNET_OT_bake_to_rig(DafnetOperator, bpy.types.Operator):
     bl_idname = "dafnet.bake_to_rig"
     bl_label = "Bake to Rig"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """A rig of the animator's own is active, and no job is running."""
-        if not idle(cls):
-            return False
-        cls.poll_message_set("Select the armature of your rig, in object or pose mode")
-        return rig_of(context) is not None and context.mode in {"OBJECT", "POSE"}
 
     def run(self, context: bpy.types.Context) -> None:
         """Bake, and say how near the result is."""

@@ -7,9 +7,10 @@ from typing import Any
 import bpy
 
 from ..dafnet_addon.blender.pipeline.running import running_job
+from ..dafnet_addon.blender.rig.properties import rig_of
 from ..dafnet_addon.core.errors import DafnetError
 
-__all__ = ["DafnetOperator", "idle", "reported"]
+__all__ = ["DafnetOperator", "RigOperator", "idle", "reported"]
 
 
 @contextmanager
@@ -47,3 +48,17 @@ def idle(operator: Any) -> bool:
         return True
     operator.poll_message_set("Wait for the job that is running, or cancel it with Esc")
     return False
+
+
+class RigOperator(DafnetOperator):
+    """An operator that works on the animator's own rig and a character."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """A rig of the animator's own is active, and no job is running."""
+        if not idle(cls):
+            return False
+        cls.poll_message_set(  # type: ignore[attr-defined]
+            "Select the armature of your rig, in object or pose mode"
+        )
+        return rig_of(context) is not None and context.mode in {"OBJECT", "POSE"}

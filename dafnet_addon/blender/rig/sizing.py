@@ -10,7 +10,7 @@ from ...core.errors import InputError
 from ...core.skeleton import JOINTS, STATURE
 from ..character.armature import character_scale, metres_per_unit
 from .maps import RigMap, require_usable, with_bone_names_of
-from .reading import rigid_parts, shape_of
+from .reading import rest_matrices, rigid_parts, shape_of
 
 __all__ = ["leg_ratio", "size_as_rig"]
 
@@ -24,10 +24,7 @@ def leg_ratio(rig: bpy.types.Object, rig_map: RigMap) -> float:
     require_usable(rig, rig_map)
     world = np.array(rig.matrix_world, float)[None]
     _, scale = rigid_parts(world, f"armature '{rig.name}'")
-    bones = [rig.data.bones.get(rig_map.place(name) or "") for name in JOINTS]
-    rest = np.array(
-        [np.full((4, 4), np.nan) if bone is None else bone.matrix_local for bone in bones], float
-    )
+    rest = rest_matrices(rig, [rig_map.place(name) for name in JOINTS])
     return shape_of(rig, rig_map, rest, scale).body.leg() / canonical_body(1.0).leg()
 
 
