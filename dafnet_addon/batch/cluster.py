@@ -9,6 +9,7 @@ import logging
 import secrets
 import time
 from collections.abc import Iterable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -29,8 +30,7 @@ __all__ = ["cluster_workers"]
 
 _ANSWERS = 10.0
 """Seconds within which a scheduler has to answer, and a worker to be there."""
-_RETURNS = 60.0
-"""Seconds for which a scheduler may be out of reach."""
+_GONE = "The Dask scheduler is gone; what is done is kept: start it again, and run again."
 
 
 @contextmanager
@@ -81,31 +81,28 @@ def _outcomes(client: "Client", orders: Iterable[Order]) -> Iterator[Outcome | N
     for name, future in futures.items():
         future.add_done_callback(lambda done, name=name: results.put((name, done)))
 
-    answered = time.monotonic()
     while futures:
-        if client.status == "running":
-            answered = time.monotonic()
-        elif time.monotonic() - answered > _RETURNS or client.status == "closed":
-            raise InputError(
-                "The Dask scheduler is gone; what is done is kept: start it again, and run again."
-            )
+        if client.status != "running":  # by then Dask has given up all that was asked for
+            raise InputError(_GONE)
         try:
             name, future = results.get(timeout=TICK)
         except Empty:
             yield None
-        else:
-            # A future that was lost with its scheduler is done, too, but has no result.
-            if future.status != "cancelled":
-                del futures[name]
-                yield _outcome(name, future)
+            continue
+        try:
+            outcome = _outcome(name, future)
+        except (OSError, CancelledError) as lost:  # gone while the outcome was on its way
+            raise InputError(_GONE) from lost
+        del futures[name]
+        yield outcome
 
 
 def _outcome(name: str, future: "Future") -> Outcome:
-    if future.status == "finished":
+    error = future.exception()
+    if error is None:
         found: Outcome = future.result()
         return found
 
-    error = future.exception()
     if type(error).__name__ == "KilledWorker":
         return Outcome(
             name,

@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -20,11 +21,15 @@ if importlib.util.find_spec("distributed") is None:
 from dafnet_addon.batch import cluster
 from dafnet_addon.batch.cluster import cluster_workers
 from dafnet_addon.batch.lists import read_list
+from dafnet_addon.batch.making import Outcome
 from dafnet_addon.batch.running import Batch, make_batch
 from dafnet_addon.core.errors import InputError
 from kit.batches import HEAD, alive, contents, shot, wait_until
 from kit.places import ROOT
 from kit.populating import PROGRAM
+
+if TYPE_CHECKING:
+    from distributed import Future
 
 pytestmark = pytest.mark.slow
 
@@ -137,8 +142,7 @@ def test_a_cluster_without_workers(
         made(batch(tmp_path, shot("a")), scheduler)
 
 
-def test_a_scheduler_that_is_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "_RETURNS", 2.0)
+def test_a_scheduler_that_is_gone(tmp_path: Path) -> None:
     file = tmp_path / "scheduler.json"
     options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
     of = batch(tmp_path, shot("quick") + shot("slow", seconds=60.0))
@@ -156,6 +160,26 @@ def test_a_scheduler_that_is_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
                 made(of, address)
             killer.join()
     wait_until(lambda: not alive(str(tmp_path / "out")))
+    assert contents(of.output).keys() == {"quick"}
+
+
+def test_a_scheduler_that_goes_while_an_outcome_is_fetched(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "scheduler.json"
+    options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    of = batch(tmp_path, shot("quick"))
+    with started(*_DASK, *options, "--scheduler-file", str(file)) as process:
+        address = address_in(file)
+        fetched = cluster._outcome
+
+        def killing(name: str, future: "Future") -> Outcome:
+            process.kill()
+            return fetched(name, future)
+
+        monkeypatch.setattr(cluster, "_outcome", killing)
+        with worker(address), pytest.raises(InputError, match="The Dask scheduler is gone"):
+            made(of, address)
     assert contents(of.output).keys() == {"quick"}
 
 
