@@ -1,0 +1,64 @@
+#!/usr/bin/env python3
+"""Joins pictures into a film that pages and READMEs show: an animated WebP.
+
+    scripts/film.py out/cafe/truth/frames -o docs/guide/cafe.webp --seconds 22
+
+The pictures are those of a folder, in the order of their names, as ``dafnet populate --render
+frames`` and the window tests write them. Needs Pillow.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from PIL import Image
+
+
+def film(pictures: list[Path], out: Path, *, seconds: float, width: int, quality: int) -> None:
+    """Write ``pictures`` as a film of ``seconds`` that begins anew, ``width`` pixels wide."""
+    images = []
+    for picture in pictures:
+        image = Image.open(picture).convert("RGB")
+        size = (width, round(image.height * width / image.width))
+        images.append(image.resize(size, Image.Resampling.LANCZOS))
+
+    out.parent.mkdir(parents=True, exist_ok=True)
+    images[0].save(
+        out,
+        save_all=True,
+        append_images=images[1:],
+        duration=round(1000.0 * seconds / len(images)),
+        loop=0,
+        quality=quality,
+        method=6,
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--seconds", type=float, required=True, help="of the whole film")
+    parser.add_argument("--width", type=int, default=720, help="pixels")
+    parser.add_argument("--quality", type=int, default=60, help="0 to 100")
+    options = parser.parse_args()
+
+    pictures = sorted(options.folder.glob("*.png"))
+    if not pictures:
+        sys.exit(f"There are no PNG files in '{options.folder}'.")
+    film(
+        pictures,
+        options.output,
+        seconds=options.seconds,
+        width=options.width,
+        quality=options.quality,
+    )
+    print(
+        f"{options.output}: {len(pictures)} pictures, {options.output.stat().st_size / 1e6:.1f} MB"
+    )
+
+
+if __name__ == "__main__":
+    main()
