@@ -36,6 +36,7 @@ _RESEARCH = {
     "canonical": "canonical",
     "farm": "farm",
     "life-ablation": "life_ablation",
+    "rerun": "rerun",
     "scale": "scale",
     "tables": "experiments",
 }
@@ -47,6 +48,7 @@ _NEEDS = {
     "ablation": ("torch",),
     "life-ablation": ("torch",),
     "farm": ("bpy",),
+    "rerun": ("torch",),
     "scale": ("bpy",),
     "speed": ("torch",),
     "tables": ("torch",),
@@ -104,7 +106,8 @@ COMMAND = Command(
     summary=(
         f"measure: {'; '.join(f'{name!r}: {does}' for name, does in _MEASURES.items())}; "
         "'canonical' fits bodies to the skeleton; 'ablation', 'life-ablation' and 'tables' "
-        "train and compare; 'scale' makes batches and kills them, 'farm' says what many shots take"
+        "train and compare; 'rerun' makes figures of the weights' report again; 'scale' makes "
+        "batches and kills them, 'farm' says what many shots take"
     ),
     add_arguments=_add_arguments,
     run=_run,

@@ -54,6 +54,7 @@ __all__ = [
     "measure_clip",
     "captured_clips",
     "clean_up_takes",
+    "group_of",
     "grouped",
     "measure_takes",
     "map_clips",
@@ -384,21 +385,23 @@ def captured_clips(clips: Sequence[HeldClip]) -> list[HeldClip]:
     return [clip for clip in clips if clip.unseen and not clip.composed and not clip.room]
 
 
+def group_of(clip: HeldClip) -> str:
+    """What the names of a clip's rows end with: nothing for unseen bodies, captured as they are."""
+    if not clip.unseen:
+        return "_bodies_in_training"
+    if clip.room:
+        return "_on_beds" if clip.room == "bed" else "_at_desks_and_shelves"
+    return "_composed" if clip.composed else ""
+
+
 def rows_by_group(clips: Sequence[MeasuredClip]) -> dict[str, dict[str, Any]]:
     """Ground truth and all runs on unseen bodies, captured as they are; then at desks and shelves,
     raised onto beds, on composed clips, and on bodies that are also in training.
     """
-    groups = {
-        "": [m for m in clips if captured_clips([m.clip])],
-        "_at_desks_and_shelves": [
-            m for m in clips if m.clip.unseen and m.clip.room not in ("", "bed")
-        ],
-        "_on_beds": [m for m in clips if m.clip.unseen and m.clip.room == "bed"],
-        "_composed": [m for m in clips if m.clip.unseen and m.clip.composed and not m.clip.room],
-        "_bodies_in_training": [m for m in clips if not m.clip.unseen],
-    }
+    groups = grouped(clips, group_of)
     out: dict[str, dict[str, Any]] = {}
-    for suffix, chosen in groups.items():
+    for suffix in ("", "_at_desks_and_shelves", "_on_beds", "_composed", "_bodies_in_training"):
+        chosen = groups.get(suffix, [])
         runs = [run for run in _RUNS if chosen and run in chosen[0].runs]
         out |= {run + suffix: values for run, values in rows_by_run(chosen, runs).items()}
 
