@@ -19,11 +19,12 @@ def register() -> None:
     from . import operators, panels
     from .dafnet_addon import cli
     from .dafnet_addon.blender import preferences, translations
-    from .dafnet_addon.blender.character import properties
+    from .dafnet_addon.blender.character import choosing, properties
     from .dafnet_addon.blender.overlay import display
 
     preferences.register()
     properties.register()
+    choosing.register()
     display.register()
     bpy.utils.register_preset_path(_FILES)
     translations.register()
@@ -40,7 +41,7 @@ def unregister() -> None:
 
     from . import operators, panels
     from .dafnet_addon.blender import preferences, translations
-    from .dafnet_addon.blender.character import properties
+    from .dafnet_addon.blender.character import choosing, properties
     from .dafnet_addon.blender.overlay import display
 
     while _commands:
@@ -53,5 +54,6 @@ def unregister() -> None:
     translations.unregister()
     bpy.utils.unregister_preset_path(_FILES)
     display.unregister()
+    choosing.unregister()
     properties.unregister()
     preferences.unregister()

@@ -6,11 +6,12 @@ from typing import Any
 
 import bpy
 
+from ..dafnet_addon.blender.character.armature import character_of, choose
 from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.blender.rig.properties import rig_of
 from ..dafnet_addon.core.errors import DafnetError
 
-__all__ = ["DafnetOperator", "RigOperator", "idle", "reported"]
+__all__ = ["DafnetOperator", "RigOperator", "idle", "remember_character", "reported"]
 
 
 @contextmanager
@@ -36,10 +37,18 @@ class DafnetOperator:
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Run, as Blender calls it: finished, or cancelled and the error reported."""
+        remember_character(context)
         with reported(self):
             self.run(context)
             return {"FINISHED"}
         return {"CANCELLED"}
+
+
+def remember_character(context: bpy.types.Context) -> None:
+    """Let the tab belong to the character that is directed now."""
+    character = character_of(context)
+    if character is not None and not character.library:
+        choose(context.scene, character)
 
 
 def idle(operator: Any) -> bool:

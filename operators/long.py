@@ -8,7 +8,7 @@ import bpy
 
 from ..dafnet_addon.blender.pipeline.running import RunningJob, begin_job, end_job
 from ..dafnet_addon.core.progress import run_to_end
-from .base import DafnetOperator, reported
+from .base import DafnetOperator, remember_character, reported
 
 __all__ = ["LongOperator"]
 
@@ -60,6 +60,7 @@ class LongOperator(DafnetOperator):
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Start the job; ``modal`` continues it."""
+        remember_character(context)
         with reported(self):
             self._steps, self._started, self._share = self.steps(context), perf_counter(), 0.0
             if (result := self._advance(self.seconds_before_modal)) is not None:

@@ -13,6 +13,7 @@ from ..dafnet_addon.blender.character.armature import (
 )
 from ..dafnet_addon.blender.character.task_rows import TaskRow, add_row, tasks_of
 from ..dafnet_addon.blender.directing.tasks import Assignment, Directed, direct
+from ..dafnet_addon.blender.overlay import display
 from .base import DafnetOperator, idle
 from .long import LongOperator
 
@@ -113,7 +114,8 @@ class DAFNET_OT_plan_tasks(LongOperator, bpy.types.Operator):
         return direct.steps(context, people)
 
     def report_result(self, result: tuple[Directed, ...]) -> None:
-        """Say what was keyed, and pass the warnings on."""
+        """Draw the path, say what was keyed, and pass the warnings on."""
+        display.suggest("path")
         for each in result:
             for warning in each.warnings:
                 self.report({"WARNING"}, f"{each.name}: {warning}")

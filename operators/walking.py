@@ -3,6 +3,7 @@
 from typing import ClassVar
 
 from ..dafnet_addon.blender.directing.walking import Walk
+from ..dafnet_addon.blender.overlay import display
 from .long import LongOperator
 
 __all__ = ["WalkOperator"]
@@ -14,7 +15,8 @@ class WalkOperator(LongOperator):
     seconds_before_modal: ClassVar[float] = 0.1
 
     def report_result(self, result: Walk) -> None:
-        """Say where the root was keyed, and pass the warnings on."""
+        """Draw the path, say where the root was keyed, and pass the warnings on."""
+        display.suggest("path")
         for warning in result.warnings:
             self.report({"WARNING"}, warning)
         ended = ", the range now ends there" if result.extended else ""

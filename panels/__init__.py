@@ -1,6 +1,6 @@
 """What the animator sees. Panels draw and change nothing."""
 
-from .main import DAFNET_PT_character
+from .main import DAFNET_PT_character, DAFNET_PT_shot
 from .overlays import DAFNET_PT_overlays
 from .presets import DAFNET_MT_presets, DAFNET_PT_presets
 from .rig import DAFNET_PT_rig, DAFNET_UL_rig
@@ -11,6 +11,8 @@ from .tasks import DAFNET_PT_tasks, DAFNET_UL_tasks
 __all__ = ["CLASSES", "add_menu"]
 
 CLASSES = (
+    DAFNET_UL_rig,
+    DAFNET_PT_rig,  # above the character, while a rig is active
     DAFNET_MT_presets,
     DAFNET_PT_presets,
     DAFNET_PT_character,
@@ -18,10 +20,9 @@ CLASSES = (
     DAFNET_MT_add,
     DAFNET_UL_tasks,
     DAFNET_PT_tasks,
+    DAFNET_PT_shot,
     DAFNET_UL_takes,
     DAFNET_PT_takes,
     DAFNET_PT_clean_up,
     DAFNET_PT_overlays,
-    DAFNET_UL_rig,
-    DAFNET_PT_rig,
 )

@@ -1,12 +1,13 @@
-"""The first panel of the tab in the 3D view's sidebar: the active character, its mode and targets,
-and Generate.
+"""The first panel of the tab in the 3D view's sidebar: whose it is; and that of the shot: the
+character's mode and targets, and Generate.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import bpy
 
-from ..dafnet_addon.blender.character.armature import character_and_goal, character_of
+from ..dafnet_addon.blender.character.armature import character_of, is_character
 from ..dafnet_addon.blender.character.targets import (
     FEET,
     HEAD_AND_HANDS,
@@ -20,10 +21,9 @@ from ..operators.add_root import DAFNET_OT_add_root
 from ..operators.add_targets import DAFNET_OT_add_foot_targets, DAFNET_OT_add_targets
 from ..operators.find_furniture import DAFNET_OT_find_furniture
 from ..operators.generate import DAFNET_OT_cancel, DAFNET_OT_generate
-from ..operators.walk_to import DAFNET_OT_walk_to
 from .presets import DAFNET_PT_presets
 
-__all__ = ["CharacterPanel", "DAFNET_PT_character"]
+__all__ = ["CharacterPanel", "DAFNET_PT_character", "DAFNET_PT_shot"]
 
 
 class CharacterPanel:
@@ -36,12 +36,12 @@ class CharacterPanel:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """A character is active."""
+        """There is a character, and no job is running."""
         return running_job() is None and character_of(context) is not None
 
 
 class DAFNET_PT_character(bpy.types.Panel):
-    """Settings of the active character, and Generate"""
+    """The character that the panels below are about"""
 
     bl_label = "DAFNet"
     bl_idname = "DAFNET_PT_character"
@@ -55,7 +55,7 @@ class DAFNET_PT_character(bpy.types.Panel):
             DAFNET_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the settings of the active character, or the way to get one."""
+        """Draw the character's name, or the way to get one; while a job runs, how far it is."""
         layout = self.layout
         if (running := running_job()) is not None:
             layout.progress(
@@ -67,24 +67,28 @@ class DAFNET_PT_character(bpy.types.Panel):
 
         character = character_of(context)
         if character is None:
-            directed, goal = character_and_goal(context)
-            if directed is not None and goal is not None:
-                layout.label(text=f"{directed.name}: {goal.name}", icon="ARMATURE_DATA")
-                layout.operator(
-                    DAFNET_OT_walk_to.bl_idname,
-                    text=f"Sit on {goal.name}",
-                    icon="TRACKING_FORWARDS",
-                ).goal = "SEAT"
-                return
-
-            layout.label(text="No character is selected", icon="INFO")
+            several = any(is_character(each) for each in context.scene.objects)
+            text = "Select a character" if several else "Add a character first"
+            layout.label(text=text, icon="INFO")
             layout.operator(DAFNET_OT_add_character.bl_idname, icon="ARMATURE_DATA")
             return
 
-        settings = character.dafnet
         row = layout.row()
-        row.label(text=character.name, icon="ARMATURE_DATA")
+        row.label(text=character.name, icon="ARMATURE_DATA", translate=False)
         row.operator(DAFNET_OT_add_character.bl_idname, text="", icon="ADD")
+
+
+class DAFNET_PT_shot(CharacterPanel, bpy.types.Panel):
+    """What is generated, and from what"""
+
+    bl_label = "Shot"
+    bl_idname = "DAFNET_PT_shot"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the settings of the character, and Generate."""
+        layout = self.layout
+        character: Any = character_of(context)
+        settings = character.dafnet
         layout.row(align=True).prop(settings, "mode", expand=True)
         layout.use_property_split = True
         layout.use_property_decorate = False

@@ -9,7 +9,6 @@ from ..dafnet_addon.blender.directing.path_sources import (
     is_curve,
     may_move,
 )
-from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.blender.showcase.examples import EXAMPLES
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.add_example import DAFNET_OT_add_example
@@ -31,13 +30,6 @@ class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
 
     bl_label = "Set Up"
     bl_idname = "DAFNET_PT_setup"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """There is a character to direct: the active one, one that is selected together with its
-        goal, or the only one.
-        """
-        return running_job() is None and character_and_goal(context)[0] is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the buttons, with the names of what they would take."""

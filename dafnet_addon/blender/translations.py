@@ -7,6 +7,7 @@ import bpy
 __all__ = ["register", "unregister"]
 
 _GERMAN = {
+    "Add a character first": "Zuerst eine Figur hinzufügen",
     "Add Character": "Figur hinzufügen",
     "Add Root": "Wurzel hinzufügen",
     "Add DAFNet Example": "DAFNet-Beispiel hinzufügen",
@@ -86,7 +87,6 @@ _GERMAN = {
     "Move Task": "Aufgabe verschieben",
     "Nearest": "Nächstgelegen",
     "Noise": "Rauschen",
-    "No character is selected": "Keine Figur ist gewählt",
     "Offset": "Versatz",
     "On Tables": "Auch auf Tische",
     "On to Cursor": "Weiter zum Cursor",
@@ -117,7 +117,9 @@ _GERMAN = {
     "Scene Range": "Bereich der Szene",
     "Seconds": "Sekunden",
     "Seed": "Startwert",
+    "Select a character": "Eine Figur auswählen",
     "Set Up": "Einrichten",
+    "Shot": "Einstellung",
     "Sit on": "Setzen auf",
     "Sit on Selected": "Auf Gewähltes setzen",
     "Sliding": "Rutschen",

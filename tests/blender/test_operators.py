@@ -13,7 +13,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.job import run
 from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.scene_reader import read_scene
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
-from bl_ext.user_default.dafnet.panels.main import DAFNET_PT_character
+from bl_ext.user_default.dafnet.panels.main import DAFNET_PT_character, DAFNET_PT_shot
 
 from kit.panels import drawn_by
 from kit.stage import Stage, bone_heads, keys_of
@@ -143,7 +143,7 @@ def test_buttons_say_what_is_missing(shot: Stage) -> None:
         bpy.context.view_layer.objects.active = belongs
         assert generate.poll()
     bpy.context.view_layer.objects.active = shot.ann.dafnet.furniture.objects[0]
-    assert not generate.poll()
+    assert generate.poll(), "the tab is still hers"
     bpy.context.view_layer.objects.active = shot.ann
     bpy.ops.object.mode_set(mode="POSE")
     assert generate.poll() and not add.poll()
@@ -167,10 +167,14 @@ def test_one_undo_step(shot: Stage) -> None:
 
 def test_the_panel_draws(shot: Stage) -> None:
     """In each of its states."""
-    panel = DAFNET_PT_character
 
     def drawn() -> list[str]:
-        return drawn_by(panel, bpy.context).words()
+        return [
+            word
+            for panel in (DAFNET_PT_character, DAFNET_PT_shot)
+            if getattr(panel, "poll", lambda _context: True)(bpy.context)
+            for word in drawn_by(panel, bpy.context).words()
+        ]
 
     shot.ann.dafnet.mode = "FREE"
     free = drawn()
@@ -192,4 +196,6 @@ def test_the_panel_draws(shot: Stage) -> None:
     finally:
         running.end_job()
     bpy.context.view_layer.objects.active = None
+    assert "root" in drawn(), "the tab is still hers"
+    bpy.data.objects.remove(shot.ann)
     assert "dafnet.add_character" in drawn() and "root" not in drawn()

@@ -88,6 +88,7 @@ def shot(blender):
     yield made
     for kind in contents.KINDS:
         display.switch(kind, False)
+    display._declined.clear()
     display.hide_live_pose()
     display.hide_faults()
     watched.forget()
@@ -406,6 +407,16 @@ def test_another_object_may_be_active(shot: Shot) -> None:
     assert watched.watched_character(bpy.context).name == "Bob", (
         "the last one, while the furniture is worked on"
     )
+
+
+def test_the_path_is_drawn_once_a_walk_is_keyed_unless_it_was_turned_off(shot: Shot) -> None:
+    shot.scene.cursor.location = (0.0, 2.0, 0.0)
+    assert bpy.ops.dafnet.walk_to(goal="CURSOR") == {"FINISHED"}
+    assert display.switched_on() == {"path"} and shot.drawn("path")
+    display.switch("path", False)
+    shot.scene.cursor.location = (1.0, 3.0, 0.0)
+    assert bpy.ops.dafnet.walk_to(goal="CURSOR") == {"FINISHED"}
+    assert not display.switched_on()
 
 
 def test_faulty_frames_are_marked_and_unmarked(shot: Shot) -> None:

@@ -15,6 +15,7 @@ from .mannequin import FACING, add_body
 
 __all__ = [
     "bodies",
+    "choose",
     "create_character",
     "character_of",
     "character_scale",
@@ -22,6 +23,7 @@ __all__ = [
     "metres_per_unit",
     "missing_bones",
     "objects_of",
+    "owner_of",
     "character_and_goal",
     "selected_characters",
 ]
@@ -102,24 +104,44 @@ def bodies(scene: bpy.types.Scene) -> set[bpy.types.Object]:
 
 
 def character_of(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The character that the active object is or belongs to: its armature, its body, its root or
-    one of its targets.
+    """The character that all is about: the one that the active object is or belongs to, else a
+    selected one, else the one that was chosen last (``choose``), else the only one of the scene.
     """
-    return _owner(context.scene, context.object) if context.object else None
+    if context.object and (owner := owner_of(context.scene, context.object)):
+        return owner
+    for each in context.selected_objects:
+        if owner := owner_of(context.scene, each):
+            return owner
+    armatures = [o for o in context.scene.objects if o.type == "ARMATURE"]
+    found = [o for o in armatures if o.dafnet.chosen and is_character(o)]
+    found = found or [o for o in armatures if is_character(o)]
+    return found[0] if len(found) == 1 else None
+
+
+def choose(scene: bpy.types.Scene, character: bpy.types.Object) -> None:
+    """Let everything be about this character of the scene until another one is chosen."""
+    for each in scene.objects:
+        if each.type == "ARMATURE" and each.dafnet.chosen != (each == character):
+            each.dafnet.chosen = each == character
 
 
 def selected_characters(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The active character, and then those to which selected objects belong, by their names."""
-    found = [_owner(context.scene, each) for each in context.selected_objects]
+    """The character of ``character_of``, and then the others to which selected objects belong, by
+    their names.
+    """
+    found = [owner_of(context.scene, each) for each in context.selected_objects]
     others = sorted({each for each in found if each is not None}, key=lambda o: o.name)
-    active = character_of(context)
-    return [*([active] if active else []), *(each for each in others if each != active)]
+    first = character_of(context)
+    return [*([first] if first else []), *(each for each in others if each != first)]
 
 
-def _owner(scene: bpy.types.Scene, part: bpy.types.Object) -> bpy.types.Object | None:
-    """The character that an object is or belongs to."""
+def owner_of(scene: bpy.types.Scene, part: bpy.types.Object) -> bpy.types.Object | None:
+    """The character that an object of the scene is or belongs to: as its armature, its body, its
+    root, one of its targets, or the animator's own rig that it is baked onto.
+    """
     if part.type == "ARMATURE":
-        return part if is_character(part) else None
+        character = part if is_character(part) else part.dafnet_rig.character
+        return character if character and character.name in scene.objects else None
     if part.parent and is_character(part.parent):
         return part.parent
 
@@ -139,15 +161,12 @@ def character_and_goal(
 ) -> tuple[bpy.types.Object | None, bpy.types.Object | None]:
     """The character to direct and the furniture to send it to, as the selection says.
 
-    The character is the active one, else a selected one, else the only one of the scene. The
-    furniture is the active or the only selected object that does not belong to a character: a mesh,
-    or an empty that holds meshes or a collection.
+    The character is that of ``character_of``. The furniture is the active or the only selected
+    object that does not belong to a character: a mesh, or an empty that holds meshes or a
+    collection.
     """
     characters = [o for o in context.scene.objects if is_character(o)]
-    chosen = [character_of(context), *(o for o in context.selected_objects if o in characters)]
-    character = next(
-        (o for o in chosen if o is not None), characters[0] if len(characters) == 1 else None
-    )
+    character = character_of(context)
     parts = {part for each in characters for part in objects_of(each)}
     meshes = [o for o in context.selected_objects if o not in parts and _holds_meshes(o)]
     active = context.object
@@ -260,6 +279,7 @@ def create_character(
     settings.root.select_set(True)
     armature.select_set(True)
     context.view_layer.objects.active = armature
+    choose(context.scene, armature)
     return armature
 
 

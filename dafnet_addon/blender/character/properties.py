@@ -134,6 +134,11 @@ class TakeLink(bpy.types.PropertyGroup):
 class CharacterSettings(bpy.types.PropertyGroup):
     """Settings of one character."""
 
+    chosen: BoolProperty(
+        override=_LOCALLY,
+        options={"HIDDEN"},
+        description="Whether the tab belongs to this character while no other is selected",
+    )
     mode: EnumProperty(
         override=_LOCALLY,
         name="Mode",

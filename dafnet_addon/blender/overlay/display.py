@@ -1,6 +1,6 @@
 """Overlays in the viewport and the timeline: their switches, and when Blender draws them.
 
-All are off at first. Blender is asked to draw only while a switch is on or a job shows its live
+All are off at first; the root's path is drawn once one was keyed (``suggest``). Blender is asked to draw only while a switch is on or a job shows its live
 pose. The switches live here and not in the
 file, so opening another file or undoing leaves them as they are. Nothing here holds on to objects
 of the file: ``contents`` looks them up at each redraw.
@@ -31,12 +31,15 @@ __all__ = [
     "show_faults",
     "show_live_pose",
     "shown_faults",
+    "suggest",
     "switch",
     "switched_on",
     "unregister",
 ]
 
 _on: set[str] = set()
+_declined: set[str] = set()
+"""What was on and was turned off."""
 _live_pose: list[Callable[[], np.ndarray | None]] = []
 _faults: dict[int, Faults] = {}
 _drawers: dict[str, tuple[Any, Any]] = {}
@@ -100,9 +103,17 @@ def switch(kind: str, on: bool) -> None:
     """Turn one of ``contents.KINDS`` on or off."""
     if on:
         _on.add(kind)
-    else:
-        _on.discard(kind)
+        _declined.discard(kind)
+    elif kind in _on:
+        _on.remove(kind)
+        _declined.add(kind)
     _arrange()
+
+
+def suggest(kind: str) -> None:
+    """Turn a kind on, unless it was turned off in this session."""
+    if kind not in _declined and kind not in _on:
+        switch(kind, True)
 
 
 def switched_on() -> frozenset[str]:
@@ -274,6 +285,7 @@ def register() -> None:
 def unregister() -> None:
     """Turn everything off and take the switches away."""
     _on.clear()
+    _declined.clear()
     _live_pose.clear()
     _faults.clear()
     _arrange()

@@ -9,7 +9,7 @@ from ...core.cleanup import standing_still
 from ...core.resampling import frame_times, resample_nearest, resample_positions
 from ...core.series import MODEL_FPS
 from ...core.take import Controls, Take
-from ..character.armature import character_and_goal, is_character
+from ..character.armature import character_of
 from ..character.takes import PACKED, played_take, stored_take
 from .cache import cache
 
@@ -36,19 +36,14 @@ def forget() -> None:
 
 
 def watched_character(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The character that overlays are for (``armature.character_and_goal``); where there is none,
-    the one that they were for last.
-    """
+    """The character that overlays are for (``armature.character_of``)."""
     scene, active = context.scene, context.object
     key = cache.edits, scene.session_uid, active.session_uid if active else 0
     last = scene.objects.get(_last_watched[1])
     if last is not None and _last_watched[0] == key:
         return last
 
-    character, _ = character_and_goal(context)
-    if character is None and last is not None and is_character(last):
-        character = last
-
+    character = character_of(context)
     _last_watched[:] = key, character.name if character else ""
     return character
 
