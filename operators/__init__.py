@@ -18,6 +18,7 @@ from .generate import DAFNET_OT_cancel, DAFNET_OT_generate
 from .map_rig import DAFNET_OT_detect_rig, DAFNET_OT_load_rig_map, DAFNET_OT_save_rig_map
 from .mark_frames import DAFNET_OT_mark_frames
 from .presets import DAFNET_OT_add_preset
+from .redo_walk import DAFNET_OT_redo_walk
 from .size_as_rig import DAFNET_OT_size_as_rig
 from .takes import (
     DAFNET_OT_clean_again,
@@ -40,6 +41,7 @@ CLASSES = (
     DAFNET_OT_generate,
     DAFNET_OT_cancel,
     DAFNET_OT_walk_to,
+    DAFNET_OT_redo_walk,
     DAFNET_OT_add_task,
     DAFNET_OT_remove_task,
     DAFNET_OT_move_task,

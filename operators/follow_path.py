@@ -5,7 +5,8 @@ from collections.abc import Callable, Generator
 import bpy
 from bpy.props import BoolProperty, FloatProperty
 
-from ..dafnet_addon.blender.character.armature import character_and_goal
+from ..dafnet_addon.blender.character.armature import character_of
+from ..dafnet_addon.blender.character.walk_rows import MANNER
 from ..dafnet_addon.blender.directing.path_sources import (
     along_curve,
     along_object,
@@ -16,7 +17,6 @@ from ..dafnet_addon.blender.directing.path_sources import (
     through_points,
 )
 from ..dafnet_addon.blender.directing.walking import Walk
-from ..dafnet_addon.core.trails import FASTEST, SLOWEST
 from .base import idle
 from .walking import WalkOperator
 
@@ -26,8 +26,6 @@ __all__ = [
     "DAFNET_OT_walk_through_points",
     "can_direct",
 ]
-
-_SPEED = "Walking speed, in metres per second for a body of 1.75 m"
 
 
 def can_direct(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
@@ -39,7 +37,7 @@ def can_direct(cls: type[bpy.types.Operator], context: bpy.types.Context) -> boo
 
     if context.mode != "OBJECT":
         cls.poll_message_set("Switch to object mode first")
-    elif (character := character_and_goal(context)[0]) is None:
+    elif (character := character_of(context)) is None:
         cls.poll_message_set("Add a character, or select one")
     elif character.dafnet.root is None:
         cls.poll_message_set("Choose the character's root")
@@ -70,15 +68,9 @@ class DAFNET_OT_walk_along_curve(WalkOperator, bpy.types.Operator):
     bl_label = "Walk along Curve"
     bl_options = {"REGISTER", "UNDO"}
 
-    speed: FloatProperty(name="Speed", default=1.1, min=SLOWEST, max=FASTEST, description=_SPEED)
-    seconds: FloatProperty(
-        name="Stay",
-        default=1.0,
-        min=0.0,
-        max=600.0,
-        subtype="TIME_ABSOLUTE",
-        description="How long it stays at the end, in seconds",
-    )
+    speed: FloatProperty(options={"SKIP_SAVE"}, **MANNER["speed"])
+    seconds: FloatProperty(options={"SKIP_SAVE"}, **MANNER["seconds"])
+    gets_up: FloatProperty(options={"SKIP_SAVE"}, **MANNER["gets_up"])
     keep_facing: BoolProperty(
         name="Keep Facing",
         description="Keep looking where it looks now, instead of along the curve",
@@ -100,12 +92,14 @@ class DAFNET_OT_walk_along_curve(WalkOperator, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Generator[float, None, Walk]:
         """Look for the way to the curve, and key the walk."""
         character, curve = character_and_source(context, is_curve)
+        self.take_manner(character)
         return along_curve.steps(
             context,
             character,
             curve,
             speed=self.speed,
             seconds=self.seconds,
+            gets_up=self.gets_up,
             keep_facing=self.keep_facing,
             backwards=self.backwards,
         )
@@ -120,15 +114,9 @@ class DAFNET_OT_walk_through_points(WalkOperator, bpy.types.Operator):
     bl_label = "Walk through Points"
     bl_options = {"REGISTER", "UNDO"}
 
-    speed: FloatProperty(name="Speed", default=1.1, min=SLOWEST, max=FASTEST, description=_SPEED)
-    seconds: FloatProperty(
-        name="Stay",
-        default=1.0,
-        min=0.0,
-        max=600.0,
-        subtype="TIME_ABSOLUTE",
-        description="How long it stays at the last one, in seconds",
-    )
+    speed: FloatProperty(options={"SKIP_SAVE"}, **MANNER["speed"])
+    seconds: FloatProperty(options={"SKIP_SAVE"}, **MANNER["seconds"])
+    gets_up: FloatProperty(options={"SKIP_SAVE"}, **MANNER["gets_up"])
     to_cursor: BoolProperty(
         name="On to Cursor", description="Walk on from the last empty to the 3D cursor"
     )
@@ -140,12 +128,15 @@ class DAFNET_OT_walk_through_points(WalkOperator, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Generator[float, None, Walk]:
         """Look for the way, and key the walk."""
+        character = character_of(context)
+        self.take_manner(character)
         return through_points.steps(
             context,
-            character_and_goal(context)[0],
+            character,
             floor_points(context),
             speed=self.speed,
             seconds=self.seconds,
+            gets_up=self.gets_up,
             to_cursor=self.to_cursor,
         )
 

@@ -7,8 +7,13 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ..dafnet_addon.blender.character.armature import character_of, selected_characters
+from ..dafnet_addon.blender.character.armature import (
+    character_of,
+    metres_per_unit,
+    selected_characters,
+)
 from ..dafnet_addon.blender.character.settings import COMES_AND_GOES, HELD
+from ..dafnet_addon.blender.character.standing import bring_root_along
 from ..dafnet_addon.blender.character.takes import active_take, draw_of, frames_of
 from ..dafnet_addon.blender.overlay import display
 from ..dafnet_addon.blender.pipeline import job
@@ -116,6 +121,9 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
     def _people(self, context: bpy.types.Context) -> list[job.Settings]:
         """The settings of all selected characters; further ones only for new takes."""
         characters = selected_characters(context)
+        unit = metres_per_unit(context.scene)
+        for each in characters:
+            bring_root_along(context.scene, each, each.dafnet.root, unit)
         if self.task != "NEW" or len(characters) == 1:
             return [self._settings(context)]
         return job.distinct_seeds([job.settings_of(o, context.scene) for o in characters])

@@ -6,6 +6,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ..dafnet_addon.blender.character.armature import character_and_goal
+from ..dafnet_addon.blender.character.walk_rows import MANNER
 from ..dafnet_addon.blender.directing.walking import Walk, walk
 from ..dafnet_addon.core.errors import InputError
 from .base import idle
@@ -36,22 +37,10 @@ class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
             ("CURSOR", "Walk to Cursor", "Walk to the 3D cursor and stand there"),
         ],
     )
-    seconds: FloatProperty(
-        name="Stay",
-        default=3.0,
-        min=0.0,
-        max=600.0,
-        subtype="TIME_ABSOLUTE",
-        description="How long it stays there, in seconds",
-    )
-    speed: FloatProperty(
-        name="Speed",
-        default=1.1,
-        min=0.4,
-        max=3.0,
-        description="Walking speed, in metres per second for a body of 1.75 m",
-    )
-
+    speed: FloatProperty(options={"SKIP_SAVE"}, **MANNER["speed"])
+    seconds: FloatProperty(options={"SKIP_SAVE"}, **MANNER["seconds"])
+    sits_down: FloatProperty(options={"SKIP_SAVE"}, **MANNER["sits_down"])
+    gets_up: FloatProperty(options={"SKIP_SAVE"}, **MANNER["gets_up"])
     tables: BoolProperty(
         name="On Tables", description="Sit on a table or a desk as well, if that is selected"
     )
@@ -74,6 +63,7 @@ class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
         if self.goal == "SEAT" and seat is None:
             raise InputError("Select one object to sit on, and nothing else but the character.")
         goal = seat if self.goal == "SEAT" else None
+        self.take_manner(character)
         return walk.steps(
             context,
             character,
@@ -82,4 +72,6 @@ class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
             self.speed,
             tables=self.tables,
             pull_out=self.pull_out,
+            sits_down=self.sits_down,
+            gets_up=self.gets_up,
         )

@@ -1,7 +1,8 @@
 """What the operators that send a character somewhere share."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
+from ..dafnet_addon.blender.character.walk_rows import MANNER
 from ..dafnet_addon.blender.directing.walking import Walk
 from ..dafnet_addon.blender.overlay import display
 from .long import LongOperator
@@ -21,3 +22,10 @@ class WalkOperator(LongOperator):
             self.report({"WARNING"}, warning)
         ended = ", the range now ends there" if result.extended else ""
         self.report({"INFO"}, f"Keyed the root from frame {result.first} to {result.last}{ended}.")
+
+    def take_manner(self, character: Any) -> None:
+        """Set what the caller has left open as the panel says it for the character."""
+        given: Any = self.properties  # type: ignore[attr-defined]
+        for name in MANNER:
+            if name in given.bl_rna.properties and not given.is_property_set(name):
+                setattr(self, name, getattr(character.dafnet, name))

@@ -1,14 +1,18 @@
 """The way from an empty scene to something to generate: a path for the root, furniture, targets."""
 
+from typing import Any
+
 import bpy
 
-from ..dafnet_addon.blender.character.armature import character_and_goal
+from ..dafnet_addon.blender.character.armature import character_and_goal, character_of
+from ..dafnet_addon.blender.character.walk_rows import MANNER, fields_of_walk, title_of_walk
 from ..dafnet_addon.blender.directing.path_sources import (
     character_and_source,
     floor_points,
     is_curve,
     may_move,
 )
+from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.blender.showcase.examples import EXAMPLES
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.add_example import DAFNET_OT_add_example
@@ -19,10 +23,17 @@ from ..operators.follow_path import (
     DAFNET_OT_walk_along_curve,
     DAFNET_OT_walk_through_points,
 )
+from ..operators.redo_walk import DAFNET_OT_redo_walk
 from ..operators.walk_to import DAFNET_OT_walk_to
 from .main import CharacterPanel
 
-__all__ = ["DAFNET_MT_add", "DAFNET_PT_setup", "add_menu"]
+__all__ = [
+    "DAFNET_MT_add",
+    "DAFNET_PT_setup",
+    "DAFNET_PT_walks",
+    "DAFNET_UL_walks",
+    "add_menu",
+]
 
 
 class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
@@ -60,6 +71,13 @@ class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
         text = f"Root from {source.name}" if source else DAFNET_OT_root_from_object.bl_label
         column.operator(DAFNET_OT_root_from_object.bl_idname, text=text, icon="CON_FOLLOWPATH")
 
+        own: Any = character_of(context)
+        column = self.layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        for name in MANNER:
+            column.prop(own.dafnet, name)
+
         column = self.layout.column(align=True)
         column.operator(DAFNET_OT_find_furniture.bl_idname, icon="VIEWZOOM")
         column.operator(DAFNET_OT_add_targets.bl_idname, icon="EMPTY_ARROWS")
@@ -70,6 +88,60 @@ class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
             row = column.row(align=True)
             row.enabled = not seat.dafnet.guess_softness
             row.prop(seat.dafnet, "softness", text="Softness, cm")
+
+
+class DAFNET_UL_walks(bpy.types.UIList):
+    """Walks that a root was keyed for"""
+
+    bl_idname = "DAFNET_UL_walks"
+
+    def draw_item(
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        _data: Any,
+        item: Any,
+        _icon: int,
+        _active: Any,
+        _name: str,
+        _index: int = 0,
+        _flag: int = 0,
+    ) -> None:
+        """A row: where to, and in which frames."""
+        row = layout.split(factor=0.68)
+        row.label(text=title_of_walk(item), translate=False)
+        row.label(text=f"{item.first}\u2013{item.last}", translate=False)
+
+
+class DAFNET_PT_walks(CharacterPanel, bpy.types.Panel):
+    """What the root's keys were made for, to be made anew"""
+
+    bl_label = "Walks"
+    bl_idname = "DAFNET_PT_walks"
+    bl_parent_id = "DAFNET_PT_setup"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """The character was sent somewhere."""
+        character = character_of(context)
+        return running_job() is None and character is not None and len(character.dafnet.walks) > 0
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the list, the chosen walk's fields, and the button."""
+        layout = self.layout
+        own = character_of(context).dafnet  # type: ignore[union-attr]
+        if len(own.walks) > 1:
+            layout.template_list(
+                DAFNET_UL_walks.bl_idname, "", own, "walks", own, "active_walk", rows=2
+            )
+        if 0 <= own.active_walk < len(own.walks):
+            walk = own.walks[own.active_walk]
+            column = layout.column()
+            column.use_property_split = True
+            column.use_property_decorate = False
+            for name in fields_of_walk(walk):
+                column.prop(walk, name)
+        layout.operator(DAFNET_OT_redo_walk.bl_idname, icon="FILE_REFRESH")
 
 
 class DAFNET_MT_add(bpy.types.Menu):

@@ -155,6 +155,21 @@ _GERMAN = {
     "Work at": "Arbeiten an",
     "Write on": "Schreiben auf",
     "Writing": "Schreiben",
+    "Getting Up": "Aufstehen",
+    "Goal": "Ziel",
+    "Redo Walk": "Gang neu machen",
+    "Replace Edited Keys": "Bearbeitete Keys ersetzen",
+    "Sitting Down": "Hinsetzen",
+    "Walk": "Gang",
+    "Walks": "Gänge",
+    "Walk through": "Gehen durch",
+    "Root from": "Wurzel aus",
+    "Kind": "Art",
+    "Replace edited keys?": "Bearbeitete Keys ersetzen?",
+    "Replace": "Ersetzen",
+    "Keys of this walk were edited since. A copy of their action is kept.": (
+        "Keys dieses Gangs wurden seither bearbeitet. Eine Kopie ihrer Aktion bleibt."
+    ),
     "Your Rig": "Dein Rig",
 }
 

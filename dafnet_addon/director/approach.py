@@ -5,12 +5,12 @@ Canonical metres, world.
 """
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.paths import BEFORE_SEAT, Route, Stop, route
+from ..core.paths import BEFORE_SEAT, SITS_DOWN, Route, Stop, route
 from ..core.progress import stepwise, within
 from ..core.root import RootPath, forward_of
 from ..core.series import MODEL_FPS
@@ -326,16 +326,19 @@ def walk_to_seat(
     speed: float = 1.1,
     fps: float = MODEL_FPS,
     size: float = 1.0,
+    sits_down: float = SITS_DOWN,
 ) -> Generator[float, None, tuple[Route, SeatPlace]]:
     """The root path from rest at ``start`` to rest on the first of the ``seats`` of a piece that a
     body fits on and that one can come to, round the furniture; and which it is.
 
-    Raises what bars the first of them. ``size``: see ``walks.way_round``.
+    Raises what bars the first of them. ``size``: see ``walks.way_round``; ``sits_down``: see
+    ``core.paths.Stop``.
     """
     refused: InputError | None = None
     tried = seats[:_TRIED]
     for done, seat in enumerate(tried):
-        job = _walked(room, piece, start, seat, seconds, speed, fps, size)
+        goal = Stop(pair(seat.position), seat.yaw, seconds, seated=True, sits_down=sits_down)
+        job = _walked(room, piece, start, seat, goal, speed, fps, size)
         try:
             return (yield from within(job, done / len(tried), (done + 1) / len(tried))), seat
         except InputError as error:
@@ -349,13 +352,13 @@ def _walked(
     piece: Piece,
     start: Stop,
     seat: SeatPlace,
-    seconds: float,
+    goal: Stop,
     speed: float,
     fps: float,
     size: float,
 ) -> Generator[float, None, Route]:
     found = yield from within(way_in.steps(room, piece.name, piece.solids, seat), 0.0, 0.3)
-    goal = Stop(pair(seat.position), seat.yaw, seconds, seated=True, before=found.before)
+    goal = replace(goal, before=found.before)
     out = np.array(start.position) + 0.45 * start.seated * forward_of(start.yaw)
     comes = found.via[0] if found.via else seat.position + found.before * forward_of(seat.yaw)
     job = ways.steps(room.solids, [out, comes], floor=room.floor, size=size)

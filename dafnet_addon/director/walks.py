@@ -16,7 +16,7 @@ from ..core.text import metres
 from .room import HEAD_HIGH, KNEE_LOW
 from .surfaces import HeightField, boxes_of, height_field, parts_of_surfaces
 
-__all__ = ["NoWay", "around", "unit_doubt", "walk_to", "way_round", "ways"]
+__all__ = ["AlreadyThere", "NoWay", "around", "unit_doubt", "walk_to", "way_round", "ways"]
 
 _CELL = 0.08
 """Metres; of the cells that ways are searched over."""
@@ -208,6 +208,10 @@ def ways(
     return found
 
 
+class AlreadyThere(InputError):
+    """The goal is where one starts."""
+
+
 class NoWay(InputError):
     """Furniture stands all round the start or the goal."""
 
@@ -296,10 +300,9 @@ def walk_to(
     goal are the same or too far apart. ``size``: see ``way_round``.
     """
     if np.linalg.norm(np.subtract(start.position, goal.position)) < _NEAREST:
-        raise InputError(
-            unit_doubt(solids, [np.array(start.position)], floor, size)
-            or "The character is there already; choose another place to go to."
-        )
+        if doubt := unit_doubt(solids, [np.array(start.position)], floor, size):
+            raise InputError(doubt)
+        raise AlreadyThere("The character is there already; choose another place to go to.")
     leaves = _ahead(start, min(AFTER_SEAT, start.before))
     comes = _ahead(goal, goal.before)
     (corners,) = yield from ways.steps(solids, [leaves, comes], floor=floor, size=size)

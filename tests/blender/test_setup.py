@@ -474,7 +474,7 @@ def test_the_menu_and_the_panel_are_there(stage: Set) -> None:
     drawn = bpy.types.VIEW3D_MT_add._dyn_ui_initialize()
     assert drawn.count(panels.add_menu) == 1
     children = [cls.bl_idname for cls in CLASSES if getattr(cls, "bl_parent_id", "")]
-    assert children[:3] == ["DAFNET_PT_setup", "DAFNET_PT_tasks", "DAFNET_PT_shot"]
+    assert children[:3] == ["DAFNET_PT_setup", "DAFNET_PT_walks", "DAFNET_PT_tasks"]
     stage.select(stage.empty("Other", (0, 0, 0)))
     assert panels.DAFNET_PT_setup.poll(bpy.context), "the only character is meant"
 

@@ -12,6 +12,7 @@ from mathutils import Vector
 from ...core.errors import InputError
 from ...core.skeleton import JOINTS, OFFSETS, PARENTS, REST, STATURE, TARGETS, joint
 from .mannequin import FACING, add_body
+from .standing import note_standing
 
 __all__ = [
     "bodies",
@@ -279,6 +280,7 @@ def create_character(
     settings.root.select_set(True)
     armature.select_set(True)
     context.view_layer.objects.active = armature
+    note_standing(armature)
     choose(context.scene, armature)
     return armature
 

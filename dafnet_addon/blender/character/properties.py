@@ -10,6 +10,7 @@ from bpy.props import (
     CollectionProperty,
     EnumProperty,
     FloatProperty,
+    FloatVectorProperty,
     IntProperty,
     PointerProperty,
     StringProperty,
@@ -20,6 +21,8 @@ from ..rig import properties as rig_properties
 from .settings import COMES_AND_GOES, HELD, MAX_TAKES
 from .takes import PACKED
 from .task_rows import TaskRow
+from .walk_rows import GROUPS as WALK_GROUPS
+from .walk_rows import MANNER, WalkRow
 
 __all__ = ["CharacterSettings", "TakeSettings", "ensure_registered", "register", "unregister"]
 
@@ -340,6 +343,28 @@ class CharacterSettings(bpy.types.PropertyGroup):
             "of where its root stands"
         ),
     )
+    stood: FloatVectorProperty(
+        override=_LOCALLY,
+        options={"HIDDEN"},
+        size=4,
+        description="Place and heading of the body, when it last stood at its root",
+    )
+    speed: FloatProperty(override=_LOCALLY, options=set(), **MANNER["speed"])
+    seconds: FloatProperty(override=_LOCALLY, options=set(), **MANNER["seconds"])
+    sits_down: FloatProperty(override=_LOCALLY, options=set(), **MANNER["sits_down"])
+    gets_up: FloatProperty(override=_LOCALLY, options=set(), **MANNER["gets_up"])
+    walks: CollectionProperty(
+        override={*_LOCALLY, "USE_INSERTION"},
+        type=WalkRow,
+        options=set(),
+        description="The walks that the root was keyed for, in the order of time",
+    )
+    active_walk: IntProperty(
+        override=_LOCALLY,
+        name="Walk",
+        options=set(),
+        description="The walk that is made again, with those after it",
+    )
     planned: StringProperty(
         override=_LOCALLY,
         options={"HIDDEN"},
@@ -544,7 +569,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
     )
 
 
-_GROUPS = (TakeFinding, TakeSettings, TakeLink, TaskRow, CharacterSettings)
+_GROUPS = (TakeFinding, TakeSettings, TakeLink, TaskRow, *WALK_GROUPS, CharacterSettings)
 
 
 def register() -> None:

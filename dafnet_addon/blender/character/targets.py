@@ -10,6 +10,7 @@ import numpy as np
 from ...core.errors import InputError
 from ...core.skeleton import END_EFFECTORS, FEET_ASKED
 from .armature import character_scale
+from .standing import note_standing
 
 __all__ = ["FEET", "HEAD_AND_HANDS", "add_root", "add_targets", "lacks_root", "missing_targets"]
 
@@ -53,6 +54,7 @@ def add_root(context: bpy.types.Context, armature: bpy.types.Object) -> bpy.type
     root.rotation_euler = (0.0, 0.0, place.to_euler().z % (2.0 * np.pi) - np.pi)
     armature.users_collection[0].objects.link(root)
     armature.dafnet.root = root
+    note_standing(armature)
     return root
 
 

@@ -10,20 +10,29 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.passage import SatOn, met_along
-from ...core.paths import AFTER_SEAT, Route, Stop, facing, route
+from ...core.paths import AFTER_SEAT, GETS_UP, Route, Stop, facing, route
 from ...core.progress import stepwise, within
 from ...core.root import forward_of
 from ...core.trails import FASTEST, followed, trail
 from ...director.walks import unit_doubt, ways
 from ..character.armature import character_and_goal, is_character, objects_of
 from ..character.settings import Settings, settings_of
+from ..character.walk_rows import CURVE, OBJECT, POINTS, Asked, Manner
 from ..compat import action_curves
 from ..scene.dependencies import Dependencies
 from ..scene.lookup import find_object
 from ..scene.playback import play_steps
 from .curve_lines import line_of
-from .root_keys import MOVES, first_key, key_route, keyable_root, unchanged_on_failure
-from .walking import Start, Walk, extend_range, passage_warnings, rest_at, start_of, walk
+from .made_walks import intact_walks, note_walk
+from .root_keys import (
+    first_key,
+    key_route,
+    keyable_root,
+    remove_keys_from,
+    restore_between,
+    unchanged_on_failure,
+)
+from .walking import Beginning, Start, Walk, extend_range, passage_warnings, rest_at, start_of, walk
 
 __all__ = [
     "along_curve",
@@ -102,11 +111,13 @@ def _key_walk(
     settings: Settings,
     start: Start,
     walked: Route,
+    asked: Asked,
     end: Sequence[SatOn] | None = None,
     warnings: Sequence[str] = (),
 ) -> Generator[float, None, Walk]:
     """Key a route in place of the root's keys from its first frame on, and collect warnings; before
-    that frame the root moves as it did. ``end``: see ``met_along``.
+    that frame the root moves as it did. ``asked``: what it was made for; ``end``: see
+    ``met_along``.
     """
     met = yield from within(met_along.steps(start.scene, walked.path, start.fps, end=end), 0.0, 0.9)
     places = walked.path.position[:, :2]
@@ -115,50 +126,17 @@ def _key_walk(
     )
     root, first = keyable_root(settings), start.first
     armature = find_object(settings, settings.armature, "character")
+    intact = intact_walks(armature)
     with unchanged_on_failure(root):
-        kept = _remove_keys_from(root, first)
+        kept = remove_keys_from(root, first)
         key_route(context, root, walked, first=first, scale=1.0 / start.unit, fps=start.fps)
-        for curve in action_curves(root):
-            for frame, value in kept.get((curve.data_path, curve.array_index), []):
-                if abs(curve.evaluate(frame) - value) > 1e-5:
-                    curve.keyframe_points.insert(frame, value).interpolation = "LINEAR"
-            curve.update()
+        restore_between(root, kept)
 
     last = first + len(walked.path) - 1
+    note_walk(context.scene, armature, asked, first=first, last=last, intact=intact)
     extended = extend_range(context.scene, armature, last)
     told = (*passage_warnings(met, first), *warnings, *([doubt] if doubt else []))
     return Walk(first, last, extended, told)
-
-
-def _remove_keys_from(
-    root: bpy.types.Object, first: int
-) -> dict[tuple[str, int], list[tuple[int, float]]]:
-    """Remove a root's keys from frame ``first`` on; returns by curve the values of the frames after
-    the last key that stays.
-    """
-    kept: dict[tuple[str, int], list[tuple[int, float]]] = {}
-    for curve in action_curves(root):
-        if curve.data_path not in MOVES:
-            continue
-
-        earlier = [point for point in curve.keyframe_points if point.co[0] < first]
-        if earlier:
-            last = earlier[-1]
-            # The next key would otherwise bend the curve that leads to this one.
-            last.handle_left_type = last.handle_right_type = "FREE"
-            between = range(int(np.floor(last.co[0])) + 1, first)
-            kept[curve.data_path, curve.array_index] = [
-                (frame, curve.evaluate(frame)) for frame in between
-            ]
-
-        for k in reversed(
-            [k for k, point in enumerate(curve.keyframe_points) if point.co[0] >= first]
-        ):
-            curve.keyframe_points.remove(curve.keyframe_points[k], fast=True)
-
-        curve.update()
-
-    return kept
 
 
 @stepwise
@@ -169,28 +147,32 @@ def along_curve(
     *,
     speed: float = 1.1,
     seconds: float = 1.0,
+    gets_up: float = GETS_UP,
     keep_facing: bool = False,
     backwards: bool = False,
+    begins: Beginning | None = None,
 ) -> Generator[float, None, Walk]:
     """Let the character walk along a curve from the current frame on, and stand at its end for some
     ``seconds``.
 
     Where the root has earlier keys, it walks from where it is to the curve first; else the walk
     begins on the curve. Later keys are replaced. ``keep_facing``: it keeps looking where it looks
-    now. ``backwards``: from the curve's end. ``InputError``: not a curve, too short, or the root
+    now. ``backwards``: from the curve's end. ``gets_up``: see ``core.paths.Stop``; ``begins``:
+    there instead of at the current frame. ``InputError``: not a curve, too short, or the root
     cannot be keyed. Then, or if the job is closed, nothing is changed.
     """
     settings, name = settings_of(armature, context.scene), curve.name
     line = line_of(context, curve)[:: -1 if backwards else 1]
     first = first_key(keyable_root(settings))
 
-    at = yield from within(start_of(context, settings, context.scene.frame_current), 0.0, _READ)
+    begins = begins or Beginning(context.scene.frame_current)
+    at = yield from within(start_of(context, settings, begins), 0.0, _READ)
     points = line[:, :2] * at.unit
     away = float(np.linalg.norm(points[0] - at.place[:2]))
 
     start = None
     if away < _THERE or (first is not None and first < at.first):
-        start = yield from within(rest_at(at), _READ, _READ)
+        start = yield from within(rest_at(at, gets_up), _READ, _READ)
     if start is not None and away >= _THERE:
         way = yield from within(_corners_through(at, start, [points[0]]), _READ, _FOUND)
         points = np.concatenate([way[:-1], points])
@@ -205,7 +187,14 @@ def along_curve(
         seconds=seconds,
         name=f"curve '{name}'",
     )
-    return (yield from within(_key_walk(context, settings, at, walked, ()), _FOUND, 1.0))
+    asked = Asked(
+        kind=CURVE,
+        manner=Manner(speed, seconds, gets_up=gets_up),
+        goal=name,
+        keep_facing=keep_facing,
+        backwards=backwards,
+    )
+    return (yield from within(_key_walk(context, settings, at, walked, asked, ()), _FOUND, 1.0))
 
 
 def _corners_through(
@@ -278,7 +267,7 @@ def along_object(
         "slow it down."
     )
     warnings = [hurried] if fastest > FASTEST else []
-    written = _key_walk(context, settings, at, moved, None, warnings)
+    written = _key_walk(context, settings, at, moved, Asked(OBJECT, Manner(), name), None, warnings)
     return (yield from within(written, _FOUND, 1.0))
 
 
@@ -290,34 +279,45 @@ def through_points(
     *,
     speed: float = 1.1,
     seconds: float = 1.0,
+    gets_up: float = GETS_UP,
     to_cursor: bool = False,
+    place: Sequence[float] | None = None,
+    begins: Beginning | None = None,
 ) -> Generator[float, None, Walk]:
     """Let the character walk through the places of ``points`` and stand at the last.
 
-    ``to_cursor``: the 3D cursor is the last one; without points it is the only one. The walk
-    continues from the root's last key, else from the current frame, around the furniture and
-    without pauses. ``InputError``: there is no way, or the root cannot be keyed. Then, or if the
-    job is closed, nothing is changed.
+    ``to_cursor``: the 3D cursor is the last one, or ``place`` (3,) instead of it; without points it
+    is the only one. The walk continues from the root's last key, else from the current frame,
+    around the furniture and without pauses. ``gets_up``, ``begins``: see ``walk``. ``InputError``:
+    there is no way, or the root cannot be keyed. Then, or if the job is closed, nothing is changed.
     """
     if not points:
-        return (yield from walk.steps(context, armature, None, seconds, speed))
+        job = walk.steps(
+            context, armature, None, seconds, speed, gets_up=gets_up, place=place, begins=begins
+        )
+        return (yield from job)
 
     settings = settings_of(armature, context.scene)
-    spots = [point.matrix_world.translation for point in points] + [
-        context.scene.cursor.location
-    ] * to_cursor
-    flat = [np.array(spot, float)[:2] for spot in spots]
+    names = tuple(point.name for point in points)
+    spots = [point.matrix_world.translation for point in points]
+    end = None
+    if to_cursor:
+        x, y, z = place or context.scene.cursor.location
+        end = (float(x), float(y), float(z))
+    flat = [np.array(spot, float)[:2] for spot in [*spots, *([end] if end else [])]]
 
-    at = yield from within(start_of(context, settings), 0.0, _READ)
+    at = yield from within(start_of(context, settings, begins), 0.0, _READ)
     places = [spot * at.unit for spot in flat]
     if len(places) > 1 and np.linalg.norm(places[0] - at.place[:2]) < _SAME_PLACE:
         del places[0]
 
-    start = yield from within(rest_at(at), _READ, _READ)
+    start = yield from within(rest_at(at, gets_up), _READ, _READ)
     way = yield from within(_corners_through(at, start, places), _READ, _FOUND)
 
     last = way[-1] - (way[-2] if len(way) > 1 else np.array(start.position))
     via = [(float(x), float(y)) for x, y in way]
     goal = Stop(via.pop(), facing(last), seconds)
     walked = route(start, *via, goal, speed=speed, fps=at.fps, floor=at.floor)
-    return (yield from within(_key_walk(context, settings, at, walked, ()), _FOUND, 1.0))
+    manner = Manner(speed, seconds, gets_up=gets_up)
+    asked = Asked(kind=POINTS, manner=manner, points=names, place=end)
+    return (yield from within(_key_walk(context, settings, at, walked, asked, ()), _FOUND, 1.0))

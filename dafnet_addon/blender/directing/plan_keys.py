@@ -20,7 +20,15 @@ from ...core.skeleton import TARGETS
 from ...director.plans import Plan
 from ..character.targets import add_targets, missing_targets
 from ..compat import action_curves
-from .root_keys import MOVES, key_route, require_keyable, unchanged_on_failure
+from .made_walks import forget_walks
+from .root_keys import (
+    MOVES,
+    keep_copy,
+    key_route,
+    keys_within,
+    require_keyable,
+    unchanged_on_failure,
+)
 
 __all__ = ["key_plan"]
 
@@ -75,6 +83,7 @@ def key_plan(
             _key_target(owners[role], plan, role, first=first, unit=unit)
         _key_settings(armature, plan, first)
         own.planned = _digest(armature, first)
+        forget_walks(armature, first)
         kept = tuple(copy.name for copy in copies)
         made.clear()
         copies.clear()
@@ -116,24 +125,13 @@ def _clear(owner: bpy.types.Object, paths: Sequence[str], first: int) -> None:
             curve.update()
 
 
-def _keys(owner: bpy.types.Object, paths: Sequence[str], first: int) -> Iterator[bytes]:
-    for curve in action_curves(owner):
-        if curve.data_path in paths and len(curve.keyframe_points):
-            values = np.empty(2 * len(curve.keyframe_points), np.float32)
-            curve.keyframe_points.foreach_get("co", values)
-            late = values.reshape(-1, 2)
-            late = late[late[:, 0] >= first]
-            if len(late):
-                yield f"{curve.data_path}[{curve.array_index}]".encode() + late.tobytes()
-
-
 def _digest(armature: bpy.types.Object, first: int) -> str:
     """What tells the keys of a plan from others; "" where there are none."""
     own = armature.dafnet
-    found = [*_keys(armature, _settings(armature), first)]
+    found = [*keys_within(armature, _settings(armature), first)]
     for role in ("root", *TARGETS):
         if (owner := getattr(own, role)) is not None:
-            found += [role.encode() + each for each in _keys(owner, MOVES, first)]
+            found += [role.encode() + each for each in keys_within(owner, MOVES, first)]
     return sha256(b"".join(sorted(found))).hexdigest() if found else ""
 
 
@@ -143,11 +141,8 @@ def _copies(
     """Copies of the actions whose keys are about to be replaced."""
     for owner in owners:
         paths = _settings(armature) if owner == armature else MOVES
-        if any(_keys(owner, paths, first)):
-            copy = owner.animation_data.action.copy()
-            copy.name = f"{owner.animation_data.action.name[: 60 - len(_TAIL)]}{_TAIL}"
-            copy.use_fake_user = True
-            yield copy
+        if any(keys_within(owner, paths, first)):
+            yield keep_copy(owner, _TAIL)
 
 
 def _frames(values: np.ndarray, fps: float) -> list[int]:

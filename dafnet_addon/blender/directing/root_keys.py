@@ -2,7 +2,7 @@
 says why.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 import bpy
@@ -19,10 +19,14 @@ from ..scene.playback import frame_kept
 __all__ = [
     "MOVES",
     "first_key",
+    "keep_copy",
     "keyable_root",
     "key_route",
+    "keys_within",
     "last_key",
+    "remove_keys_from",
     "require_keyable",
+    "restore_between",
     "unchanged_on_failure",
     "write_keys",
 ]
@@ -139,6 +143,71 @@ def _key_frames(root: bpy.types.Object) -> list[float]:
         if curve.data_path in MOVES
         for point in curve.keyframe_points
     ]
+
+
+def remove_keys_from(
+    root: bpy.types.Object, first: int
+) -> dict[tuple[str, int], list[tuple[int, float]]]:
+    """Remove a root's keys from frame ``first`` on; returns by curve the values of the frames after
+    the last key that stays.
+    """
+    kept: dict[tuple[str, int], list[tuple[int, float]]] = {}
+    for curve in action_curves(root):
+        if curve.data_path not in MOVES:
+            continue
+
+        earlier = [point for point in curve.keyframe_points if point.co[0] < first]
+        if earlier:
+            last = earlier[-1]
+            # The next key would otherwise bend the curve that leads to this one.
+            last.handle_left_type = last.handle_right_type = "FREE"
+            between = range(int(np.floor(last.co[0])) + 1, first)
+            kept[curve.data_path, curve.array_index] = [
+                (frame, curve.evaluate(frame)) for frame in between
+            ]
+
+        for k in reversed(
+            [k for k, point in enumerate(curve.keyframe_points) if point.co[0] >= first]
+        ):
+            curve.keyframe_points.remove(curve.keyframe_points[k], fast=True)
+
+        curve.update()
+
+    return kept
+
+
+def restore_between(
+    root: bpy.types.Object, kept: dict[tuple[str, int], list[tuple[int, float]]]
+) -> None:
+    """Key what ``remove_keys_from`` has returned, where the root would move otherwise now."""
+    for curve in action_curves(root):
+        for frame, value in kept.get((curve.data_path, curve.array_index), []):
+            if abs(curve.evaluate(frame) - value) > 1e-5:
+                curve.keyframe_points.insert(frame, value).interpolation = "LINEAR"
+        curve.update()
+
+
+def keep_copy(owner: bpy.types.Object, tail: str) -> bpy.types.Action:
+    """A copy of an object's action, kept in the file, whose name ends in ``tail``."""
+    action = owner.animation_data.action
+    copy = action.copy()
+    copy.name = f"{action.name[: 60 - len(tail)]}{tail}"
+    copy.use_fake_user = True
+    return copy
+
+
+def keys_within(
+    owner: bpy.types.Object, paths: Sequence[str], first: float, last: float = np.inf
+) -> Iterator[bytes]:
+    """The keys of these data paths from frame ``first`` to ``last``, as bytes, curve by curve."""
+    for curve in action_curves(owner):
+        if curve.data_path in paths and len(curve.keyframe_points):
+            values = np.empty(2 * len(curve.keyframe_points), np.float32)
+            curve.keyframe_points.foreach_get("co", values)
+            found = values.reshape(-1, 2)
+            found = found[(found[:, 0] >= first) & (found[:, 0] <= last)]
+            if len(found):
+                yield f"{curve.data_path}[{curve.array_index}]".encode() + found.tobytes()
 
 
 @contextmanager

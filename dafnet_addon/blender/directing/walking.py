@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from ...core.distance import scaled
 from ...core.errors import InputError
 from ...core.passage import Passage, SatOn, listed, met_along
-from ...core.paths import BEFORE_SEAT, Route, Stop, facing
+from ...core.paths import BEFORE_SEAT, GETS_UP, SITS_DOWN, Route, Stop, facing
 from ...core.progress import stepwise, within
 from ...core.root import forward_of
 from ...core.solids import Box, Mesh, Scene
@@ -17,20 +18,41 @@ from ...director.approach import Tucked, walk_to_seat
 from ...director.places import before_a_top
 from ...director.room import Piece, Room
 from ...director.seats import on_a_seat, seats_of
-from ...director.walks import unit_doubt, walk_to
+from ...director.walks import AlreadyThere, unit_doubt, walk_to
 from ..character.armature import character_scale, metres_per_unit
 from ..character.settings import Settings, settings_of
+from ..character.standing import standing
+from ..character.walk_rows import PLACE, SEAT, Asked, Manner
 from ..scene.furniture import furniture_at
 from ..scene.lookup import find_collection, find_object, find_scene
-from .root_keys import key_route, keyable_root, last_key, unchanged_on_failure
+from .made_walks import intact_walks, note_walk
+from .root_keys import (
+    key_route,
+    keyable_root,
+    last_key,
+    remove_keys_from,
+    restore_between,
+    unchanged_on_failure,
+)
 from .seat_pieces import add_furniture, collection_of, movable, move, piece_of, top_of
 
-__all__ = ["Start", "Walk", "extend_range", "rest_at", "start_of", "passage_warnings", "walk"]
+__all__ = [
+    "Beginning",
+    "Start",
+    "Walk",
+    "extend_range",
+    "rest_at",
+    "start_of",
+    "passage_warnings",
+    "walk",
+]
 
 _BEFORE = 0.2
 """Seconds of rest before the first step."""
 _READ = 0.1
 """Progress once the scene is read."""
+_THERE = 0.3
+"""Metres from a seat within which one sits on it already."""
 _SITTING_DOWN = BEFORE_SEAT + 0.2
 """Metres from a seat within which a walker is about to sit down on it."""
 
@@ -53,6 +75,7 @@ class Start:
     furniture then; canonical metres.
 
     ``unit``: a Blender unit in canonical metres. ``size``: the character's over the canonical one.
+    ``keyed``: whether that is where its keys end.
     """
 
     first: int
@@ -62,65 +85,87 @@ class Start:
     place: np.ndarray
     yaw: float
     scene: Scene
+    keyed: bool = False
 
     @property
     def floor(self) -> float:
         return float(self.place[2])
 
 
+@dataclass(frozen=True)
+class Beginning:
+    """Where a walk that is made again begins: at frame ``first``; ``pose`` (4,): place in Blender
+    units and heading, None where its keys say so.
+    """
+
+    first: int
+    pose: np.ndarray | None = None
+
+
 def start_of(
-    context: bpy.types.Context, settings: Settings, first: int | None = None
+    context: bpy.types.Context, settings: Settings, begins: Beginning | int | None = None
 ) -> Generator[float, None, Start]:
-    """Read where a character is at frame ``first``, None for its root's last key or else the
-    current frame. A job, see ``playback.play_steps``.
+    """Read where a character is at a frame, None for its root's last key or else the current frame.
+    A job, see ``playback.play_steps``.
     """
     scene = find_scene(settings)
     root = keyable_root(settings)
-    if first is None:
-        keyed = last_key(root)
-        first = scene.frame_current if keyed is None else keyed
+    keyed = last_key(root)
+    if begins is None:
+        begins = scene.frame_current if keyed is None else keyed
+    if isinstance(begins, int):
+        begins = Beginning(begins)
+    pose = begins.pose
+    if pose is None and keyed is None:
+        armature = find_object(settings, settings.armature, "character")
+        pose = standing(scene, armature, root, metres_per_unit(scene))
 
-    seen: list[tuple[float, np.ndarray, float]] = []
+    seen: list[tuple[float, np.ndarray]] = []
 
     def look() -> None:
         armature = find_object(settings, settings.armature, "character")
         root = keyable_root(settings)
         size = character_scale(armature, metres_per_unit(scene))
-        seen.append((size, np.array(root.location, float), float(root.rotation_euler[2])))
+        seen.append((size, np.array([*root.location, root.rotation_euler[2]], float)))
 
-    solids = yield from furniture_at(context, settings, first, look)
+    solids = yield from furniture_at(context, settings, begins.first, look)
     yield 1.0
-    ((size, location, yaw),) = seen
+    ((size, by_keys),) = seen
+    pose = by_keys if pose is None else pose
     unit = metres_per_unit(scene) / size
     return Start(
-        first=first,
+        first=begins.first,
         fps=scene.render.fps / scene.render.fps_base,
         unit=unit,
         size=size,
-        place=location * unit,
-        yaw=yaw,
+        place=pose[:3] * unit,
+        yaw=float(pose[3]),
         scene=scaled(Scene(solids), 1.0 / size),
+        keyed=begins.first == keyed,
     )
 
 
-def rest_at(start: Start) -> Generator[float, None, Stop]:
-    """Where a root rests before it goes."""
+def rest_at(start: Start, gets_up: float = GETS_UP) -> Generator[float, None, Stop]:
+    """Where a root rests before it goes, and in how many seconds it gets up if that is a seat."""
     place = start.place[:2]
     seated = yield from on_a_seat.steps(start.scene.solids, place, start.floor)
-    return Stop((float(place[0]), float(place[1])), start.yaw, _BEFORE, seated=seated)
+    here = (float(place[0]), float(place[1]))
+    return Stop(here, start.yaw, _BEFORE, seated=seated, gets_up=gets_up)
 
 
 @dataclass(frozen=True)
 class _Request:
     """What is asked for of a seat: the ``names`` of the piece's objects, that which was chosen
-    first; ``cursor`` (2,), canonical metres: by which place on it; whether ``tables`` are seats;
-    whether the piece is pulled ``out`` where something stands over it.
+    first; ``place`` (2,), canonical metres: by which place on it, or where one goes if there is no
+    piece; whether ``tables`` are seats; whether the piece is pulled ``out`` where something stands
+    over it; in which ``manner``.
     """
 
     names: Sequence[str]
-    cursor: np.ndarray
+    place: np.ndarray
     tables: bool
     out: bool
+    manner: Manner
 
 
 @dataclass(frozen=True)
@@ -144,13 +189,20 @@ def walk(
     speed: float = 1.1,
     tables: bool = False,
     pull_out: bool = False,
+    *,
+    sits_down: float = SITS_DOWN,
+    gets_up: float = GETS_UP,
+    place: Sequence[float] | None = None,
+    begins: Beginning | None = None,
 ) -> Generator[float, None, Walk]:
     """Let the character walk to ``seat`` and sit there for some ``seconds``, or, for None, to the
     3D cursor and stand.
 
     All of the piece counts that the seat is a part of; where the cursor is on it, it says by which
-    place, and to which side. The walk continues from the root's last key, else from the current
-    frame; earlier keys stay. The seat has to be in the character's furniture collection; where it
+    place, and to which side. ``place`` (3,): another one than the cursor's, in the world, or in the
+    seat's own space. ``sits_down``, ``gets_up``: see ``core.paths.Stop``. The walk continues from
+    the root's last key, else from the current frame; earlier keys stay. ``begins``: from there, in
+    place of all later keys. The seat has to be in the character's furniture collection; where it
     has none, the seat's own becomes that, or a new one of all that stands around. ``pull_out``:
     move a seat that is tucked under something. ``InputError``: there is nothing to sit on, no way,
     no room before the seat, or the root cannot be keyed. Then, or if the job is closed, nothing is
@@ -163,12 +215,16 @@ def walk(
         if furniture is None:
             furniture = add_furniture(seat, armature, scene)
             made = furniture.name_full
+    asked = Asked(
+        kind=PLACE if seat is None else SEAT,
+        manner=Manner(speed, seconds, sits_down, gets_up),
+        goal=seat.name if seat else "",
+        place=_asked_place(scene, seat, place),
+        tables=tables,
+        pull_out=pull_out,
+    )
     try:
-        return (
-            yield from _walk(
-                context, armature, seat, furniture, made, seconds, speed, tables, pull_out
-            )
-        )
+        return (yield from _walk(context, armature, asked, furniture, made, begins))
     except BaseException:
         added = next((c for c in bpy.data.collections if c.name_full == made), None)
         if added is not None:
@@ -176,34 +232,47 @@ def walk(
         raise
 
 
+def _asked_place(
+    scene: bpy.types.Scene, seat: bpy.types.Object | None, place: Sequence[float] | None
+) -> tuple[float, float, float]:
+    """Where one goes, in the world, or where on the seat, in its own space."""
+    if place is None:
+        there = scene.cursor.location
+        place = seat.matrix_world.inverted_safe() @ there if seat else there
+    return (float(place[0]), float(place[1]), float(place[2]))
+
+
 def _walk(
     context: bpy.types.Context,
     armature: bpy.types.Object,
-    seat: bpy.types.Object | None,
+    asked: Asked,
     furniture: bpy.types.Collection | None,
     made: str | None,
-    seconds: float,
-    speed: float,
-    tables: bool,
-    pull_out: bool,
+    begins: Beginning | None,
 ) -> Generator[float, None, Walk]:
     scene = context.scene
     settings = settings_of(armature, scene, furniture=furniture.name_full if furniture else None)
+    seat = scene.objects[asked.goal] if asked.goal else None
     names = piece_of(seat) if seat is not None else []
-    goal = np.array(scene.cursor.location, float)
-    if pull_out and seat is not None:
+    goal = Vector(asked.place or (0.0, 0.0, 0.0))
+    goal = seat.matrix_world @ goal if seat is not None else goal
+    if asked.pull_out and seat is not None:
         movable(top_of(seat))
 
-    start = yield from within(start_of(context, settings), 0.0, _READ)
-    asked = _Request(names, goal[:2] * start.unit, tables, pull_out)
-    found = yield from within(_route(start, asked, seconds, speed), _READ, 1.0)
+    start = yield from within(start_of(context, settings, begins), 0.0, _READ)
+    place = np.array(goal[:2], float) * start.unit
+    request = _Request(names, place, asked.tables, asked.pull_out, asked.manner)
+    found = yield from within(_route(start, request), _READ, 1.0)
 
     root = keyable_root(settings)
     character = find_object(settings, settings.armature, "character")
     own = find_collection(settings.furniture) if settings.furniture is not None else None
     route, warnings = found.route, found.warnings
+    intact = intact_walks(character)
     with unchanged_on_failure(root):
+        kept = remove_keys_from(root, start.first) if begins is not None else {}
         key_route(context, root, route, first=start.first, scale=1.0 / start.unit, fps=start.fps)
+        restore_between(root, kept)
 
     if found.pulled is not None:
         piece = next(each for each in scene.objects if each.name == names[0])
@@ -214,6 +283,7 @@ def _walk(
         scene.collection.children.link(own)
     character.dafnet.furniture = own
     last = start.first + len(route.path) - 1
+    note_walk(scene, character, asked, first=start.first, last=last, intact=intact)
     extended = extend_range(scene, character, last)
     return Walk(start.first, last, extended, (*passage_warnings(found.met, start.first), *warnings))
 
@@ -245,20 +315,22 @@ def passage_warnings(met: Sequence[Passage], first: int) -> tuple[str, ...]:
     )
 
 
-def _route(
-    start: Start, asked: _Request, seconds: float, speed: float
-) -> Generator[float, None, _Found]:
+def _route(start: Start, asked: _Request) -> Generator[float, None, _Found]:
     """The walk in metres of the canonical body to the seat that is wished for, or where none is, to
-    the cursor.
+    the place.
     """
-    here = yield from within(rest_at(start), 0.0, 0.05)
+    here = yield from within(rest_at(start, asked.manner.gets_up), 0.0, 0.05)
     if asked.names:
-        return (yield from within(_route_to_seat(start, here, asked, seconds, speed), 0.05, 1.0))
+        return (yield from within(_route_to_seat(start, here, asked), 0.05, 1.0))
 
-    solids, floor, size, goal = start.scene.solids, start.floor, start.size, asked.cursor
-    end = Stop((float(goal[0]), float(goal[1])), facing(goal - start.place[:2]), seconds)
-    way = walk_to.steps(solids, here, end, speed, start.fps, floor, size)
-    route = yield from within(way, 0.05, 0.6)
+    solids, floor, size, goal = start.scene.solids, start.floor, start.size, asked.place
+    manner = asked.manner
+    end = Stop((float(goal[0]), float(goal[1])), facing(goal - start.place[:2]), manner.seconds)
+    way = walk_to.steps(solids, here, end, manner.speed, start.fps, floor, size)
+    try:
+        route = yield from within(way, 0.05, 0.6)
+    except AlreadyThere as error:
+        raise _there_already(start, error) from error
 
     met = met_along.steps(start.scene, route.path, start.fps, end=())
     passages = yield from within(met, 0.6, 0.95)
@@ -268,20 +340,30 @@ def _route(
     return _Found(route, passages, (doubt,) if doubt else ())
 
 
-def _route_to_seat(
-    start: Start, here: Stop, asked: _Request, seconds: float, speed: float
-) -> Generator[float, None, _Found]:
+def _there_already(start: Start, error: AlreadyThere) -> InputError:
+    """What is said where a walk would end where it begins: which frame that is, since the character
+    may be elsewhere in the one that is shown.
+    """
+    if not start.keyed:
+        return error
+    return InputError(
+        f"The root's keys end there already, at frame {start.first}, and a walk goes on from them; "
+        "press Redo Walk to make the last one anew, or choose another place."
+    )
+
+
+def _route_to_seat(start: Start, here: Stop, asked: _Request) -> Generator[float, None, _Found]:
     """The walk from ``here`` to the seat. ``InputError`` where something stands before it, or where
     a body would be.
     """
-    name = asked.names[0]
+    name, manner = asked.names[0], asked.manner
     parts = tuple(solid for solid in start.scene.solids if solid.name in asked.names)
     if not parts:
         raise InputError(f"'{name}' is not in the character's furniture collection; move it there.")
 
     room = _room_of(start.scene.solids, start.floor, asked.names)
     whole, chosen = room.pieces()[name], [s for s in parts if s.name == name]
-    near = _place_on(whole, asked.cursor)
+    near = _place_on(whole, asked.place)
     if near is None and len({solid.name for solid in parts}) > 1 and chosen:
         near = Piece(name, tuple(chosen)).box().mean(axis=0)[:2]
     job = seats_of.steps(parts, start.place[:2], start.floor, name, near, start.size, asked.tables)
@@ -293,9 +375,23 @@ def _route_to_seat(
             job = seats_of.steps(parts, top, start.floor, name, near, start.size, asked.tables)
             seats = yield from within(job, 0.12, 0.15)
 
+    if here.seated and np.linalg.norm(seats[0].position - here.position) < _THERE:
+        sits = AlreadyThere(f"The character sits on '{name}' already; choose another seat.")
+        raise _there_already(start, sits)
+
     pulled = None
     while True:
-        goes = walk_to_seat.steps(room, whole, here, seats, seconds, speed, start.fps, start.size)
+        goes = walk_to_seat.steps(
+            room,
+            whole,
+            here,
+            seats,
+            seconds=manner.seconds,
+            speed=manner.speed,
+            fps=start.fps,
+            size=start.size,
+            sits_down=manner.sits_down,
+        )
         try:
             route, spot = yield from within(goes, done, done + 0.2)
             break

@@ -1,7 +1,7 @@
 """Overlays in the viewport and the timeline: their switches, and when Blender draws them.
 
-All are off at first; the root's path is drawn once one was keyed (``suggest``). Blender is asked to draw only while a switch is on or a job shows its live
-pose. The switches live here and not in the
+All are off at first; the root's path is drawn once one was keyed (``suggest``). Blender is asked to
+draw only while a switch is on or a job shows its live pose. The switches live here and not in the
 file, so opening another file or undoing leaves them as they are. Nothing here holds on to objects
 of the file: ``contents`` looks them up at each redraw.
 """

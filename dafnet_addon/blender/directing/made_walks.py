@@ -1,0 +1,120 @@
+"""Which walks the keys of a root were made for, and whether they were edited since."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from hashlib import sha256
+from typing import Any
+
+import bpy
+
+from ..character.standing import note_standing
+from ..character.walk_rows import MANNER, Asked, WalkRow, asked_in
+from .root_keys import MOVES, keys_within
+
+__all__ = [
+    "edited_from",
+    "forget_walks",
+    "intact_walks",
+    "note_walk",
+    "walks_kept_on_failure",
+]
+
+_EDITED = "edited"
+"""The digest of a walk whose keys were edited before another one replaced its end."""
+
+
+def note_walk(
+    scene: bpy.types.Scene,
+    character: bpy.types.Object,
+    asked: Asked,
+    *,
+    first: int,
+    last: int,
+    intact: Sequence[bool],
+) -> None:
+    """Add a row for a walk that was keyed from frame ``first`` to ``last``, in place of those that
+    began there or later; it becomes the chosen one.
+
+    ``intact``: of each row, whether its keys were as they were made before this walk was keyed.
+    """
+    own: Any = character.dafnet
+    for row, was in zip(own.walks, intact, strict=True):
+        if row.first < first < row.last:
+            row.last = first
+            row.digest = _digest(own.root, row.first, first) if was else _EDITED
+    forget_walks(character, first)
+
+    row = _add_row(scene, character, asked)
+    row.first, row.last = first, last
+    row.digest = _digest(own.root, first, last)
+    own.active_walk = len(own.walks) - 1
+    note_standing(character)
+
+
+def _add_row(scene: bpy.types.Scene, character: bpy.types.Object, asked: Asked) -> WalkRow:
+    own: Any = character.dafnet
+    row = own.walks.add()
+    row.kind = asked.kind
+    row.goal = scene.objects.get(asked.goal)
+    for name in asked.points:
+        row.points.add().point = scene.objects.get(name)
+    row.placed = asked.place is not None
+    row.place = asked.place or (0.0, 0.0, 0.0)
+    for name in MANNER:
+        setattr(row, name, getattr(asked.manner, name))
+    for name in ("tables", "pull_out", "keep_facing", "backwards"):
+        setattr(row, name, getattr(asked, name))
+    return row
+
+
+@contextmanager
+def walks_kept_on_failure(scene: bpy.types.Scene, character: bpy.types.Object) -> Iterator[None]:
+    """A block that keys walks: if it fails, the rows are as they were."""
+    own: Any = character.dafnet
+    rows = [(asked_in(row), row.first, row.last, row.digest) for row in own.walks]
+    chosen = own.active_walk
+    try:
+        yield
+    except BaseException:
+        own.walks.clear()
+        for asked, first, last, digest in rows:
+            row = _add_row(scene, character, asked)
+            row.first, row.last, row.digest = first, last, digest
+        own.active_walk = chosen
+        raise
+
+
+def forget_walks(character: bpy.types.Object, first: int) -> None:
+    """Drop the rows of walks that begin at frame ``first`` or later."""
+    own: Any = character.dafnet
+    for k in reversed(range(len(own.walks))):
+        if own.walks[k].first >= first:
+            own.walks.remove(k)
+
+
+def intact_walks(character: bpy.types.Object) -> tuple[bool, ...]:
+    """Of each row, whether its keys are as they were made."""
+    own: Any = character.dafnet
+    return tuple(own.root is not None and _intact(own.root, row) for row in own.walks)
+
+
+def edited_from(character: bpy.types.Object, index: int) -> bool:
+    """Whether keys would be lost that nobody asked for, if the walk of this row and those after it
+    were made anew: edited ones, and later ones. The key where it begins does not count.
+    """
+    own: Any = character.dafnet
+    rows = list(own.walks)[index:]
+    if own.root is None or not any(keys_within(own.root, MOVES, rows[0].first + 1e-3)):
+        return False
+    return not all(_intact(own.root, row) for row in rows) or any(
+        keys_within(own.root, MOVES, rows[-1].last + 1e-3)
+    )
+
+
+def _intact(root: bpy.types.Object, row: WalkRow) -> bool:
+    return bool(row.digest == _digest(root, row.first, row.last))
+
+
+def _digest(root: bpy.types.Object, first: int, last: int) -> str:
+    """What tells a root's keys after frame ``first`` up to ``last`` from others."""
+    return sha256(b"".join(sorted(keys_within(root, MOVES, first + 1e-3, last)))).hexdigest()

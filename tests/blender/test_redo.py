@@ -1,0 +1,278 @@
+"""Walks know what they were made for and are made anew, and where a character stands that was taken
+by the body.
+"""
+
+from types import ModuleType
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.walk_rows import title_of_walk
+from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import redo
+from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+from bl_ext.user_default.dafnet.panels.setup import DAFNET_PT_setup, DAFNET_PT_walks
+
+from kit.panels import drawn_by
+from kit.stage import Stage, keys_of
+
+
+class Room(Stage):
+    """A character at the origin and a stool 3 m ahead of it."""
+
+    def __init__(self) -> None:
+        super().__init__(fps=30)
+        self.stool = self.seat("Stool", location=(0.0, 3.0, 0.0))
+        self.scene.cursor.location = (5.0, 5.0, 0.0)
+        bpy.context.view_layer.update()
+
+    def sit(self, **options: Any) -> None:
+        self.select(self.stool, self.ann)
+        assert bpy.ops.dafnet.walk_to(goal="SEAT", **options) == {"FINISHED"}
+
+    def go(self, x: float, y: float, **options: Any) -> None:
+        self.scene.cursor.location = (x, y, 0.0)
+        assert bpy.ops.dafnet.walk_to(goal="CURSOR", **options) == {"FINISHED"}
+
+    def end(self) -> np.ndarray:
+        return self.place(self.own.walks[-1].last)
+
+    def rows(self) -> list[tuple[str, int]]:
+        return [(title_of_walk(row), row.first) for row in self.own.walks]
+
+
+@pytest.fixture
+def room(blender: ModuleType) -> Room:
+    return Room()
+
+
+def test_a_walk_is_made_again_to_where_the_seat_is_now(room: Room) -> None:
+    room.sit(seconds=1.0)
+    before = room.end()
+    room.stool.location.x = 1.5
+    room.stool.name = "Bar Stool"
+    bpy.context.view_layer.update()
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+    after = room.end()
+    assert abs(after[0] - 1.5) < 0.1 and abs(before[0]) < 0.1
+    assert room.rows() == [("Sit on Bar Stool", 1)]
+    assert room.scene.frame_end == room.own.walks[0].last, "the range ends with it again"
+    assert np.allclose(room.place(1), 0.0, atol=1e-5)
+
+
+def test_the_manner_is_one_place_s_and_is_kept_with_the_walk(room: Room) -> None:
+    room.own.speed, room.own.seconds, room.own.sits_down = 0.8, 2.0, 2.6
+    room.sit()
+    row = room.own.walks[0]
+    assert (row.speed, row.seconds, row.sits_down) == pytest.approx((0.8, 2.0, 2.6))
+    slow = row.last
+    row.speed, row.sits_down = 1.6, 0.8
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+    assert room.own.walks[0].last < slow - 30
+    assert room.own.walks[0].speed == pytest.approx(1.6), "it stays with the walk"
+    assert room.own.speed == pytest.approx(0.8), "and the next one is as the panel says"
+
+
+def test_seconds_of_sitting_down_and_getting_up_are_those_of_the_path(room: Room) -> None:
+    def backs(first: int, last: int) -> int:
+        """Frames in which the root is within 25 cm of the seat, and moves."""
+        path = room.path(first, last)[:, :2]
+        seat = path[-1] if last == room.own.walks[0].last else path[0]
+        near = np.linalg.norm(path - seat, axis=1)
+        return int(((near < 0.25) & (near > 0.002)).sum())
+
+    quick = slow = 0
+    for seconds in (0.6, 2.4):
+        room.root.animation_data_clear()
+        room.own.walks.clear()
+        room.root.location, room.root.rotation_euler = (0, 0, 0), (0, 0, 0)
+        room.scene.frame_set(1)
+        room.sit(seconds=0.5, sits_down=seconds)
+        down = backs(1, room.own.walks[0].last)
+        room.go(3.0, 0.0, gets_up=seconds)
+        up = backs(room.own.walks[1].first, room.own.walks[1].last)
+        quick, slow = (down + up, slow) if seconds < 1 else (quick, down + up)
+    assert slow > 2 * quick
+
+
+def test_those_after_it_are_made_again_as_well(room: Room) -> None:
+    room.sit(seconds=1.0)
+    room.go(3.0, 0.0, seconds=1.0)
+    first = room.own.walks[0].last
+    room.own.active_walk = 0
+    room.own.walks[0].seconds = 4.0
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+    assert [title for title, _ in room.rows()] == ["Sit on Stool", "Walk to 3.0, 0.0"]
+    assert room.own.walks[0].last == room.own.walks[1].first == first + 90
+    assert np.allclose(room.end()[:2], (3.0, 0.0), atol=1e-3)
+    room.own.active_walk = 1
+    before = room.path(1, first + 90)
+    room.own.walks[1].place = (2.0, 0.0, 0.0)
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+    assert np.allclose(room.path(1, first + 90), before, atol=1e-3), "what is before it stays"
+    assert np.allclose(room.end()[:2], (2.0, 0.0), atol=1e-3)
+
+
+@pytest.mark.parametrize("taken", ["armature", "root"])
+@pytest.mark.parametrize("played", [False, True])
+def test_it_begins_where_the_character_was_moved_to(room: Room, taken: str, played: bool) -> None:
+    room.sit(seconds=1.0)
+    if played:
+        assert bpy.ops.dafnet.generate() == {"FINISHED"}
+    room.scene.frame_set(1)
+    moved = room.ann if taken == "armature" else room.root
+    moved.location.x += 2.0
+    moved.rotation_euler.z += 0.5
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+    assert np.allclose(room.place(1), (2.0, 0.0, 0.0, 0.5), atol=1e-3)
+    assert abs(room.end()[0]) < 0.1, "to the same seat"
+
+
+def test_a_character_taken_by_its_body_walks_from_where_it_stands(room: Room) -> None:
+    room.ann.location.x -= 3.0
+    room.go(0.0, 0.0)  # where its root is
+    assert np.allclose(room.place(1)[:2], (-3.0, 0.0), atol=1e-4)
+    assert np.allclose(room.end()[:2], (0.0, 0.0), atol=1e-3)
+
+
+def test_a_character_taken_by_its_body_is_generated_where_it_stands(room: Room) -> None:
+    room.ann.location.x -= 3.0
+    room.scene.frame_end = 6
+    room.select(room.ann)
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
+    assert room.ann.location.x == pytest.approx(-3.0, abs=1e-3)
+    assert room.root.location.x == pytest.approx(-3.0, abs=1e-3)
+
+
+def test_a_root_that_was_moved_counts_more_than_the_body(room: Room) -> None:
+    room.ann.location.x, room.root.location.x = -3.0, 1.0
+    room.go(0.0, 2.0)
+    assert np.allclose(room.place(1)[:2], (1.0, 0.0), atol=1e-4)
+
+
+def test_where_the_keys_end_is_said_with_its_frame(room: Room) -> None:
+    room.go(0.0, 3.0 - 1.0)
+    last = room.own.walks[0].last
+    room.scene.frame_set(1)
+    with pytest.raises(RuntimeError, match=f"end there already, at frame {last}.*Redo Walk"):
+        bpy.ops.dafnet.walk_to(goal="CURSOR")
+    room.sit(seconds=0.5)
+    with pytest.raises(RuntimeError, match="end there already, at frame"):
+        room.sit(seconds=0.5)
+    assert len(room.own.walks) == 2
+
+
+def test_edited_keys_are_asked_about_and_kept(room: Room) -> None:
+    room.sit(seconds=1.0)
+    keys = keys_of(room.root)
+    curve = next(c for c in action_curves(room.root) if c.data_path == "location")
+    curve.keyframe_points[4].co[1] += 0.3
+    edited = keys_of(room.root)
+    with pytest.raises(RuntimeError, match="were edited since"):
+        bpy.ops.dafnet.redo_walk()
+    assert all(np.array_equal(edited[name], now) for name, now in keys_of(room.root).items())
+    assert bpy.ops.dafnet.redo_walk(replace_edited=True) == {"FINISHED"}
+    for name, now in keys_of(room.root).items():
+        assert np.allclose(now, keys[name], atol=1e-4), "as it was made"
+    kept = [action for action in bpy.data.actions if action.name.endswith(" before redo")]
+    assert len(kept) == 1 and kept[0].use_fake_user
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}, "nothing is edited now"
+
+
+def test_keys_after_it_are_asked_about_and_the_one_it_begins_with_is_not(room: Room) -> None:
+    room.sit(seconds=1.0)
+    last = room.own.walks[0].last
+    room.stand(1, 0.5, 0.0)
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+    assert np.allclose(room.place(1), (0.5, 0.0, 0.0, 0.0), atol=1e-4)
+    room.stand(last + 60, 0.5, 0.0)
+    with pytest.raises(RuntimeError, match="were edited since"):
+        bpy.ops.dafnet.redo_walk()
+
+
+def test_what_cannot_be_made_again_changes_nothing(
+    room: Room, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    room.sit(seconds=1.0)
+    room.go(3.0, 0.0)
+    room.own.active_walk = 0
+
+    def state() -> Any:
+        rows = [(row.kind, row.goal, row.first, row.last, row.digest) for row in room.own.walks]
+        keys = {name: values.tolist() for name, values in keys_of(room.root).items()}
+        return rows, keys, room.scene.frame_end, room.own.active_walk, len(bpy.data.actions)
+
+    before = state()
+    room.own.walks[0].seconds = 5.0
+    room.own.walks[1].place = (0.0, 400.0, 0.0)
+    with pytest.raises(RuntimeError, match="m away"):
+        bpy.ops.dafnet.redo_walk()
+    assert state() == before, "nor the first of both"
+    room.own.walks[1].place = (3.0, 0.0, 0.0)
+    job = redo.redo_walks.steps(bpy.context, room.ann, 0)
+    for _ in range(30):
+        next(job)
+    job.close()
+    assert state() == before
+    bpy.data.objects.remove(room.stool)
+    with pytest.raises(RuntimeError, match="no longer in the scene"):
+        bpy.ops.dafnet.redo_walk()
+    with pytest.raises(InputError, match="no walk"):
+        redo.redo_walks(bpy.context, room.ann, 7)
+
+
+def test_a_walk_that_takes_the_place_of_another_s_end_leaves_its_beginning(room: Room) -> None:
+    room.go(0.0, 2.0, seconds=1.0)
+    room.scene.frame_set(40)
+    line = bpy.data.curves.new("Path", "CURVE")
+    line.dimensions = "3D"
+    spline = line.splines.new("POLY")
+    spline.points.add(1)
+    for point, place in zip(spline.points, ((2.0, 1.0, 0.0), (2.0, 4.0, 0.0)), strict=True):
+        point.co = (*place, 1.0)
+    path = room.put(bpy.data.objects.new("Path", line), room.scene.collection)
+    room.select(path, room.ann)
+    assert bpy.ops.dafnet.walk_along_curve(seconds=1.0) == {"FINISHED"}
+    assert room.rows() == [("Walk to 0.0, 2.0", 1), ("Walk along Path", 40)]
+    assert room.own.walks[0].last == 40
+    path.location.x = 1.0
+    bpy.context.view_layer.update()
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+    assert np.allclose(room.end()[:2], (3.0, 4.0), atol=1e-2)
+
+
+def test_points_and_moving_objects_are_made_again(room: Room) -> None:
+    points = [room.empty("P1", (1.0, 1.0, 0.0)), room.empty("P2", (2.0, 1.0, 0.0))]
+    room.select(room.ann, *points)
+    assert bpy.ops.dafnet.walk_through_points(to_cursor=True) == {"FINISHED"}
+    assert room.rows() == [("Walk through 3 points", 1)]
+    points[1].location = (2.0, 2.0, 0.0)
+    bpy.context.view_layer.update()
+    room.scene.cursor.location = (0.0, 0.0, 0.0)
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+    path = room.path(1, room.own.walks[0].last)
+    assert np.linalg.norm(path[:, :2] - (2.0, 2.0), axis=1).min() < 0.3
+    assert np.allclose(path[-1, :2], (5.0, 5.0), atol=1e-2), "the cursor as it was"
+
+
+def test_a_plan_of_tasks_takes_the_place_of_walks(room: Room) -> None:
+    room.go(0.0, 2.0)
+    row = room.own.tasks.add()
+    row.verb, row.about = "SIT_ON", "Stool"
+    assert bpy.ops.dafnet.plan_tasks() == {"FINISHED"}
+    assert not room.own.walks and not bpy.ops.dafnet.redo_walk.poll()
+
+
+def test_the_panel_shows_the_walk_s_fields_and_the_button(room: Room) -> None:
+    assert not DAFNET_PT_walks.poll(bpy.context)
+    assert {"speed", "seconds", "sits_down", "gets_up"} <= set(
+        drawn_by(DAFNET_PT_setup, bpy.context).words()
+    )
+    room.sit(seconds=0.5)
+    assert DAFNET_PT_walks.poll(bpy.context)
+    words = drawn_by(DAFNET_PT_walks, bpy.context).words()
+    assert words == ["goal", "speed", "seconds", "sits_down", "gets_up", "dafnet.redo_walk"]
+    room.go(2.0, 0.0)
+    words = drawn_by(DAFNET_PT_walks, bpy.context).words()
+    assert words[0] == "DAFNET_UL_walks" and "place" in words and "sits_down" not in words
