@@ -17,6 +17,7 @@ _MEASURES = {
     "rest": "clean up bodies that hover over seats or sink into them",
     "sample": "on the held-out motion that comes with the project, beside that motion",
     "seats": "sit on ten heights from three sides",
+    "sitting": "send people to every kind of seat, from two sides, and see how they sit",
     "speed": "time every system",
 }
 """Measurements of weights, and what they do."""
@@ -28,8 +29,15 @@ _DATA = {
         "LIBRARY",
         "on these real pieces instead of seats made of boxes",
     ),
+    "sitting": (
+        "--furniture",
+        "LIBRARY",
+        "to these real pieces, alone and in rooms, instead of made ones",
+    ),
 }
 """What a measurement may be given besides: the option, what it takes, and its effect."""
+_SHEETS = ("sitting",)
+"""Measurements that draw their worst."""
 
 _RESEARCH = {
     "ablation": "ablation",
@@ -85,6 +93,8 @@ def _measured_with(name: str, arguments: Sequence[str]) -> argparse.Namespace:
     if name in _DATA:
         option, metavar, effect = _DATA[name]
         parser.add_argument(option, dest="data", type=Path, metavar=metavar, help=effect)
+    if name in _SHEETS:
+        parser.add_argument("--sheets", type=Path, metavar="FOLDER", help="draw the worst there")
     return parser.parse_args(arguments)
 
 
@@ -94,6 +104,7 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
         asked = _measured_with(options.name, arguments)
         options.json = options.json or asked.json
         data = [asked.data] if options.name in _DATA else []
+        data += [asked.sheets] if options.name in _SHEETS else []
         found: Result = benchmark(options.name).measure(asked.weights, progress, *data)
         return found
 

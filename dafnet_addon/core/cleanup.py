@@ -17,7 +17,7 @@ import numpy as np
 from .errors import InputError
 from .kinematics import on_bones, two_bone
 from .progress import stepwise
-from .resting import Distance, across_of, on_legs, rested
+from .resting import Distance, across_of, on_legs, rested, sitting, until_free
 from .root import gaussian
 from .rotations import matrix_from_vector
 from .series import MODEL_FPS, runs, smoothstep
@@ -45,8 +45,9 @@ __all__ = [
     "cleared",
     "planted",
     "smoothed_out",
-    "standing_still",
     "reach_targets",
+    "standing_still",
+    "with_legroom",
 ]
 
 _THIGH, _SHIN = (float(np.linalg.norm(OFFSETS[joint("left_" + n)])) for n in ("knee", "ankle"))
@@ -68,6 +69,10 @@ _SKIN = 0.03  # metres between a wrist or ankle and the surface that it must not
 _DEEPEST = 0.20  # metres that it is moved, at most
 _STEADY = 3.0  # frames; deviation of the Gaussian over what brings a hand or foot out
 _NUDGE = 0.01  # metres; for slopes of the distance
+_LEGROOM = 0.02  # metres that furniture keeps the bones of shins and feet away
+_SWINGS = 0.15  # metres that a foot is put ahead for that, at most
+_LEGROOM_ROUNDS = 2  # knees move with the feet
+_ON_SHIN = np.array([0.35, 0.55, 0.75, 1.0])  # places on it that are kept clear
 _STRAIGHT = 0.999  # of a leg's or arm's length, which is how far they reach
 
 _FARTHEST_HEAD = 0.20  # metres that the trunk is bent by for the head's target, at most
@@ -316,6 +321,45 @@ def _limited(vectors: np.ndarray, limit: float) -> np.ndarray:
     )
 
 
+def with_legroom(
+    joints: np.ndarray,
+    support: Support,
+    distance: Distance,
+    strength: float = 1.0,
+    floor: np.ndarray | float = 0.0,
+) -> np.ndarray:
+    """Joints (T, 22, 3) of which nobody who sits has shins or feet in the furniture: feet stand as
+    far ahead as that asks for, from the step before they sit on; feet that hang swing ahead.
+    """
+    sits, out = sitting(joints, support), joints
+    skin = np.where(sits, _LEGROOM, -1.0)
+    for _ in range(_LEGROOM_ROUNDS if sits.any() else 0):
+        forward = np.cross((0.0, 0.0, 1.0), across_of(out))
+        knees, ankles = out[:, KNEES, None], out[:, ANKLES, None]
+        points = knees + _ON_SHIN[:, None] * (ankles - knees)
+        points = np.concatenate([points, out[:, FEET, None]], axis=2)
+        ahead = until_free(points.reshape(len(out), -1, 3), forward, distance, skin)
+        need = (ahead.reshape(len(out), 2, -1) / np.append(_ON_SHIN, 1.0)).max(axis=-1)
+        if not need.any():
+            break
+
+        need = strength * np.minimum(need, _SWINGS)
+        moved = gaussian(need, _STEADY)[..., None] * forward[:, None]
+        held = need > 0.0
+        low = out[:, FEET, 2] - np.reshape(floor, (-1, 1)) < TOE_HEIGHT + _LOW
+        for foot in range(2):
+            for start, stop in runs(low[:, foot]):
+                own = need[start:stop, foot]
+                way = (own[:, None] * forward[start:stop]).sum(axis=0)
+                moved[start:stop, foot] = own.max() * way / max(float(np.linalg.norm(way)), 1e-9)
+                held[start:stop, foot] = True
+            moved[:, foot] = _between(moved[:, foot], held[:, foot])
+        ankles = out[:, ANKLES] + moved
+        down = _lowered(out[:, HIPS], ankles, low)
+        out = on_legs(out, -down, ankles, out[:, KNEES] + moved / 2)
+    return out
+
+
 def _softly_limited(vectors: np.ndarray, limit: float) -> np.ndarray:
     """Vectors whose lengths near ``limit`` as they grow, without a kink."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
@@ -484,6 +528,8 @@ def cleaned(
         yield 0.6
     if settings.seat > 0.0 and support is not None:
         joints = rested(joints, support, settings.seat, distance)
+        if distance is not None:
+            joints = with_legroom(joints, support, distance, settings.seat, floor)
         yield 0.8
     if settings.reach > 0.0:
         joints = reach_targets(joints, targets, settings.reach)

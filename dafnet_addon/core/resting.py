@@ -25,9 +25,9 @@ from .skeleton import (
     SPINE,
     joint,
 )
-from .softness import LIES_LOWER, OVER_HARD, Support
+from .softness import LIES_LOWER, Support
 
-__all__ = ["Distance", "across_of", "on_legs", "rested", "resting"]
+__all__ = ["Distance", "across_of", "on_legs", "rested", "resting", "sitting", "until_free"]
 
 Distance = Callable[[np.ndarray], np.ndarray]
 """Signed distances (T, N) of world points (T, N, 3) to the furniture, negative inside; metres."""
@@ -46,6 +46,7 @@ _SETTLED = 3.0  # frames; deviation of the Gaussian over a pelvis whose speed is
 _RESTS = 8  # frames of the shortest rest
 _STIRS = 10  # frames of the longest gap in one
 _EITHER_WAY = 0.005  # metres by which bodies rest higher or lower and are left alone
+_ON_THE_WAY = 25  # frames of sitting down and getting up
 _SLOW = 10.0  # frames; deviation of the Gaussian that tells a rest's height from its life
 _LOOKS_BACK = 2.0  # seconds before and after a rest, in which its way down or up begins and ends
 _UPRIGHT = 0.2  # share of the way down that is not yet part of it
@@ -81,7 +82,7 @@ def rested(
     over it as what stands. The way to it and from it is moved softly, less and less.
     """
     lying = smoothstep(_between(_tilt(joints), *_LIES))
-    carried = support.top + OVER_HARD - support.softness - LIES_LOWER * lying
+    carried = support.carried - LIES_LOWER * lying
     rests = resting(joints, carried)
     if not rests:
         return joints
@@ -118,6 +119,14 @@ def resting(joints: np.ndarray, carried: np.ndarray) -> list[tuple[int, int]]:
     over = pelvis[:, 2] - carried
     there = (over > -_SINKS) & (over < _HOVERS) & (speed < _STILL)
     return runs(there, at_least=min(_RESTS, len(joints)), gap=_STIRS)
+
+
+def sitting(joints: np.ndarray, support: Support) -> np.ndarray:
+    """Whether (T,) somebody sits on what is under the root, or is about to, or gets up."""
+    sits = np.zeros(len(joints), bool)
+    for start, stop in resting(joints, support.carried):
+        sits[max(0, start - _ON_THE_WAY) : stop + _ON_THE_WAY] = True
+    return sits & (_tilt(joints) < _LIES[0])
 
 
 def _lift(joints: np.ndarray, carried: np.ndarray, rests: Sequence[tuple[int, int]]) -> np.ndarray:
@@ -197,7 +206,7 @@ def _during(rests: Sequence[tuple[int, int]], frames: int) -> np.ndarray:
     return gaussian(out, _STEADY)
 
 
-def _until_free(
+def until_free(
     points: np.ndarray, way: np.ndarray, distance: Distance, skin: np.ndarray
 ) -> np.ndarray:
     """How far (T, N) points (T, N, 3) have to go along ``way`` (T, 3) to be ``skin`` (T,) metres
@@ -228,7 +237,7 @@ def _off_the_back(
     trunk = joints[:, _TRUNK]
     across = across_of(joints)
     forward = np.cross((0.0, 0.0, 1.0), across)
-    ahead = _until_free(trunk, forward, distance, _BACK_SKIN - _GIVES_WAY * softness)
+    ahead = until_free(trunk, forward, distance, _BACK_SKIN - _GIVES_WAY * softness)
     over = np.maximum((trunk - joints[:, PELVIS, None])[..., 2], _LEAST_LEVER)
     lean = gaussian(counts * np.clip(ahead / over, 0.0, _LEANS).max(axis=1), _STEADY)
     if not lean.any():
@@ -255,7 +264,7 @@ def _on_the_seat(
     for _ in range(_ROUNDS):
         thighs = out[:, KNEES] - out[:, HIPS]
         points = out[:, HIPS, None] + _ALONG[:, None] * thighs[:, :, None]
-        up = _until_free(points.reshape(len(out), -1, 3), above, distance, skin)
+        up = until_free(points.reshape(len(out), -1, 3), above, distance, skin)
         steepest = (up.reshape(len(out), 2, -1) / _ALONG).max(axis=-1)
         raised = gaussian(counts[:, None] * np.minimum(steepest, _FARTHEST_OUT), _STEADY)
         if not raised.any():

@@ -80,6 +80,11 @@ class Support:
     top: np.ndarray
     softness: np.ndarray
 
+    @property
+    def carried(self) -> np.ndarray:
+        """The heights (T,) at which it carries the pelvis joint of one who sits."""
+        return self.top + OVER_HARD - self.softness
+
 
 def guessed(solid: Box | Mesh, top: float) -> float:
     """The softness (metres) that a solid's name and shape tell; ``top``: height over the floor of

@@ -14,7 +14,7 @@ from .occupancy import distance
 from .root import RootPath
 from .series import runs
 from .skeleton import FEET, JOINTS, PELVIS
-from .softness import OVER_HARD, Support, guessed
+from .softness import Support, guessed
 from .solids import Scene
 from .take import Finding
 
@@ -63,7 +63,6 @@ def _seats(
 ) -> Iterator[Finding]:
     if not np.isfinite(support.top).any():
         return
-    carried = support.top + OVER_HARD - support.softness
     names = _names_under(scene, path, support.top)
     for episode in seat_episodes(joints, path, fps):
         here = slice(episode.start, episode.stop)
@@ -73,7 +72,7 @@ def _seats(
             continue
 
         name = names[middle]
-        over = float(np.median(joints[here, PELVIS, 2] - carried[here]))
+        over = float(np.median(joints[here, PELVIS, 2] - support.carried[here]))
         amount, when = f"{100 * abs(over):.0f} cm", f"at {middle / fps:.1f} s"
         if episode.pelvis_height > _STANDS and over > 2 * _OFF_SEAT:
             yield Finding(

@@ -41,6 +41,8 @@ _STEP = 0.02
 """Between neighbouring cells of a part, at most: shells and hollows slope by 30 degrees."""
 _LEAST = 0.035
 """Square metres of the smallest seat."""
+_HOLE = 0.10
+"""Square metres of the largest hole in a seat."""
 _MOST_PARTS = 24
 """The largest parts are looked at; of a whole room, those that are nearest."""
 _SMALLEST = 0.15
@@ -97,6 +99,8 @@ farther.
 """
 _LEGS = (0.06, 0.22)
 """Beyond the edge, where shins hang."""
+_HANGS = 0.16
+"""Under the seat, that shins need there at least: before a pillow there is none of it."""
 _STANDS = (0.46, 0.60)
 """Before the pelvis, where one stands who is about to sit down."""
 _UNDER = 0.08
@@ -340,7 +344,7 @@ def _even_parts(seen: Columns, nearest: np.ndarray) -> list[_Part]:
 
     found = []
     for number in large:
-        mask = numbers == number
+        mask = _without_holes(numbers == number)
         cells = np.argwhere(mask)
         places = field.middles(cells)
         longer, shorter = rectangle_axes(field.middles(_ends_of_rows(cells)))
@@ -348,12 +352,27 @@ def _even_parts(seen: Columns, nearest: np.ndarray) -> list[_Part]:
         width = float(np.ptp(places @ shorter)) + field.cell
         if length < 2.0 * _HIPS or width < _SHORTEST:
             continue
-        fills = float(sizes[number]) * field.cell**2 / (length * width)
-        found.append(_Part(seen, heights, mask, places, longer, shorter, length, width, fills))
+        fills = len(cells) * field.cell**2 / (length * width)
+        hole = mask & (numbers != number)
+        own = np.where(hole, np.median(heights[numbers == number]), heights)
+        found.append(_Part(seen, own, mask, places, longer, shorter, length, width, fills))
 
     if len(found) > _MOST_PARTS:
         found.sort(key=lambda part: float(np.linalg.norm(part.places - nearest, axis=1).min()))
     return found[:_MOST_PARTS]
+
+
+def _without_holes(mask: np.ndarray) -> np.ndarray:
+    """A part (X, Y) with what it surrounds, where hips cover that: rings, frames with webbing."""
+    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+    own = np.ix_(np.arange(rows[0], rows[-1] + 1), np.arange(columns[0], columns[-1] + 1))
+    beside = np.pad(~mask[own], 1, constant_values=True)
+    numbers = connected(np.where(beside, 0.0, np.nan), 0.0)
+    sizes = np.bincount(numbers[beside])
+    hole = beside & (numbers != numbers[0, 0]) & (sizes[numbers] * _CELL**2 < _HOLE)
+    filled = mask.copy()
+    filled[own] |= hole[1:-1, 1:-1]
+    return filled
 
 
 def _ends_of_rows(cells: np.ndarray) -> np.ndarray:
@@ -545,7 +564,7 @@ class _Lines:
         if (risen.mean(axis=1) > 0.3).any():
             return None
         legs = self._layers[self._rows(ends + _LEGS[0], ends + _LEGS[1]), trunk]
-        hang = ((legs & Columns.between(height - 0.10, height + 0.11)) != 0).mean() < 0.2
+        hang = ((legs & Columns.between(height - _HANGS, height + 0.11)) != 0).mean() < 0.2
         stands = self._layers[self._rows(ahead + _STANDS[0], ahead + _STANDS[1]), trunk]
         stand = ((stands & Columns.between(0.2, 1.4)) != 0).mean() < 0.1
         good = tall_back + 1.0 * hang + 0.5 * stand

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dafnet_addon import Box, InputError, Mesh, Scene
+from dafnet_addon.core.cleanup import with_legroom
 from dafnet_addon.core.kinematics import two_bone
 from dafnet_addon.core.metrics import jerk
 from dafnet_addon.core.resting import rested, resting
@@ -236,3 +237,44 @@ def test_thighs_lie_on_the_edge_of_a_high_seat_and_feet_hang_from_it():
     assert thighs(joints).min() < -0.02 and thighs(out).min() > 0.0
     assert (out[110:, FEET, 2] > joints[110:, FEET, 2] + 0.02).all()
     assert np.abs(_lengths(out) - _lengths(joints)).max() < 1e-6
+
+
+def _closed_to_the_floor(front: float) -> tuple[Scene, Support]:
+    """A seat of 0.45 m, closed down to the floor, whose front is at ``front`` metres."""
+    box = Box(center=np.array([0.0, front - 0.3, 0.225]), half_size=np.array([0.4, 0.3, 0.225]))
+    support = Support(np.full(FRAMES, 0.45), np.zeros(FRAMES))
+    return Scene((box,)), support
+
+
+def _in_shins(joints: np.ndarray, box: Box) -> float:
+    """The deepest that lower shins and feet are in a box, metres; negative outside."""
+    shins = joints[:, KNEES] + 0.5 * (joints[:, ANKLES] - joints[:, KNEES])
+    points = np.concatenate([shins, joints[:, ANKLES], joints[:, FEET]], axis=1)
+    return float(-box_distance(points - box.center, box.half_size).min())
+
+
+def test_feet_stand_where_shins_have_room_before_a_seat() -> None:
+    scene, support = _closed_to_the_floor(front=0.06)
+    (box,) = scene.solids
+    joints = _sitting_down(low=0.59)
+
+    def distance(points: np.ndarray) -> np.ndarray:
+        return box_distance(points - box.center, box.half_size)
+
+    out = with_legroom(joints, support, distance)
+    assert _in_shins(joints[-30:], box) > 0.05 and _in_shins(out[-30:], box) < -0.01
+    np.testing.assert_allclose(_lengths(out), _lengths(joints), atol=1e-9)
+    np.testing.assert_allclose(out[-30:, PELVIS], joints[-30:, PELVIS], atol=1e-3)
+    toes = out[:, FEET]
+    assert np.ptp(toes, axis=0).max() < 1e-3, "they stood there before, and slide nowhere"
+    assert ((toes - joints[:, FEET])[..., 1] > 0.05).all()
+    half = with_legroom(joints, support, distance, strength=0.5)
+    assert 0.02 < (half - joints)[0, FEET[0], 1] < (out - joints)[0, FEET[0], 1]
+
+
+def test_legs_that_have_room_are_left_alone() -> None:
+    scene, support = _closed_to_the_floor(front=-0.2)
+    (box,) = scene.solids
+    joints = _sitting_down(low=0.59)
+    out = with_legroom(joints, support, lambda p: box_distance(p - box.center, box.half_size))
+    np.testing.assert_array_equal(out, joints)

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from benchmarks.marks import MARKS, measured, others, piece
 from dafnet_addon import InputError, Mesh
 from dafnet_addon.director.beds import bed_of
 from dafnet_addon.director.room import Piece
 from dafnet_addon.director.seats import NoSeat, seat_of
-from kit.marks import MARKS, measured, others, piece
+from kit.places import LIBRARY
 
 pytestmark = pytest.mark.furniture
 
@@ -15,21 +16,15 @@ _SEATS = {"armchair", "bed", "bench", "chair", "sofa", "stool", "toilet"}
 
 
 def test_every_piece_that_one_can_sit_on_is_marked() -> None:
-    assert not [name for name in others() if name.split("_")[0] in _SEATS]
+    assert not [name for name in others(LIBRARY) if name.split("_")[0] in _SEATS]
     for name, mark in MARKS.items():
         assert mark["seats"] or mark["refusal"], name
-        assert np.load(piece_file(name))["vertices"][:, 2].max() > 0.2
-
-
-def piece_file(name: str):
-    from kit.places import LIBRARY
-
-    return LIBRARY / f"{name}.npz"
+        assert piece(LIBRARY, name).vertices[:, 2].max() > 0.2
 
 
 @pytest.mark.slow
 def test_people_sit_where_a_person_marks_it_and_the_way_there_cuts_nothing() -> None:
-    found = measured(sorted(MARKS))
+    found = measured(LIBRARY, sorted(MARKS))
     wrong = {where: each for where, each in found.items() if not each.right}
     assert len(wrong) <= 0.03 * len(found), wrong
     refused = [where for where, each in found.items() if each.refused and not each.agreed]
@@ -46,7 +41,7 @@ def test_people_sit_where_a_person_marks_it_and_the_way_there_cuts_nothing() -> 
 
 @pytest.mark.parametrize("name", ["table_013", "table_011", "desk_003", "table_002"])
 def test_tables_are_not_sat_on_unless_they_are_asked_for(name: str) -> None:
-    table = piece(name, "Piece" if name != "table_011" else "Coffee Table")
+    table = piece(LIBRARY, name, "Piece" if name != "table_011" else "Coffee Table")
     with pytest.raises(NoSeat, match="is a table; choose a seat"):
         seat_of([table], np.array([0.0, -3.0]), name=table.name)
     asked = seat_of([table], np.array([0.0, -3.0]), name=table.name, tables=True)
@@ -57,7 +52,7 @@ def test_tables_are_not_sat_on_unless_they_are_asked_for(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, mark in MARKS.items() if name.startswith("bed")])
 def test_people_lie_along_the_beds_line_with_the_head_where_the_pillow_is(name: str) -> None:
-    mesh: Mesh = piece(name, "Bed")
+    mesh: Mesh = piece(LIBRARY, name, "Bed")
     try:
         beds = bed_of(Piece("Bed", (mesh,)), np.array([2.6, -1.0]), 0.0)
     except InputError:

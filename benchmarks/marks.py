@@ -1,14 +1,15 @@
 """Where a person sits and lies on each piece of the furniture library, as marked by eye in
 ``tests/director/marks.toml``, and how far somebody is from there.
 
-As a command, ``PYTHONPATH=.:tests python -m kit.marks [PIECE …]``: sends somebody to each piece
-twice, from its front and from behind it, and prints what was missed and a table.
+As a command, ``python -m benchmarks.marks LIBRARY [PIECE …]``: sends somebody to each piece twice,
+from its front and from behind it, and prints what was missed and a table.
 """
 
 import sys
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,13 +22,11 @@ from dafnet_addon.core.text import read_json
 from dafnet_addon.director.approach import walk_to_seat
 from dafnet_addon.director.room import Room
 from dafnet_addon.director.seats import SeatPlace, seats_of
-from kit.places import LIBRARY, ROOT
 
 __all__ = ["MARKS", "Off", "Sent", "cuts", "measured", "nearest_mark", "others", "piece", "sent"]
 
-MARKS: dict[str, dict[str, Any]] = tomllib.loads(
-    (ROOT / "tests" / "director" / "marks.toml").read_text(encoding="utf-8")
-)
+_FILE = Path(__file__).parents[1] / "tests" / "director" / "marks.toml"
+MARKS: dict[str, dict[str, Any]] = tomllib.loads(_FILE.read_text(encoding="utf-8"))
 STARTS = {"front": (0.8, -3.2), "behind": (-2.8, 2.2)}
 
 _PLACE, _TURN, _HEIGHT = 10.0, 20.0, 3.0  # cm, degrees, cm
@@ -75,15 +74,15 @@ class Sent:
         return self.agreed or (self.off is not None and self.off.right and not self.cuts)
 
 
-def piece(name: str, as_called: str | None = None) -> Mesh:
+def piece(library: Path, name: str, as_called: str | None = None) -> Mesh:
     """A piece of the library."""
-    with np.load(LIBRARY / f"{name}.npz") as made:
+    with np.load(library / f"{name}.npz") as made:
         return Mesh(made["vertices"], made["triangles"], name=as_called or name)
 
 
-def others() -> list[str]:
+def others(library: Path) -> list[str]:
     """The pieces of the library on which nobody sits."""
-    index = read_json((LIBRARY / "index.json").read_text(encoding="utf-8"))
+    index = read_json((library / "index.json").read_text(encoding="utf-8"))
     return [each["name"] for each in index["pieces"] if each["name"] not in MARKS]
 
 
@@ -123,9 +122,9 @@ def cuts(points: np.ndarray, path: RootPath, seat: SeatPlace) -> int:
     return found
 
 
-def sent(name: str, start: Sequence[float]) -> Sent:
+def sent(library: Path, name: str, start: Sequence[float]) -> Sent:
     """Send somebody to a piece that stands alone."""
-    mark, room = MARKS[name], Room([piece(name, "Piece")])
+    mark, room = MARKS[name], Room([piece(library, name, "Piece")])
     own = room.pieces()["Piece"]
     try:
         seats = seats_of(own.solids, np.array(start), 0.0, "Piece")
@@ -139,9 +138,11 @@ def sent(name: str, start: Sequence[float]) -> Sent:
     return Sent(nearest_mark(seat, mark["seats"]), cuts(points, walked.path, seat))
 
 
-def measured(names: Iterable[str]) -> dict[tuple[str, str], Sent]:
+def measured(library: Path, names: Iterable[str]) -> dict[tuple[str, str], Sent]:
     """What comes of sending somebody to these pieces, from the front and from behind."""
-    return {(name, side): sent(name, start) for name in names for side, start in STARTS.items()}
+    return {
+        (name, side): sent(library, name, start) for name in names for side, start in STARTS.items()
+    }
 
 
 def _row(title: str, found: Sequence[Sent]) -> str:
@@ -162,9 +163,9 @@ def _row(title: str, found: Sequence[Sent]) -> str:
     return f"{title:9s}{cells}{share:8.1f} %{depth:8.1f} cm"
 
 
-def main(names: Sequence[str]) -> int:
+def main(library: str, *names: str) -> int:
     """Print what was missed, and a table by kinds."""
-    found = measured(names or sorted(MARKS))
+    found = measured(Path(library), names or sorted(MARKS))
     for (name, side), each in found.items():
         if not each.right:
             print(f"{name} {side}: {each.refused or each.off}, {each.cuts} cuts")
@@ -180,4 +181,4 @@ def main(names: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main(*sys.argv[1:]))
