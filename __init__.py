@@ -3,7 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-__all__ = ["register", "unregister"]
+from .dafnet_addon.blender.gltf_seats import glTF2ExportUserExtension, glTF2ImportUserExtension
+
+__all__ = ["glTF2ExportUserExtension", "glTF2ImportUserExtension", "register", "unregister"]
 
 _commands: list[Any] = []
 _FILES = str(Path(__file__).parent / "dafnet_addon" / "blender")

@@ -15,6 +15,7 @@ from .follow_path import (
     DAFNET_OT_walk_through_points,
 )
 from .generate import DAFNET_OT_cancel, DAFNET_OT_generate
+from .lie_on import DAFNET_OT_lie_on
 from .map_rig import DAFNET_OT_detect_rig, DAFNET_OT_load_rig_map, DAFNET_OT_save_rig_map
 from .mark_frames import DAFNET_OT_mark_frames
 from .presets import DAFNET_OT_add_preset
@@ -42,6 +43,7 @@ CLASSES = (
     DAFNET_OT_cancel,
     DAFNET_OT_walk_to,
     DAFNET_OT_redo_walk,
+    DAFNET_OT_lie_on,
     DAFNET_OT_add_task,
     DAFNET_OT_remove_task,
     DAFNET_OT_move_task,

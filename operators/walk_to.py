@@ -44,9 +44,24 @@ class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
     tables: BoolProperty(
         name="On Tables", description="Sit on a table or a desk as well, if that is selected"
     )
-    pull_out: BoolProperty(
+    pull_out: EnumProperty(
         name="Pull Out",
-        description="Move a seat out that is tucked under a table, so that the character fits",
+        default="NO",
+        description="A seat that is tucked under a table, so that the character fits",
+        items=[
+            ("NO", "Leave", "Say by how far it has to come out, and do nothing"),
+            ("MOVED", "Move", "Move it out"),
+            (
+                "KEYED",
+                "Key",
+                "Key its location: it comes out before the character is near",
+            ),
+        ],
+    )
+    mark_seat: BoolProperty(
+        name="Mark Seat",
+        description="Keep where one sits on the piece, as the custom property OMI_seat, which glTF "
+        "files take along; it counts the next time",
     )
 
     @classmethod
@@ -71,7 +86,9 @@ class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
             self.seconds,
             self.speed,
             tables=self.tables,
-            pull_out=self.pull_out,
+            pull_out=self.pull_out != "NO",
+            by_keys=self.pull_out == "KEYED",
             sits_down=self.sits_down,
             gets_up=self.gets_up,
+            mark_seat=self.mark_seat,
         )

@@ -5,6 +5,7 @@ from .overlays import DAFNET_PT_overlays
 from .presets import DAFNET_MT_presets, DAFNET_PT_presets
 from .rig import DAFNET_PT_rig, DAFNET_UL_rig
 from .setup import DAFNET_MT_add, DAFNET_PT_setup, DAFNET_PT_walks, DAFNET_UL_walks, add_menu
+from .sitting import DAFNET_MT_sit
 from .takes import DAFNET_PT_clean_up, DAFNET_PT_takes, DAFNET_UL_takes
 from .tasks import DAFNET_PT_tasks, DAFNET_UL_tasks
 
@@ -16,6 +17,7 @@ CLASSES = (
     DAFNET_MT_presets,
     DAFNET_PT_presets,
     DAFNET_PT_character,
+    DAFNET_MT_sit,
     DAFNET_PT_setup,
     DAFNET_UL_walks,
     DAFNET_PT_walks,

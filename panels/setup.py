@@ -23,9 +23,11 @@ from ..operators.follow_path import (
     DAFNET_OT_walk_along_curve,
     DAFNET_OT_walk_through_points,
 )
+from ..operators.lie_on import DAFNET_OT_lie_on
 from ..operators.redo_walk import DAFNET_OT_redo_walk
 from ..operators.walk_to import DAFNET_OT_walk_to
 from .main import CharacterPanel
+from .sitting import DAFNET_MT_sit
 
 __all__ = [
     "DAFNET_MT_add",
@@ -53,6 +55,12 @@ class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
         row.enabled = seat is not None
         text = f"Sit on {seat.name}" if seat else "Sit on Selected"
         row.operator(DAFNET_OT_walk_to.bl_idname, text=text, icon="TRACKING_FORWARDS").goal = "SEAT"
+        row.menu(DAFNET_MT_sit.bl_idname, text="", icon="DOWNARROW_HLT")
+
+        row = column.row(align=True)
+        row.enabled = seat is not None
+        text = f"Lie on {seat.name}" if seat else DAFNET_OT_lie_on.bl_label
+        row.operator(DAFNET_OT_lie_on.bl_idname, text=text, icon="TRACKING_FORWARDS")
 
         column.operator(
             DAFNET_OT_walk_to.bl_idname, text="Walk to Cursor", icon="PIVOT_CURSOR"

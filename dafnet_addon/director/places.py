@@ -15,7 +15,7 @@ from ..core.root import forward_of
 from ..core.rotations import normalised
 from ..core.skeleton import OFFSETS, SEAT_TO_PELVIS, STANDING_PELVIS, joint
 from .room import HEAD_HIGH, KNEE_LOW, Piece, Room, top_view
-from .seats import SeatPlace, seat_of
+from .seats import MarkedSeat, SeatPlace, seat_of
 
 __all__ = [
     "REACH",
@@ -25,6 +25,7 @@ __all__ = [
     "beside",
     "has_room",
     "known_seats",
+    "marked_places",
     "seated_pelvis",
     "seats_on",
     "shoulder",
@@ -101,6 +102,17 @@ def has_room(
     return free
 
 
+def marked_places(
+    marked: Sequence[MarkedSeat], towards: np.ndarray, near: np.ndarray | None
+) -> list[SeatPlace]:
+    """Where one sits on marked seats, the nearest first: to ``near`` (2,), or to where one comes
+    from.
+    """
+    places = [place for seat in marked if (place := seat.place()) is not None]
+    at = towards if near is None else near
+    return sorted(places, key=lambda place: float(np.linalg.norm(place.position - at)))
+
+
 def known_seats(
     room: Room,
     piece: Piece,
@@ -109,9 +121,12 @@ def known_seats(
     size: float,
     tables: bool = False,
 ) -> Generator[float, None, list[SeatPlace]]:
-    """``seats_on`` a piece of a room; looked for once on all of one shape that have a back, which
-    tells the facing. A job.
+    """The seats that a piece of a room says itself, else ``seats_on`` it; these are looked for once
+    on all of one shape that have a back, which tells the facing. A job.
     """
+    marked = marked_places(room.marked.get(piece.name, ()), towards, near)
+    if marked:
+        return marked if near is None else marked[:1]
     shape, place = piece.shape()
     key = ("seats", shape)
     if near is not None or key not in room.known.shapes:

@@ -14,6 +14,7 @@ from ..core.progress import stepwise, within
 from ..core.solids import Box, Mesh, Scene
 from ..core.text import nearest_known, printable
 from .outlines import rectangle_axes
+from .seats import MarkedSeat
 from .surfaces import HeightField, height_field, parts_of_surfaces
 
 __all__ = ["HEAD_HIGH", "KNEE_LOW", "Piece", "Room", "axes_from_above", "top_view"]
@@ -102,7 +103,8 @@ class Room:
     ``solids``: the furniture; those of one name are one piece. ``parts``: names of solids that
     belong to a piece of another name, as a chair's back does. ``groups``: names of pieces by a name
     for all of them, as collections are. ``points`` (x, y, z): what can be looked at, reached or
-    walked to besides furniture. ``lines`` (N, 2): curves to walk along. ``floor``: its height.
+    walked to besides furniture. ``lines`` (N, 2): curves to walk along. ``marked``: seats by the
+    names of pieces that say themselves where they are. ``floor``: its height.
     """
 
     solids: Sequence[Box | Mesh] = ()
@@ -110,6 +112,7 @@ class Room:
     groups: Mapping[str, Sequence[str]] = field(default_factory=dict)
     points: Mapping[str, Sequence[float] | np.ndarray] = field(default_factory=dict)
     lines: Mapping[str, np.ndarray] = field(default_factory=dict)
+    marked: Mapping[str, Sequence[MarkedSeat]] = field(default_factory=dict)
     floor: float = 0.0
     known: "Known" = field(default_factory=lambda: Known(), repr=False, compare=False)
 
@@ -128,6 +131,10 @@ class Room:
             groups=self.groups,
             points={name: factor * np.asarray(at, float) for name, at in self.points.items()},
             lines={name: factor * np.asarray(line, float) for name, line in self.lines.items()},
+            marked={
+                name: [seat.resized(factor) for seat in seats]
+                for name, seats in self.marked.items()
+            },
             floor=factor * self.floor,
             known=Known(of=self, factor=factor),
         )

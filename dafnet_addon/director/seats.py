@@ -23,7 +23,7 @@ from ..core.text import metres
 from .outlines import connected, rectangle_axes
 from .surfaces import Columns, columns, parts_of_surfaces
 
-__all__ = ["NoSeat", "SeatPlace", "on_a_seat", "seat_of", "seats_of"]
+__all__ = ["MarkedSeat", "NoSeat", "SeatPlace", "on_a_seat", "seat_of", "seats_of"]
 
 _CELL = 0.03
 """Metres; of the cells in which furniture is looked at from above."""
@@ -166,6 +166,52 @@ class SeatPlace:
     back: bool
     aside: float
     edge: float
+
+
+@dataclass(frozen=True)
+class MarkedSeat:
+    """A seat as its maker marked it, in the words of glTF's OMI_seat: where the ``back`` and hips
+    are at most, the hollow of the ``knee``, and the ``foot`` (3,); metres, world. ``angle``:
+    between thighs and spine, radians.
+    """
+
+    back: np.ndarray
+    foot: np.ndarray
+    knee: np.ndarray
+    angle: float = 0.5 * np.pi
+
+    def place(self) -> SeatPlace | None:
+        """Where somebody sits on it, thighs ending at the knee or before it; None where back and
+        knee are one over the other.
+        """
+        ahead = (self.knee - self.back) * (1.0, 1.0, 0.0)
+        deep = float(np.linalg.norm(ahead))
+        if deep < _SHORTEST:
+            return None
+        pelvis = min(max(_BEFORE_BACK, deep - _THIGH), max(0.5 * deep, deep - _ON_IT))
+        at = self.back + pelvis / deep * (self.knee - self.back)
+        return SeatPlace(
+            position=at[:2],
+            yaw=facing(ahead[:2]),
+            height=float(at[2]),
+            back=True,
+            aside=0.0,
+            edge=deep - pelvis,
+        )
+
+    def resized(self, factor: float) -> "MarkedSeat":
+        """The same ``factor`` times as large, about the world's origin."""
+        return MarkedSeat(factor * self.back, factor * self.foot, factor * self.knee, self.angle)
+
+    @staticmethod
+    def of(place: SeatPlace, floor: float) -> "MarkedSeat":
+        """What is marked where a seat was found."""
+        ahead = np.array([*forward_of(place.yaw), 0.0])
+        at = np.array([*place.position, place.height])
+        knee = at + place.edge * ahead
+        return MarkedSeat(
+            back=at - _BEFORE_BACK * ahead, foot=np.array([*knee[:2], floor]), knee=knee
+        )
 
 
 @dataclass(frozen=True)

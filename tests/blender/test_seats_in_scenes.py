@@ -102,14 +102,54 @@ def test_a_tucked_chair_is_pulled_out_on_request_and_undone_in_one_step(stage) -
     with pytest.raises(RuntimeError, match=r"'Table' stands .* pull 'Chair' out by \d+ cm"):
         bpy.ops.dafnet.walk_to(goal="SEAT")
     assert chair.location.y == 3.0 and not stage.root.animation_data
-    assert bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0, pull_out=True) == {"FINISHED"}
+    assert bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0, pull_out="MOVED") == {"FINISHED"}
     out = bpy.data.objects["Chair"].location.y - 3.0
     assert 0.2 < out < 0.5
     place = stage.place(stage.scene.frame_end)
     assert abs(place[1] - 3.0 - out) < 0.06
     chair.lock_location[0] = True
     with pytest.raises(RuntimeError, match="'Chair' is linked, locked, keyed or constrained"):
-        bpy.ops.dafnet.walk_to(goal="SEAT", pull_out=True)
+        bpy.ops.dafnet.walk_to(goal="SEAT", pull_out="MOVED")
+
+
+def test_a_tucked_chair_comes_out_by_keys_before_anybody_is_near(stage) -> None:
+    chair = _chair(stage, "Chair", 3.0)
+    stage.box("Table", (-0.7, 2.2, 0.70), (0.7, 2.95, 0.74))
+    stage.select(chair)
+    assert bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0, pull_out="KEYED") == {"FINISHED"}
+    sits = stage.scene.frame_end
+    at, root = {}, {}
+    for frame in range(1, sits + 1):
+        stage.scene.frame_set(frame)
+        at[frame], root[frame] = chair.matrix_world.translation.y, stage.place(frame)
+    out = at[sits] - 3.0
+    assert at[1] == 3.0 and 0.2 < out < 0.5 and abs(root[sits][1] - at[sits]) < 0.06
+    moving = [frame for frame in at if frame > 1 and at[frame] != at[frame - 1]]
+    assert 10 < len(moving) < 40 and moving[-1] < sits - 30
+    for frame in moving:
+        assert np.hypot(root[frame][0], root[frame][1] - at[frame]) > 0.9
+
+
+def test_people_lie_down_on_what_is_selected(stage) -> None:
+    bed = stage.box("Bed", (-0.5, 2.0, 0.0), (0.5, 4.0, 0.45))
+    stage.box("Headboard", (-0.5, 4.0, 0.0), (0.5, 4.06, 0.9), parent=bed)
+    bpy.context.view_layer.update()
+    stage.select(bed)
+    assert bpy.ops.dafnet.lie_on(seconds=2.0) == {"FINISHED"}
+    place = stage.place(stage.scene.frame_end)
+    assert abs(place[0]) < 0.4 and 2.5 < place[1] < 3.5
+    assert stage.own.head is not None, "the head is led to where it lies"
+    stage.select(stage.ann)
+    with pytest.raises(RuntimeError, match="Select one object to lie on"):
+        bpy.ops.dafnet.lie_on()
+
+
+def test_nobody_lies_on_a_stool(stage) -> None:
+    stool = stage.box("Stool", (-0.2, 2.0, 0.0), (0.2, 2.4, 0.45))
+    stage.select(stool)
+    with pytest.raises(RuntimeError, match="Stool"):
+        bpy.ops.dafnet.lie_on()
+    assert not stage.root.animation_data
 
 
 def test_ones_own_rigs_body_is_never_furniture(stage) -> None:

@@ -110,6 +110,12 @@ def movable(top: bpy.types.Object) -> None:
         )
 
 
-def move(top: bpy.types.Object, offset: np.ndarray) -> None:
-    """Move a piece by an offset (2,) in the world, Blender units."""
+def move(top: bpy.types.Object, offset: np.ndarray, between: tuple[int, int] | None = None) -> None:
+    """Move a piece by an offset (2,) in the world, Blender units; ``between`` two frames, with keys
+    on its location, where these are given.
+    """
+    if between is not None:
+        top.keyframe_insert("location", frame=between[0])
     top.matrix_world = Matrix.Translation(Vector((*offset.tolist(), 0.0))) @ top.matrix_world
+    if between is not None:
+        top.keyframe_insert("location", frame=between[1])

@@ -15,9 +15,9 @@ from ...core.progress import stepwise, within
 from ...core.root import forward_of
 from ...core.solids import Box, Mesh, Scene
 from ...director.approach import Tucked, walk_to_seat
-from ...director.places import before_a_top
+from ...director.places import before_a_top, marked_places
 from ...director.room import Piece, Room
-from ...director.seats import on_a_seat, seats_of
+from ...director.seats import MarkedSeat, SeatPlace, on_a_seat, seats_of
 from ...director.walks import AlreadyThere, unit_doubt, walk_to
 from ..character.armature import character_scale, metres_per_unit
 from ..character.settings import Settings, settings_of
@@ -25,6 +25,7 @@ from ..character.standing import standing
 from ..character.walk_rows import PLACE, SEAT, Asked, Manner
 from ..scene.furniture import furniture_at
 from ..scene.lookup import find_collection, find_object, find_scene
+from ..scene.marked_seats import mark, marked_on
 from .made_walks import intact_walks, note_walk
 from .root_keys import (
     key_route,
@@ -53,6 +54,10 @@ _READ = 0.1
 """Progress once the scene is read."""
 _THERE = 0.3
 """Metres from a seat within which one sits on it already."""
+_NEAR_SEAT = 1.0
+"""Metres from a seat within which it is not pulled out by itself."""
+_PULLS = 0.8
+"""Seconds of pulling a seat out."""
 _SITTING_DOWN = BEFORE_SEAT + 0.2
 """Metres from a seat within which a walker is about to sit down on it."""
 
@@ -158,7 +163,7 @@ class _Request:
     """What is asked for of a seat: the ``names`` of the piece's objects, that which was chosen
     first; ``place`` (2,), canonical metres: by which place on it, or where one goes if there is no
     piece; whether ``tables`` are seats; whether the piece is pulled ``out`` where something stands
-    over it; in which ``manner``.
+    over it; in which ``manner``; its ``marked`` seats, if it says itself where one sits.
     """
 
     names: Sequence[str]
@@ -166,18 +171,20 @@ class _Request:
     tables: bool
     out: bool
     manner: Manner
+    marked: Sequence[MarkedSeat] = ()
 
 
 @dataclass(frozen=True)
 class _Found:
     """A ``route``, the furniture that it leads through, ``warnings``, and by how much the seat is
-    ``pulled`` (2,) out for it, canonical metres.
+    ``pulled`` (2,) out for it, canonical metres; the ``seat``, if one is sat on.
     """
 
     route: Route
     met: tuple[Passage, ...]
     warnings: tuple[str, ...] = ()
     pulled: np.ndarray | None = None
+    seat: SeatPlace | None = None
 
 
 @stepwise
@@ -194,6 +201,8 @@ def walk(
     gets_up: float = GETS_UP,
     place: Sequence[float] | None = None,
     begins: Beginning | None = None,
+    by_keys: bool = False,
+    mark_seat: bool = False,
 ) -> Generator[float, None, Walk]:
     """Let the character walk to ``seat`` and sit there for some ``seconds``, or, for None, to the
     3D cursor and stand.
@@ -204,9 +213,10 @@ def walk(
     the root's last key, else from the current frame; earlier keys stay. ``begins``: from there, in
     place of all later keys. The seat has to be in the character's furniture collection; where it
     has none, the seat's own becomes that, or a new one of all that stands around. ``pull_out``:
-    move a seat that is tucked under something. ``InputError``: there is nothing to sit on, no way,
-    no room before the seat, or the root cannot be keyed. Then, or if the job is closed, nothing is
-    changed.
+    move a seat that is tucked under something, or ``by_keys``, so that it comes out before the
+    character is near. ``mark_seat``: keep where one sits on the piece, as glTF does.
+    ``InputError``: there is nothing to sit on, no way, no room before the seat, or the root cannot
+    be keyed. Then, or if the job is closed, nothing is changed.
     """
     scene, furniture = context.scene, armature.dafnet.furniture
     made = None
@@ -224,12 +234,16 @@ def walk(
         pull_out=pull_out,
     )
     try:
-        return (yield from _walk(context, armature, asked, furniture, made, begins))
+        walked, found = yield from _walk(context, armature, asked, furniture, made, begins, by_keys)
     except BaseException:
         added = next((c for c in bpy.data.collections if c.name_full == made), None)
         if added is not None:
             bpy.data.collections.remove(added)
         raise
+    if mark_seat and found is not None:
+        carrier = scene.objects[asked.goal]
+        mark(carrier, found, metres_per_unit(scene))
+    return walked
 
 
 def _asked_place(
@@ -249,7 +263,9 @@ def _walk(
     furniture: bpy.types.Collection | None,
     made: str | None,
     begins: Beginning | None,
-) -> Generator[float, None, Walk]:
+    by_keys: bool,
+) -> Generator[float, None, tuple[Walk, MarkedSeat | None]]:
+    """The walk, and the seat that was found for it in metres of the scene."""
     scene = context.scene
     settings = settings_of(armature, scene, furniture=furniture.name_full if furniture else None)
     seat = scene.objects[asked.goal] if asked.goal else None
@@ -261,7 +277,9 @@ def _walk(
 
     start = yield from within(start_of(context, settings, begins), 0.0, _READ)
     place = np.array(goal[:2], float) * start.unit
-    request = _Request(names, place, asked.tables, asked.pull_out, asked.manner)
+    objects = [each for each in scene.objects if each.name in names]
+    marked = marked_on(objects, start.unit)
+    request = _Request(names, place, asked.tables, asked.pull_out, asked.manner, marked)
     found = yield from within(_route(start, request), _READ, 1.0)
 
     root = keyable_root(settings)
@@ -275,17 +293,32 @@ def _walk(
         restore_between(root, kept)
 
     if found.pulled is not None:
-        piece = next(each for each in scene.objects if each.name == names[0])
-        move(top_of(piece), found.pulled / start.unit)
+        top = top_of(next(each for each in scene.objects if each.name == names[0]))
+        move(top, found.pulled / start.unit, _free_to_move(start, found) if by_keys else None)
         out = 100.0 * start.size * float(np.linalg.norm(found.pulled))
-        warnings = (f"Pulled '{top_of(piece).name}' out by {out:.0f} cm.", *warnings)
+        warnings = (f"Pulled '{top.name}' out by {out:.0f} cm.", *warnings)
     if made is not None:
         scene.collection.children.link(own)
     character.dafnet.furniture = own
     last = start.first + len(route.path) - 1
     note_walk(scene, character, asked, first=start.first, last=last, intact=intact)
     extended = extend_range(scene, character, last)
-    return Walk(start.first, last, extended, (*passage_warnings(found.met, start.first), *warnings))
+    warnings = (*passage_warnings(found.met, start.first), *warnings)
+    seat_found = None
+    if found.seat is not None:
+        seat_found = MarkedSeat.of(found.seat, start.floor).resized(start.size)
+    return Walk(start.first, last, extended, warnings), seat_found
+
+
+def _free_to_move(start: Start, found: _Found) -> tuple[int, int]:
+    """The frames between which a seat is pulled out: the last in which nobody is near it yet."""
+    assert found.seat is not None and found.pulled is not None
+    path = found.route.path.position[:, :2]
+    places = (found.seat.position, found.seat.position - found.pulled)
+    gaps = [np.linalg.norm(path - place, axis=1) for place in places]
+    near = np.flatnonzero(np.min(gaps, axis=0) < _NEAR_SEAT)
+    last = max(int(near[0]) - 1, 1)
+    return start.first + max(0, last - round(_PULLS * start.fps)), start.first + last
 
 
 def extend_range(scene: bpy.types.Scene, armature: bpy.types.Object, last: int) -> bool:
@@ -366,9 +399,11 @@ def _route_to_seat(start: Start, here: Stop, asked: _Request) -> Generator[float
     near = _place_on(whole, asked.place)
     if near is None and len({solid.name for solid in parts}) > 1 and chosen:
         near = Piece(name, tuple(chosen)).box().mean(axis=0)[:2]
-    job = seats_of.steps(parts, start.place[:2], start.floor, name, near, start.size, asked.tables)
-    seats = yield from within(job, 0.0, 0.1)
-    done = 0.15
+    seats, done = marked_places(asked.marked, start.place[:2], near), 0.15
+    if not seats:
+        place = start.place[:2]
+        job = seats_of.steps(parts, place, start.floor, name, near, start.size, asked.tables)
+        seats = yield from within(job, 0.0, 0.1)
     if near is None and not seats[0].back:
         top = yield from within(before_a_top(room, whole, seats[0]), 0.1, 0.12)
         if top is not None:
@@ -419,7 +454,7 @@ def _route_to_seat(start: Start, here: Stop, asked: _Request) -> Generator[float
                 "choose another seat."
             )
 
-    return _Found(route, passages, pulled=pulled)
+    return _Found(route, passages, pulled=pulled, seat=spot)
 
 
 def _place_on(piece: Piece, cursor: np.ndarray) -> np.ndarray | None:

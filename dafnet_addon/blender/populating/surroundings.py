@@ -9,8 +9,11 @@ import numpy as np
 
 from ...core.solids import Mesh
 from ...director.room import Room
+from ...director.seats import MarkedSeat
 from ..character.armature import is_character, metres_per_unit
+from ..gltf_seats import NAME
 from ..scene.furniture import meshes_in
+from ..scene.marked_seats import marked_on
 
 __all__ = ["furniture_of_room", "room_of", "standing_objects"]
 
@@ -73,8 +76,31 @@ def room_of(context: bpy.types.Context) -> Room:
             if each.type in {"EMPTY", "CAMERA", "LIGHT"}
         },
         lines={each.name: line for each in others if (line := _line(each, unit)) is not None},
+        marked=_marked(members, named, unit),
         floor=_floor(solids),
     )
+
+
+def _marked(
+    members: set[bpy.types.Object], named: set[str], unit: float
+) -> dict[str, tuple[MarkedSeat, ...]]:
+    """The seats that pieces say themselves, by their names: marked on a mesh, or on what carries it
+    or hangs on it.
+    """
+    found: dict[str, list[bpy.types.Object]] = {}
+    for each in sorted(members, key=lambda each: each.name):
+        if each.get(NAME) is None:
+            continue
+        family = [each, *_carriers(each), *each.children_recursive]
+        mesh = next((other for other in family if other.name in named), None)
+        if mesh is not None:
+            found.setdefault(_whole(mesh, named), []).append(each)
+    return {name: marked_on(carriers, unit) for name, carriers in found.items()}
+
+
+def _carriers(part: bpy.types.Object) -> list[bpy.types.Object]:
+    """What an object is parented to, the nearest first."""
+    return [] if part.parent is None else [part.parent, *_carriers(part.parent)]
 
 
 def _whole(part: bpy.types.Object, named: set[str]) -> str:
