@@ -58,6 +58,7 @@ DEFAULTS = CleanUp(feet=1.0, reach=1.0, seat=1.0)
 
 _HEIGHT, _PLACE, _TURN = 4.0, 10.0, 20.0  # cm, cm, degrees
 _INSIDE = 1.0  # cm of a bone in something hard: its flesh is past it
+_SEEN = 3  # frames that it is inside
 _GIVES_WAY = 60.0  # cm of that, by a metre of softness
 _SETTLES = 15  # frames from where the root rests, until the body has to
 _PER_BONE = 4
@@ -203,7 +204,8 @@ def _inside(joints: np.ndarray, scene: Scene) -> dict[str, float]:
         gives = _GIVES_WAY * SOFTNESS.get(kind_by_name(solid.name), 0.0)
         for part, ends in _ENDS.items():
             own = np.array([name.rpartition("_")[2] in ends for name in names])
-            deepest = float(depth[:, own].max()) - gives * (part == "trunk")
+            # as deep as it is for as long as can be seen
+            deepest = float(np.sort(depth[:, own].max(axis=1))[-_SEEN]) - gives * (part == "trunk")
             if deepest > _INSIDE:
                 found[part] = round(max(deepest, found.get(part, 0.0)), 1)
     return found

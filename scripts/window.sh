@@ -3,6 +3,8 @@
 # Its pictures go to a folder. The Blender is one on the PATH, or lies in a Debian made by scripts/debian_blender.sh.
 #
 #     scripts/window.sh PICTURES [DEBIAN]
+#
+# PARTS names some of the parts of drive.py instead of all; RIGS is a folder of real characters' rest poses, of which two are baked on.
 set -euo pipefail
 
 cd "$(dirname "$0")/.."
@@ -13,6 +15,11 @@ trap 'rm -rf "$work"; [[ -z ${mounted:-} ]] || umount "$debian/proc"' EXIT
 cp build/dafnet-*.zip "$work/dafnet.zip"
 cp -r tests/window "$work/drive"
 cp -r tests/kit "$work/drive/"
+mkdir "$work/drive/rigs"
+for rig in mixamo_gltf_woman vrm_b; do
+    if [[ -n ${RIGS:-} ]]; then cp "$RIGS/$rig.json" "$work/drive/rigs/"; fi
+done
+read -ra parts <<<"${PARTS:-}"
 mkdir -p "$work/profile/extensions/user_default" "$work/pictures"
 inside=${work#"$debian"}
 run=(env HOME="$inside" BLENDER_USER_RESOURCES="$inside/profile" LIBGL_ALWAYS_SOFTWARE=1)
@@ -22,7 +29,7 @@ if [[ -n $debian ]]; then
 fi
 "${run[@]}" blender --command extension install-file -r user_default -e "$inside/dafnet.zip" >/dev/null
 "${run[@]}" xvfb-run -a -s "-screen 0 1600x1000x24 +extension GLX" blender --enable-event-simulate --no-window-focus \
-    --python-exit-code 1 --window-geometry 0 0 1600 1000 --python "$inside/drive/drive.py" -- "$inside/pictures" 2>&1 |
+    --python-exit-code 1 --window-geometry 0 0 1600 1000 --python "$inside/drive/drive.py" -- "$inside/pictures" "${parts[@]}" 2>&1 |
     tee "$work/log"
 mkdir -p "$pictures"
 cp "$work"/pictures/*.png "$pictures/"

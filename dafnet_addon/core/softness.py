@@ -68,7 +68,8 @@ _BED = (1.8, 0.8)  # long, wide
 _SOFA = (1.3, 0.65)  # wide, deep
 _ARMCHAIR = (0.7, 0.7)  # wide, deep
 _SEAT_HEIGHTS = (0.25, 0.56)  # of their tops over the floor
-_BACK = 0.2  # of a back over the top
+_BACK = (0.2, 0.8)  # of a back over the top; what is higher is a flight of stairs, or a whole room
+_LONGEST = (2.7, 4.0)  # beds and sofas; what is longer is several, or a room
 
 
 @dataclass(frozen=True)
@@ -111,9 +112,9 @@ def _kind_by_shape(solid: Box | Mesh, top: float) -> str:
     long, short, back = _sides(solid, top)
     if not lowest < top < highest:
         return ""
-    if long >= _BED[0] and short >= _BED[1] and back < 1.0:
+    if _BED[0] <= long <= _LONGEST[0] and short >= _BED[1] and back < 1.0:
         return "bed"
-    if back < _BACK:
+    if not _BACK[0] < back < _BACK[1] or long > _LONGEST[1]:
         return ""
     if long >= _SOFA[0] and short >= _SOFA[1]:
         return "sofa"

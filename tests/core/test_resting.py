@@ -182,6 +182,9 @@ def test_shapes_tell_it_where_names_do_not(size, top, kind):
 def test_a_plain_box_is_a_hard_seat_of_any_kind():
     assert guessed(_box("Cube", (0.45, 0.45, 0.45)), 0.45) == pytest.approx(0.02)
     assert guessed(_box("Cube", (2.2, 1.0, 0.74)), 0.74) == pytest.approx(0.02), "a table"
+    assert guessed(_box("Cube", (6.4, 6.4, 2.5)), 0.45) == pytest.approx(0.02), "a room"
+    assert guessed(_box("Cube", (5.0, 5.0, 1.0)), 0.45) == pytest.approx(0.02), "a stage"
+    assert guessed(_box("Cube", (2.2, 1.2, 1.36)), 0.34) == pytest.approx(0.02), "stairs"
 
 
 def test_what_carries_is_the_solid_under_the_root_and_it_may_say_how_soft_it_is():

@@ -1,11 +1,12 @@
-"""What scripts/window.sh plays: what may come between while a take is made, then a first shot with
-the mouse.
+"""What scripts/window.sh plays: what may come between while a take is made, then seats and rigs,
+then a first shot with the mouse; or only what is named.
 
 In this order, since Blender 4.3 crashes by itself when it opens a new file after another scene was
 made with Rigify on.
 """
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -13,18 +14,24 @@ import bpy
 sys.path.insert(0, str(Path(__file__).parent))
 from first_shot import first_shot
 from interruptions import interruptions
+from seats import seats
 
 from kit import humanoids
 from kit.window import Waits, play
 
-PICTURES = Path(sys.argv[sys.argv.index("--") + 1])
+PICTURES, *NAMED = sys.argv[sys.argv.index("--") + 1 :]
+PARTS: dict[str, Callable[[Path], Waits]] = {
+    "interruptions": interruptions,
+    "seats": lambda pictures: seats(pictures, humanoids, Path(__file__).parent / "rigs"),
+    "first_shot": lambda pictures: first_shot(pictures, humanoids),
+}
 
 
 def everything() -> Waits:
-    yield from interruptions(PICTURES)
-    bpy.ops.wm.read_homefile(app_template="")
-    yield 0.5
-    yield from first_shot(PICTURES, humanoids)
+    for name in NAMED or PARTS:
+        bpy.ops.wm.read_homefile(app_template="")
+        yield 0.5
+        yield from PARTS[name](Path(PICTURES))
 
 
 play(everything)
