@@ -138,7 +138,7 @@ def _around(
     """
     low, high = seat.position - _ROUND_SEAT, seat.position + _ROUND_SEAT
     names, found = [], []
-    surfaces = dict((yield from room.surfaces()))
+    surfaces = dict((yield from room.surfaces((low, high))))
     whole = surfaces.pop(name, np.zeros((0, 3)))
     surfaces[name] = whole[_beyond(whole, seat)]
     top, arms = seat.height - room.floor, whole - (0.0, 0.0, room.floor)

@@ -90,7 +90,7 @@ def has_room(
     if not len(spots):
         return free
     low, high = spots.min(axis=0) - radius, spots.max(axis=0) + radius
-    for name, points in (yield from room.footprints()).items():
+    for name, points in (yield from room.footprints((low, high))).items():
         if name == besides or not len(points):
             continue
         near = points[((points > low) & (points < high)).all(axis=1)]
@@ -149,7 +149,8 @@ def before_a_top(
     """
     low, high = (seat.height + over for over in _TOPS)
     best, nearest = None, _AT_TOP
-    for name, points in (yield from room.surfaces()).items():
+    around = seat.position - _AT_TOP, seat.position + _AT_TOP
+    for name, points in (yield from room.surfaces(around)).items():
         if name == piece.name:
             continue
         at = points[(points[:, 2] > low) & (points[:, 2] < high), :2]

@@ -24,6 +24,7 @@ KNEE_LOW = 0.07
 HEAD_HIGH = 1.85
 """Metres over the floor; what hangs higher is not met."""
 _FINE = 0.04  # metres between points on furniture, however small who walks round it
+_TABLE_AT_MOST = 8_000_000  # numbers that are looked up instead of sorted
 _MAX_CELLS = 1_000_000  # cells of a field; what is larger is looked at more coarsely
 
 
@@ -68,32 +69,42 @@ class Piece:
 @dataclass
 class Known:
     """What has been found out about a room, for whoever asks next: the room in other ``sizes``, its
-    ``pieces``, their ``surfaces`` and ``footprints``, and what was found on ``shapes`` of
-    furniture. A room that is ``factor`` times another one knows which (``of``).
+    ``pieces``, their ``boxes``, and, of those that were asked for, their ``surfaces`` and
+    ``footprints``, and what was found on ``shapes`` of furniture. A room that is ``factor`` times
+    another one knows which (``of``).
     """
 
     of: "Room | None" = None
     factor: float = 1.0
     sizes: "dict[float, Room]" = field(default_factory=dict)
     pieces: "dict[str, Piece] | None" = None
-    surfaces: dict[str, np.ndarray] | None = None
-    footprints: dict[str, np.ndarray] | None = None
+    boxes: dict[str, np.ndarray] = field(default_factory=dict)
+    surfaces: dict[str, np.ndarray] = field(default_factory=dict)
+    footprints: dict[str, np.ndarray] = field(default_factory=dict)
     shapes: dict[Hashable, Any] = field(default_factory=dict)
 
 
 def _thinned(parts: Sequence[np.ndarray]) -> np.ndarray:
     """Points (N, k) float32, of those closer together than a centimetre only one."""
+    parts = [part for part in parts if len(part)]
     if not parts:
         return np.zeros((0, 3), np.float32)
-    points = np.concatenate(parts)
-    if not len(points):
-        return points.astype(np.float32)
-    cells = np.rint((points - points.min(axis=0)) * 100.0).astype(np.int64)
-    key = cells[:, 0]
-    for column in cells.T[1:]:
-        key = key * (int(column.max()) + 1) + column
-    _, first = np.unique(key, return_index=True)
-    return points[first].astype(np.float32)
+    low = np.min([part.min(axis=0) for part in parts], axis=0)
+    high = np.max([part.max(axis=0) for part in parts], axis=0)
+    counts = np.rint((high - low) * 100.0).astype(np.int64) + 1
+    steps = np.append(np.cumprod(counts[:0:-1])[::-1], 1)
+    keys = [np.rint((part - low) * 100.0).astype(np.int64) @ steps for part in parts]
+    if counts.prod() > _TABLE_AT_MOST:
+        first = np.unique(np.concatenate(keys), return_index=True)[1]
+    else:  # much faster than sorting
+        table = np.full(int(counts.prod()), -1, np.int32)
+        stop = sum(map(len, keys))
+        for key in reversed(keys):
+            start = stop - len(key)
+            table[key[::-1]] = np.arange(stop - 1, start - 1, -1, dtype=np.int32)
+            stop = start
+        first = table[table >= 0]
+    return np.concatenate(parts)[first].astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -139,36 +150,59 @@ class Room:
             known=Known(of=self, factor=factor),
         )
 
-    def surfaces(self) -> Generator[float, None, dict[str, np.ndarray]]:
-        """Points (N, 3) all over each piece, by name; a job."""
-        if self.known.surfaces is None and self.known.of is not None:
-            found = yield from self.known.of.surfaces()
-            self.known.surfaces = {
-                name: (self.known.factor * points).astype(np.float32)
-                for name, points in found.items()
-            }
-        elif self.known.surfaces is None:
-            pieces, surfaces = self.pieces(), {}
-            for k, (name, piece) in enumerate(pieces.items()):
-                job = parts_of_surfaces.steps(piece.solids, _FINE)
-                found_parts = yield from within(job, k / len(pieces), (k + 1) / len(pieces))
-                surfaces[name] = _thinned(found_parts)
-            self.known.surfaces = surfaces
-        return self.known.surfaces
-
-    def footprints(self) -> Generator[float, None, dict[str, np.ndarray]]:
-        """Where (N, 2) each piece stands in the way of a body, from knee-low to head-high, by name;
-        canonical metres. A job.
+    def surfaces(
+        self, between: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> Generator[float, None, dict[str, np.ndarray]]:
+        """Points (N, 3) all over each piece, by name; a job. ``between``: two corners (2,) of the
+        floor; only of pieces that reach over what is between them, if they are given.
         """
-        if self.known.footprints is None:
-            footprints = {}
-            for name, points in (yield from self.surfaces()).items():
+        known = self.known.surfaces
+        names = self._between(between)
+        missing = [name for name in names if name not in known]
+        if missing and self.known.of is not None:
+            factor = self.known.factor
+            corners = None if between is None else (between[0] / factor, between[1] / factor)
+            found = yield from self.known.of.surfaces(corners)
+            for name in missing:
+                known[name] = (factor * found[name]).astype(np.float32)
+        elif missing:
+            pieces = self.pieces()
+            for k, name in enumerate(missing):
+                job = parts_of_surfaces.steps(pieces[name].solids, _FINE)
+                parts = yield from within(job, k / len(missing), (k + 1) / len(missing))
+                known[name] = _thinned(parts)
+        return {name: known[name] for name in names}
+
+    def _between(self, between: tuple[np.ndarray, np.ndarray] | None) -> list[str]:
+        """The names of the pieces that reach over the floor between two corners (2,); of all, where
+        none are given.
+        """
+        pieces, boxes = self.pieces(), self.known.boxes
+        if between is None:
+            return [*pieces]
+        for name in pieces.keys() - boxes.keys():
+            boxes[name] = pieces[name].box()
+        low, high = between[0] - _FINE, between[1] + _FINE
+        return [
+            name
+            for name in pieces
+            if (boxes[name][1, :2] >= low).all() and (boxes[name][0, :2] <= high).all()
+        ]
+
+    def footprints(
+        self, between: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> Generator[float, None, dict[str, np.ndarray]]:
+        """Where (N, 2) each piece stands in the way of a body, from knee-low to head-high, by name;
+        canonical metres. A job. ``between``: as for ``surfaces``.
+        """
+        known = self.known.footprints
+        for name, points in (yield from self.surfaces(between)).items():
+            if name not in known:
                 over = points[:, 2] - self.floor
                 stands = points[(over > KNEE_LOW) & (over < HEAD_HIGH), :2]
-                footprints[name] = _thinned([stands]).astype(float)
+                known[name] = _thinned([stands]).astype(float)
                 yield 1.0
-            self.known.footprints = footprints
-        return self.known.footprints
+        return {name: known[name] for name in self._between(between)}
 
     def pieces(self) -> dict[str, Piece]:
         """All furniture by its name."""
