@@ -23,7 +23,7 @@ from ..core.text import metres
 from .outlines import connected, rectangle_axes
 from .surfaces import Columns, columns, parts_of_surfaces
 
-__all__ = ["MarkedSeat", "NoSeat", "SeatPlace", "on_a_seat", "seat_of", "seats_of"]
+__all__ = ["MarkedSeat", "NoSeat", "SeatPlace", "mark_of", "on_a_seat", "seat_of", "seats_of"]
 
 _CELL = 0.03
 """Metres; of the cells in which furniture is looked at from above."""
@@ -203,15 +203,13 @@ class MarkedSeat:
         """The same ``factor`` times as large, about the world's origin."""
         return MarkedSeat(factor * self.back, factor * self.foot, factor * self.knee, self.angle)
 
-    @staticmethod
-    def of(place: SeatPlace, floor: float) -> "MarkedSeat":
-        """What is marked where a seat was found."""
-        ahead = np.array([*forward_of(place.yaw), 0.0])
-        at = np.array([*place.position, place.height])
-        knee = at + place.edge * ahead
-        return MarkedSeat(
-            back=at - _BEFORE_BACK * ahead, foot=np.array([*knee[:2], floor]), knee=knee
-        )
+
+def mark_of(place: SeatPlace, floor: float) -> MarkedSeat:
+    """What is marked where a seat was found."""
+    ahead = np.array([*forward_of(place.yaw), 0.0])
+    at = np.array([*place.position, place.height])
+    knee = at + place.edge * ahead
+    return MarkedSeat(back=at - _BEFORE_BACK * ahead, foot=np.array([*knee[:2], floor]), knee=knee)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from ...core.solids import Box, Mesh, Scene
 from ...director.approach import Tucked, walk_to_seat
 from ...director.places import before_a_top, marked_places
 from ...director.room import Piece, Room
-from ...director.seats import MarkedSeat, SeatPlace, on_a_seat, seats_of
+from ...director.seats import MarkedSeat, SeatPlace, mark_of, on_a_seat, seats_of
 from ...director.walks import AlreadyThere, unit_doubt, walk_to
 from ..character.armature import character_scale, metres_per_unit
 from ..character.settings import Settings, settings_of
@@ -306,7 +306,7 @@ def _walk(
     warnings = (*passage_warnings(found.met, start.first), *warnings)
     seat_found = None
     if found.seat is not None:
-        seat_found = MarkedSeat.of(found.seat, start.floor).resized(start.size)
+        seat_found = mark_of(found.seat, start.floor).resized(start.size)
     return Walk(start.first, last, extended, warnings), seat_found
 
 
