@@ -47,6 +47,7 @@ __all__ = [
     "smoothed_out",
     "reach_targets",
     "standing_still",
+    "too_high",
     "with_legroom",
 ]
 
@@ -242,15 +243,18 @@ def _lowered(hips: np.ndarray, ankles: np.ndarray, held: np.ndarray) -> np.ndarr
     """How far down (T,) the pelvis has to go for standing legs (T, 2) to reach their ankles (T, 2,
     3), smooth in time.
     """
+    return _covering(too_high(hips, ankles, held))
+
+
+def too_high(hips: np.ndarray, ankles: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """How much (T,) the pelvis is too high for legs (T, 2) that are ``held`` to reach from hips to
+    ankles (T, 2, 3).
+    """
     reach = _STRAIGHT * (_THIGH + _SHIN)
     across = np.linalg.norm((hips - ankles)[..., :2], axis=-1)
     highest = np.sqrt(np.maximum(reach**2 - across**2, 0.0))
-    need = (
-        np.where(held & (across < reach), hips[..., 2] - ankles[..., 2] - highest, 0.0)
-        .max(1)
-        .clip(0.0, 0.15)
-    )
-    return _covering(need)
+    above = np.where(held & (across < reach), hips[..., 2] - ankles[..., 2] - highest, 0.0)
+    return np.asarray(above.max(1).clip(0.0, 0.15))
 
 
 def _covering(need: np.ndarray) -> np.ndarray:

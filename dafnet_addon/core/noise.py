@@ -1,5 +1,6 @@
 """The noise that takes are made of: what lasts all along a take, and what comes and goes in it."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,10 +45,8 @@ class TakeNoise:
         Each part of the body has a seed (0 or more) and, if wished, a temperature of its own, so
         that legs vary under one trunk. At temperature 1 takes differ as captured ones do.
         """
-        lower_seed = seed if lower_seed is None else lower_seed
         held_draws, white = [], []
-        for part, (own_seed, size) in enumerate(((seed, UPPER_SIZE), (lower_seed, LOWER_SIZE))):
-            rng = np.random.default_rng([own_seed, part])
+        for rng, size in _sources(seed, lower_seed):
             held_draws.append(rng.standard_normal(size))
             white.append(rng.standard_normal((frames + TAPS - 1, size)))
 
@@ -63,7 +62,34 @@ class TakeNoise:
 
         return heat * (lasting + passing)
 
+    def stream(
+        self, seed: int, lower_seed: int | None = None, held: bool = False
+    ) -> Iterator[np.ndarray]:
+        """The noise of a take's frames (66,) at temperature 1, one after another without end: as
+        ``draw`` gives it for as many frames as one likes, but for rounding.
+        """
+        sources = _sources(seed, lower_seed)
+        lasting = self.lasting @ np.concatenate([rng.standard_normal(n) for rng, n in sources])
+        while held:
+            yield lasting
+
+        white = [rng.standard_normal((TAPS - 1, size)) for rng, size in sources]
+        steps = np.concatenate(white, axis=1) @ self.passing.T
+        while True:
+            row = np.concatenate([rng.standard_normal(size) for rng, size in sources])
+            steps = np.concatenate([steps, [self.passing @ row]])
+            yield lasting + np.einsum("kd,dk->d", steps, self.taps)
+            steps = steps[1:]
+
     @staticmethod
     def standard_normal() -> "TakeNoise":
         """The paper's: one vector from N(0, I), held."""
         return TakeNoise(np.eye(POSE_SIZE), np.zeros((POSE_SIZE,) * 2), np.zeros((POSE_SIZE, TAPS)))
+
+
+def _sources(seed: int, lower_seed: int | None) -> list[tuple[np.random.Generator, int]]:
+    """What the noise of the upper and of the lower part is drawn from, and how many numbers each
+    takes a frame.
+    """
+    seeds = ((seed, UPPER_SIZE), (seed if lower_seed is None else lower_seed, LOWER_SIZE))
+    return [(np.random.default_rng([own, part]), size) for part, (own, size) in enumerate(seeds)]

@@ -27,7 +27,16 @@ from .skeleton import (
 )
 from .softness import LIES_LOWER, Support
 
-__all__ = ["Distance", "across_of", "on_legs", "rested", "resting", "sitting", "until_free"]
+__all__ = [
+    "Distance",
+    "across_of",
+    "lifted",
+    "on_legs",
+    "rested",
+    "resting",
+    "sitting",
+    "until_free",
+]
 
 Distance = Callable[[np.ndarray], np.ndarray]
 """Signed distances (T, N) of world points (T, N, 3) to the furniture, negative inside; metres."""
@@ -89,7 +98,7 @@ def rested(
 
     lift = strength * _lift(joints, carried, rests)
     if lift.any():
-        joints = _lifted(joints, lift, support.top)
+        joints = lifted(joints, lift, support.top)
     if distance is not None:
         rest = strength * _during(rests, len(joints))
         sits = rest * (1.0 - lying)
@@ -165,7 +174,7 @@ def _way(height: np.ndarray, lift: float) -> int:
     return max(int(upright[0]), round(_COMES * MODEL_FPS), round(abs(lift) * _PACE * MODEL_FPS))
 
 
-def _lifted(joints: np.ndarray, lift: np.ndarray, top: np.ndarray) -> np.ndarray:
+def lifted(joints: np.ndarray, lift: np.ndarray, top: np.ndarray) -> np.ndarray:
     """Joints with all but the legs lifted (T,); feet stay, or go with the body where they lie on
     the same ``top`` (T,), and knees bend forward.
     """

@@ -212,6 +212,26 @@ class Sampler:
         self._shot = yield from self._in_advance(conditions)
         self._memory = self._mean_past(takes)
 
+    def forget(self, takes: int = 1) -> None:
+        """Forget all memory, for ``step`` to begin with: the past of the takes is the mean pose."""
+        self._memory = self._mean_past(takes)
+
+    def step(self, conditions: Conditions, z: np.ndarray) -> np.ndarray:
+        """Poses (B, 66), SMPL order, metres, of the next frame of B takes, for who learns what is
+        asked only as time goes; the memory goes on.
+
+        ``conditions``: of this frame, their last one, and of those before it, whose velocities the
+        action predictor is told. ``z`` (B, 66): the noise, upper part first. After ``forget``, step
+        by step, the poses are those of ``run``, but for rounding. Raises WeightsError where they
+        are not a body's, InputError as ``run`` does.
+        """
+        before = self.network.sizes.history + 1
+        seen = conditions.between(max(0, len(conditions) - before), len(conditions))
+        with one_thread(), np.errstate(over="ignore", invalid="ignore"):
+            self._shot = run_to_end(self._in_advance(seen, len(seen) - 1))
+            pose = self.decode(0, self.backend.array(z)).pose
+        return self._checked(self.backend.numpy(pose).astype(np.float64))
+
     def _mean_past(self, takes: int) -> _Memory:
         sizes, array = self.network.sizes, self.backend.array
         empty = array(np.zeros((takes, sizes.width)))
@@ -221,15 +241,20 @@ class Sampler:
             states=[[state] * len(part.steps) for part in self.network.parts],
         )
 
-    def _in_advance(self, conditions: Conditions) -> Generator[float, None, _InAdvance]:
-        """What is known of one shot."""
+    def _in_advance(
+        self, conditions: Conditions, since: int = 0
+    ) -> Generator[float, None, _InAdvance]:
+        """What is known of one shot's frames from ``since`` on."""
         xp, array = self.backend.xp, self.backend.array
         sizes, known = self.network.sizes, self.network.normalisation
 
         velocity = (conditions.velocity - known.velocity_mean) / known.velocity_std
+        up_to = velocities_up_to(velocity, sizes.history)[since:]
+        if since:
+            conditions, velocity = conditions.between(since, len(conditions)), velocity[since:]
         occupancy = array(conditions.occupancy)
         root, scene = self.inputs.in_advance(
-            velocities_up_to(velocity, sizes.history),
+            up_to,
             np.concatenate([velocity, self._way_ahead(conditions)], axis=1),
             occupancy,
         )
