@@ -246,11 +246,13 @@ def _lowered(hips: np.ndarray, ankles: np.ndarray, held: np.ndarray) -> np.ndarr
     return _covering(too_high(hips, ankles, held))
 
 
-def too_high(hips: np.ndarray, ankles: np.ndarray, held: np.ndarray) -> np.ndarray:
+def too_high(
+    hips: np.ndarray, ankles: np.ndarray, held: np.ndarray, straight: float = _STRAIGHT
+) -> np.ndarray:
     """How much (T,) the pelvis is too high for legs (T, 2) that are ``held`` to reach from hips to
-    ankles (T, 2, 3).
+    ankles (T, 2, 3), stretched to no more than this share of their length.
     """
-    reach = _STRAIGHT * (_THIGH + _SHIN)
+    reach = straight * (_THIGH + _SHIN)
     across = np.linalg.norm((hips - ankles)[..., :2], axis=-1)
     highest = np.sqrt(np.maximum(reach**2 - across**2, 0.0))
     above = np.where(held & (across < reach), hips[..., 2] - ankles[..., 2] - highest, 0.0)

@@ -82,13 +82,16 @@ class PointFollower:
 
 
 class RootFollower:
-    """Follows a root that is dragged. ``position`` (3,) and ``yaw``: of the last frame."""
+    """Follows a root that is dragged. ``position`` (3,) and ``yaw``: of the last frame;
+    ``seat``: the one that one sits on, or is about to, or gets up from.
+    """
 
-    def __init__(self, position: np.ndarray, yaw: float, seat: Seat | None = None) -> None:
+    def __init__(self, position: np.ndarray, yaw: float) -> None:
         self.position = np.array(position, float)
         self.yaw = float(yaw)
-        self.seat = seat
+        self.seat: Seat | None = None
         self._velocity, self._turn = np.zeros(2), 0.0
+        self._leaves = False
 
     @property
     def speed(self) -> float:
@@ -155,7 +158,7 @@ class RootFollower:
         self, goal: np.ndarray, yaw: float, seats: Sequence[Seat]
     ) -> tuple[np.ndarray, float]:
         """Where to go next, (2,), and how to be turned there."""
-        meant = self._meant(goal, seats)
+        meant = self.meant(goal, seats)
         self._leaves = False
         if self.seat is not None:
             ahead = forward_of(self.seat.yaw)
@@ -192,8 +195,8 @@ class RootFollower:
         to_go = goal - self.position[:2]
         return float(yaw_of(to_go)) if np.linalg.norm(to_go) > _FAR else yaw
 
-    def _meant(self, goal: np.ndarray, seats: Sequence[Seat]) -> Seat | None:
-        """The seat that the root is dragged onto, where it is."""
+    def meant(self, goal: np.ndarray, seats: Sequence[Seat]) -> Seat | None:
+        """The one of the ``seats`` that a root at ``goal`` (2,) is on, where it is on one."""
         found = None
         for seat in seats:
             ahead = forward_of(seat.yaw)

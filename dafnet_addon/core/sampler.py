@@ -216,9 +216,9 @@ class Sampler:
         """Forget all memory, for ``step`` to begin with: the past of the takes is the mean pose."""
         self._memory = self._mean_past(takes)
 
-    def step(self, conditions: Conditions, z: np.ndarray) -> np.ndarray:
-        """Poses (B, 66), SMPL order, metres, of the next frame of B takes, for who learns what is
-        asked only as time goes; the memory goes on.
+    def step(self, conditions: Conditions, z: np.ndarray) -> Samples:
+        """The next frame of B takes alone, for who learns what is asked only as time goes; the
+        memory goes on.
 
         ``conditions``: of this frame, their last one, and of those before it, whose velocities the
         action predictor is told. ``z`` (B, 66): the noise, upper part first. After ``forget``, step
@@ -229,8 +229,14 @@ class Sampler:
         seen = conditions.between(max(0, len(conditions) - before), len(conditions))
         with one_thread(), np.errstate(over="ignore", invalid="ignore"):
             self._shot = run_to_end(self._in_advance(seen, len(seen) - 1))
-            pose = self.decode(0, self.backend.array(z)).pose
-        return self._checked(self.backend.numpy(pose).astype(np.float64))
+            frame = self.decode(0, self.backend.array(z))
+            density = _log_density(frame)
+        return Samples(
+            poses=self._checked(self._stacked([frame.pose])),
+            actions=self._stacked([frame.inputs[:, : self.actions]]),
+            log_likelihood=self._stacked([density]),
+            unchanged=np.zeros((0, len(z), POSE_SIZE)),
+        )
 
     def _mean_past(self, takes: int) -> _Memory:
         sizes, array = self.network.sizes, self.backend.array
