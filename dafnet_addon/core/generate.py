@@ -22,6 +22,7 @@ from .kinematics import (
     local_from_global,
     turned,
 )
+from .live import LiveFrame
 from .metrics import motion_metrics
 from .occupancy import distance
 from .progress import stepwise, within
@@ -47,6 +48,7 @@ __all__ = [
     "crowd_steps",
     "generate",
     "generate_steps",
+    "played_take_steps",
     "takes_steps",
 ]
 
@@ -559,6 +561,45 @@ def clean_again_steps(
             1.0,
         )
     )
+
+
+def played_take_steps(
+    scene: Scene,
+    controls: Controls,
+    before: Sequence[LiveFrame],
+    played: Sequence[LiveFrame],
+    clean_up: CleanUp,
+) -> Generator[float, None, Take]:
+    """The take of what was played live (``live.LiveBody``), 30 frames a second, with the clean-up
+    that needs a look ahead; nothing is sampled.
+
+    ``controls``: what it was led by, of one mode (``live.controls_of``); ``before``: the frames
+    before the first that was ``played``, at least ``PREROLL`` of them. Raises InputError for what
+    cannot be used.
+    """
+    shot = yield from within(shot_steps(scene, controls), 0.0, 0.5)
+    count = len(shot.path)
+    if len(before) < PREROLL or len(played) < count or shot.request.changes:
+        raise InputError("What was played has other frames than its controls; record it again.")
+
+    kept, scale = played[:count], controls.scale
+    own = RootPath(
+        np.array([each.position for each in kept]) / scale, np.array([each.yaw for each in kept])
+    )
+    world = to_world(own, np.array([each.pose for each in kept]).reshape(count, 22, 3))
+    poses = np.concatenate(
+        [
+            np.array([each.pose for each in before[-PREROLL:]]),
+            to_root(shot.path, world).reshape(count, 66),
+        ]
+    )
+    source, target = frame_times(count, MODEL_FPS), frame_times(len(controls), controls.fps)
+    action = resample_positions(np.array([each.action for each in kept]), source, target)
+    density = float(np.mean([each.log_likelihood for each in kept]))
+    job = _finished_steps(
+        poses, np.zeros((0, 66)), action, shot, controls, clean_up, density
+    )
+    return (yield from within(job, 0.5, 1.0))
 
 
 @stepwise

@@ -21,6 +21,7 @@ from .kinematics import fit, forward_kinematics, local_from_global
 from .live_cleanup import LiveCleanUp
 from .nearby import REACH_OF_A_BODY, bounds
 from .occupancy import occupancy, tops_under
+from .resampling import frame_times, resample_positions
 from .root import AHEAD, RootPath, to_root, to_world, velocities
 from .rotations import quaternion_from_matrix
 from .sampler import Conditions, Sampler
@@ -34,10 +35,12 @@ from .skeleton import (
     SHOULDERS,
     TARGETS,
 )
+from .series import MODEL_FPS
 from .softness import Support, support_under
 from .solids import Scene
+from .take import Controls
 
-__all__ = ["Lead", "LiveBody", "LiveFrame", "Surroundings"]
+__all__ = ["Lead", "LiveBody", "LiveFrame", "Surroundings", "controls_of"]
 
 _SLOTS = {name: MODEL_ORDER.index(j) for name, j in TARGETS.items()}
 _FROM = {
@@ -62,6 +65,7 @@ _MEMORY = PREROLL
 """Frames that are remembered, so that a take can begin with what was before it."""
 _SITS = 0.80
 """Metres over the floor of a pelvis that may be carried by something."""
+_HAIR = 1e-6  # of a frame
 _LIVELY = 0.5
 """Temperature of a body for which it is 0: at rest it would not move at all."""
 
@@ -95,6 +99,32 @@ class LiveFrame:
     log_likelihood: float
     targets: dict[str, np.ndarray]
     shares: dict[str, float]
+
+
+def controls_of(played: Sequence[LiveFrame], fps: float, scale: float) -> Controls:
+    """What led a body of this ``scale`` in frames that were played, ``fps`` of them a second: FREE,
+    or EE where any target counted. Raises InputError for fewer than two frames.
+    """
+    if len(played) < 2:
+        raise InputError("Nothing was played in the recording; record for longer.")
+
+    count = int((len(played) - 1) * fps / MODEL_FPS + _HAIR) + 1
+    source, target = frame_times(len(played), MODEL_FPS), frame_times(count, fps)
+    path = RootPath(
+        resample_positions(np.array([each.position for each in played]), source, target),
+        resample_positions(np.array([each.yaw for each in played]), source, target),
+    )
+    given: dict[str, np.ndarray] = {}
+    for name in TARGETS:
+        shares = np.array([each.shares.get(name, 0.0) for each in played])
+        if shares.any():
+            free = np.full(3, np.nan)
+            places = np.array([each.targets.get(name, free) for each in played])
+            given[name] = resample_positions(places, source, target)
+            given[f"{name}_influence"] = resample_positions(shares[:, None], source, target)[:, 0]
+    return Controls(
+        fps=fps, root=path.matrices(), mode="EE" if given else "FREE", scale=scale, **given
+    )
 
 
 class Surroundings:

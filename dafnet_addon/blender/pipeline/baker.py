@@ -1,6 +1,7 @@
 """Bakes a take onto the character: keyframes in a new action."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -23,10 +24,13 @@ from .curves import copy_curve
 
 __all__ = [
     "TRANSFORMS",
+    "Channels",
     "bake",
+    "channels_of",
     "has_drivers",
     "key_curves",
     "has_bone_overrides",
+    "ready_to_pose",
     "require_bakeable",
 ]
 
@@ -130,38 +134,25 @@ def bake(
         raise InputError("The take holds values that are not numbers; generate it again.")
 
     frames = frame_start + np.arange(len(take), dtype=float)
-    to_root = transpose(take.root[:, :3, :3])
-    heading = np.unwrap(yaw_of(take.root[:, :2, 1])) + np.pi
-    pelvis = rotate(FACING @ to_root, take.joints[:, PELVIS] - take.root[:, :3, 3]) / (
-        unit * armature.scale[0]
-    )
-    local = matrix_from_quaternion(take.rotations)
-    local[:, 0] = to_root @ local[:, 0]
-
+    posed = channels_of(armature, take.joints, take.rotations, take.root, unit)
     previous = armature.animation_data.action if armature.animation_data else None
     carried = [curve for curve in action_curves(armature) if not _is_motion(curve.data_path)]
     action, add_curve = new_action(armature, name)
     action.use_fake_user = True
 
-    places = take.root[:, :3, 3] / unit
-    angles = np.stack([0 * heading, 0 * heading, heading], axis=1)
-    key_curves(add_curve, "location", "Root", frames=frames, values=places)
-    key_curves(add_curve, "rotation_euler", "Root", frames=frames, values=angles)
+    key_curves(add_curve, "location", "Root", frames=frames, values=posed.places)
+    key_curves(add_curve, "rotation_euler", "Root", frames=frames, values=posed.angles)
     for j, joint_name in enumerate(JOINTS):
-        rest = np.array(armature.data.bones[joint_name].matrix_local)
-        axes = FACING @ rest[:3, :3]
-        quaternions = continuous_signs(quaternion_from_matrix(axes.T @ local[:, j] @ axes))
         path = f'pose.bones["{joint_name}"].'
-        if j == 0:
-            moved = (pelvis - rest[:3, 3]) @ rest[:3, :3]
-            key_curves(add_curve, path + "location", joint_name, frames=frames, values=moved)
+        if j == PELVIS:
+            key_curves(add_curve, path + "location", joint_name, frames=frames, values=posed.pelvis)
 
         key_curves(
             add_curve,
             path + "rotation_quaternion",
             joint_name,
             frames=frames,
-            values=quaternions,
+            values=continuous_signs(posed.turns[:, j]),
         )
 
     for curve in carried:
@@ -170,14 +161,58 @@ def bake(
     if previous:
         previous.use_fake_user = True
 
+    ready_to_pose(armature)
+    assign_action(armature, action)
+    return action
+
+
+def ready_to_pose(armature: bpy.types.Object) -> None:
+    """Set the modes of rotation that ``channels_of`` are for, and clear the joints' bones."""
     armature.rotation_mode = "XYZ"
     for joint_name in JOINTS:
         bone = armature.pose.bones[joint_name]
         bone.matrix_basis.identity()
         bone.rotation_mode = "QUATERNION"
 
-    assign_action(armature, action)
-    return action
+
+class Channels(NamedTuple):
+    """What T frames of a body are on an armature, in Blender's units: the object's ``places`` and
+    Euler ``angles`` (T, 3), the ``pelvis`` bone's location (T, 3), and the ``turns`` (T, 22, 4) of
+    the joints' bones, quaternions.
+    """
+
+    places: np.ndarray
+    angles: np.ndarray
+    pelvis: np.ndarray
+    turns: np.ndarray
+
+
+def channels_of(
+    armature: bpy.types.Object,
+    joints: np.ndarray,
+    rotations: np.ndarray,
+    root: np.ndarray,
+    unit: float,
+) -> Channels:
+    """Those of ``joints`` (T, 22, 3), ``rotations`` (T, 22, 4) and ``root`` (T, 4, 4), as in a
+    take: the object follows the root, each bone turns, and the pelvis moves.
+    """
+    to_root = transpose(root[:, :3, :3])
+    heading = np.unwrap(yaw_of(root[:, :2, 1])) + np.pi
+    pelvis = rotate(FACING @ to_root, joints[:, PELVIS] - root[:, :3, 3]) / (
+        unit * armature.scale[0]
+    )
+    local = matrix_from_quaternion(rotations)
+    local[:, 0] = to_root @ local[:, 0]
+    rest = np.array([armature.data.bones[name].matrix_local for name in JOINTS])
+    axes = FACING @ rest[:, :3, :3]
+    own = rest[PELVIS]
+    return Channels(
+        places=root[:, :3, 3] / unit,
+        angles=np.stack([0 * heading, 0 * heading, heading], axis=1),
+        pelvis=(pelvis - own[:3, 3]) @ own[:3, :3],
+        turns=quaternion_from_matrix(transpose(axes) @ local @ axes),
+    )
 
 
 def key_curves(

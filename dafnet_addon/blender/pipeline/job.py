@@ -34,7 +34,9 @@ if TYPE_CHECKING:
 __all__ = [
     "Result",
     "Settings",
+    "bake_steps",
     "clean_up_again",
+    "clean_up_of",
     "distinct_seeds",
     "draws_of",
     "run",
@@ -107,7 +109,7 @@ def distinct_seeds(people: Sequence[Settings]) -> list[Settings]:
     return found
 
 
-def _clean_up(settings: Settings) -> CleanUp:
+def clean_up_of(settings: Settings) -> CleanUp:
     return CleanUp(**{strength: getattr(settings, name) for name, strength in CLEAN_UP.items()})
 
 
@@ -153,7 +155,7 @@ def run(
             resume=resume,
             resume_frame=resume_frame,
             device=device,
-            clean_up=_clean_up(settings),
+            clean_up=clean_up_of(settings),
             watch=watch,
         ),
         _READ,
@@ -164,7 +166,7 @@ def run(
     if gone := used - names_in_use(settings):
         raise InputError(f"'{min(gone)}' is no longer in the scene; generate again.")
 
-    actions = yield from within(_bake_steps(settings, takes, read.controls, draws), _GENERATED, 1.0)
+    actions = yield from within(bake_steps(settings, takes, read.controls, draws), _GENERATED, 1.0)
     seconds |= takes[0].seconds | {"fitting": sum(take.seconds["fitting"] for take in takes)}
     seconds["baking"] = perf_counter() - started
     yield 1.0
@@ -232,7 +234,7 @@ def _kept_take(settings: Settings) -> tuple[Take | None, int]:
     return take, index
 
 
-def _bake_steps(
+def bake_steps(
     settings: Settings, takes: list[Take], controls: Controls, draws: list[Draw]
 ) -> Generator[float, None, list[bpy.types.Action]]:
     """An action for each take, listed on the armature; the first one plays. All are made or none:
@@ -292,9 +294,9 @@ def clean_up_again(
         armature, context.scene, frame_start=start, frame_end=start + len(take) - 1, mode="FREE"
     )
     read = read_scene(context, settings)
-    again = run_to_end(clean_again_steps(read.scene, controls, take, _clean_up(settings)))
+    again = run_to_end(clean_again_steps(read.scene, controls, take, clean_up_of(settings)))
     draw = draw_of(action)
-    actions = run_to_end(_bake_steps(settings, [again], controls, [draw]))
+    actions = run_to_end(bake_steps(settings, [again], controls, [draw]))
     return Result(
         actions=tuple(actions),
         takes=(again,),
