@@ -44,8 +44,10 @@ def unregister() -> None:
     from . import operators, panels
     from .dafnet_addon.blender import preferences, translations
     from .dafnet_addon.blender.character import choosing, properties
+    from .dafnet_addon.blender.live import listening
     from .dafnet_addon.blender.overlay import display
 
+    listening.end_live()
     while _commands:
         bpy.utils.unregister_cli_command(_commands.pop())
 

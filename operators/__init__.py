@@ -16,6 +16,7 @@ from .follow_path import (
 )
 from .generate import DAFNET_OT_cancel, DAFNET_OT_generate
 from .lie_on import DAFNET_OT_lie_on
+from .live import DAFNET_OT_live, DAFNET_OT_live_draw, DAFNET_OT_live_record
 from .map_rig import DAFNET_OT_detect_rig, DAFNET_OT_load_rig_map, DAFNET_OT_save_rig_map
 from .mark_frames import DAFNET_OT_mark_frames
 from .presets import DAFNET_OT_add_preset
@@ -41,6 +42,9 @@ CLASSES = (
     DAFNET_OT_add_character,
     DAFNET_OT_generate,
     DAFNET_OT_cancel,
+    DAFNET_OT_live,
+    DAFNET_OT_live_record,
+    DAFNET_OT_live_draw,
     DAFNET_OT_walk_to,
     DAFNET_OT_redo_walk,
     DAFNET_OT_lie_on,

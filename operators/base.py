@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 
 from ..dafnet_addon.blender.character.armature import character_of, choose
+from ..dafnet_addon.blender.live.listening import live_state
 from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.blender.rig.properties import rig_of
 from ..dafnet_addon.core.errors import DafnetError
@@ -52,7 +53,10 @@ def remember_character(context: bpy.types.Context) -> None:
 
 
 def idle(operator: Any) -> bool:
-    """Whether no job is running; else the operator's button says why it has to wait."""
+    """Whether no job is running, nor Live; else the operator's button says why it has to wait."""
+    if live_state() is not None:
+        operator.poll_message_set("End Live first, with Esc")
+        return False
     if running_job() is None:
         return True
     operator.poll_message_set("Wait for the job that is running, or cancel it with Esc")

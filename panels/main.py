@@ -15,12 +15,15 @@ from ..dafnet_addon.blender.character.targets import (
     missing_targets,
 )
 from ..dafnet_addon.blender.compat import action_curves
+from ..dafnet_addon.blender.live.listening import live_state
 from ..dafnet_addon.blender.pipeline.running import running_job
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.add_root import DAFNET_OT_add_root
 from ..operators.add_targets import DAFNET_OT_add_foot_targets, DAFNET_OT_add_targets
 from ..operators.find_furniture import DAFNET_OT_find_furniture
 from ..operators.generate import DAFNET_OT_cancel, DAFNET_OT_generate
+from ..operators.live import DAFNET_OT_live
+from .live import draw_live
 from .presets import DAFNET_PT_presets
 
 __all__ = ["CharacterPanel", "DAFNET_PT_character", "DAFNET_PT_shot"]
@@ -36,8 +39,8 @@ class CharacterPanel:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There is a character, and no job is running."""
-        return running_job() is None and character_of(context) is not None
+        """There is a character, and nothing is running."""
+        return running_job() is None and live_state() is None and character_of(context) is not None
 
 
 class DAFNET_PT_character(bpy.types.Panel):
@@ -63,6 +66,10 @@ class DAFNET_PT_character(bpy.types.Panel):
                 text=f"{100 * running.progress:.0f} %, {running.seconds_left:.0f} s left",
             )
             layout.operator(DAFNET_OT_cancel.bl_idname, icon="CANCEL")
+            return
+
+        if (live := live_state()) is not None:
+            draw_live(layout, live)
             return
 
         character = character_of(context)
@@ -142,6 +149,7 @@ class DAFNET_PT_shot(CharacterPanel, bpy.types.Panel):
         row = layout.row()
         row.scale_y = 1.5
         row.operator(DAFNET_OT_generate.bl_idname, icon="PLAY").task = "NEW"
+        layout.operator(DAFNET_OT_live.bl_idname, icon="HAND")
 
 
 def _draw_targets(

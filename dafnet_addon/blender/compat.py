@@ -5,6 +5,7 @@ media types of their own from 5.0 on.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import bpy
 
@@ -14,6 +15,7 @@ __all__ = [
     "playback_restorer",
     "action_curves",
     "animated_paths",
+    "remove_curves",
     "shares_curves",
     "node_tree_of",
     "output_image",
@@ -108,6 +110,21 @@ def action_curves(owner: bpy.types.Object) -> list[bpy.types.FCurve]:
         strip.channelbag(data.action_slot) for layer in data.action.layers for strip in layer.strips
     )
     return [curve for bag in bags if bag for curve in bag.fcurves]
+
+
+def remove_curves(owner: bpy.types.Object, path: str) -> None:
+    """Remove the curves of this data path from the action that ``owner`` plays."""
+    data = owner.animation_data
+    if data is None or data.action is None:
+        return
+    if not _SLOTS:
+        bags: list[Any] = [data.action]
+    else:
+        strips = (strip for layer in data.action.layers for strip in layer.strips)
+        bags = [strip.channelbag(data.action_slot) for strip in strips] if data.action_slot else []
+    for bag in filter(None, bags):
+        for curve in [each for each in bag.fcurves if each.data_path == path]:
+            bag.fcurves.remove(curve)
 
 
 def animated_paths(owner: bpy.types.ID) -> set[str]:

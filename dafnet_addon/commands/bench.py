@@ -14,6 +14,7 @@ __all__ = ["COMMAND", "benchmark"]
 
 _MEASURES = {
     "life": "whether people sway as they walk, sit down as slowly as asked, and move as they rest",
+    "live": "step Live through five minutes of random dragging",
     "rest": "clean up bodies that hover over seats or sink into them",
     "sample": "on the held-out motion that comes with the project, beside that motion",
     "seats": "sit on ten heights from three sides",
@@ -56,6 +57,7 @@ _NEEDS = {
     "ablation": ("torch",),
     "life-ablation": ("torch",),
     "farm": ("bpy",),
+    "live": ("bpy",),
     "rerun": ("torch",),
     "scale": ("bpy",),
     "speed": ("torch",),

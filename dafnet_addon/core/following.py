@@ -7,6 +7,7 @@ with. A seat is come to from in front, turned round, and left straight ahead. Me
 canonical body, 30 frames a second.
 """
 
+from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -16,7 +17,7 @@ from .paths import AFTER_SEAT, BEFORE_SEAT, GETS_UP, SITS_DOWN
 from .root import forward_of, yaw_of
 from .series import MODEL_FPS, smoothstep
 
-__all__ = ["LAG", "CRUISE", "PointFollower", "RootFollower", "Seat"]
+__all__ = ["LAG", "CRUISE", "PointFollower", "RootFollower", "Seat", "Way"]
 
 LAG = 1 / 3
 """Seconds by which one is behind a root that is dragged at a walker's speed."""
@@ -41,6 +42,8 @@ _FACES = np.radians(35.0)  # from the way that one sits
 _TURNS_AWAY = 0.20  # metres before a seat, where the heading lets go
 _SEATED_WAY = 0.25  # metres before a seat, in which one sits down or gets up
 _ROOT_TIME = 1.87  # of the root for that way, over the pelvis' for 80 % of its own
+_CARROT = 0.7  # metres by which what is led along a way is ahead of the body
+_SPACED = 0.05  # metres between two points of a way
 _AROUND = 0.75  # metres beside a seat, where who comes from behind it passes
 
 
@@ -208,3 +211,47 @@ class RootFollower:
             if off < (_LETS_GO if mine else _CATCHES) and (found is None or off < found[0]):
                 found = off, Seat(place, seat.yaw)
         return None if found is None else found[1]
+
+
+class Way:
+    """A way over the floor that is drawn while it is walked: what leads along it stays ahead of the
+    body, as far as it is drawn.
+    """
+
+    def __init__(self) -> None:
+        self._points: deque[np.ndarray] = deque()
+
+    def __bool__(self) -> bool:
+        return bool(self._points)
+
+    def add(self, point: np.ndarray) -> None:
+        """Go to this ``point`` (2,), metres, after all others."""
+        if not self._points or np.linalg.norm(point - self._points[-1]) > _SPACED:
+            self._points.append(np.asarray(point, float))
+
+    def left(self) -> np.ndarray:
+        """The points (N, 2) that are still to be gone to."""
+        return np.array(self._points).reshape(-1, 2)
+
+    def clear(self) -> None:
+        """Go nowhere any more."""
+        self._points.clear()
+
+    def lead(
+        self, place: np.ndarray, body: np.ndarray, frames: int, scale: float = 1.0
+    ) -> tuple[np.ndarray, float | None]:
+        """Where (2,) what leads is ``frames`` later than at ``place`` (2,), and its yaw, None where
+        it stays: no faster than one walks, and not too far ahead of the ``body`` (2,), which is
+        ``scale`` times the canonical size.
+        """
+        far, yaw = CRUISE * scale * frames / MODEL_FPS, None
+        while self._points and far > 0.0 and np.linalg.norm(place - body) < _CARROT * scale:
+            step = self._points[0] - place
+            length = float(np.linalg.norm(step))
+            if length > 1e-6:
+                yaw = float(yaw_of(step))
+                place = place + step * min(1.0, far / length)
+            if length <= far:
+                self._points.popleft()
+            far -= length
+        return place, yaw

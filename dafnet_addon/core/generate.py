@@ -596,9 +596,7 @@ def played_take_steps(
     source, target = frame_times(count, MODEL_FPS), frame_times(len(controls), controls.fps)
     action = resample_positions(np.array([each.action for each in kept]), source, target)
     density = float(np.mean([each.log_likelihood for each in kept]))
-    job = _finished_steps(
-        poses, np.zeros((0, 66)), action, shot, controls, clean_up, density
-    )
+    job = _finished_steps(poses, np.zeros((0, 66)), action, shot, controls, clean_up, density)
     return (yield from within(job, 0.5, 1.0))
 
 

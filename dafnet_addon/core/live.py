@@ -26,6 +26,7 @@ from .root import AHEAD, RootPath, to_root, to_world, velocities
 from .rotations import quaternion_from_matrix
 from .sampler import Conditions, Sampler
 from .sensor import HEIGHT, SPHERES
+from .series import MODEL_FPS
 from .skeleton import (
     END_EFFECTORS,
     FEET_ASKED,
@@ -35,7 +36,6 @@ from .skeleton import (
     SHOULDERS,
     TARGETS,
 )
-from .series import MODEL_FPS
 from .softness import Support, support_under
 from .solids import Scene
 from .take import Controls
@@ -281,9 +281,7 @@ class LiveBody:
         self._observation.append(observation.reshape(-1))
         self._given.append(given)
 
-    def _wanted(
-        self, name: str, lead: Lead, here: RootPath, share: float
-    ) -> np.ndarray | None:
+    def _wanted(self, name: str, lead: Lead, here: RootPath, share: float) -> np.ndarray | None:
         """Where a target is (3,), canonical metres, where it counts: within reach, and, for feet,
         for weights that have learnt of them.
         """

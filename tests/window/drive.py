@@ -1,5 +1,5 @@
-"""What scripts/window.sh plays: what may come between while a take is made, then seats and rigs,
-then a first shot with the mouse; or only what is named.
+"""What scripts/window.sh plays: what may come between while a take is made, Live, then seats and
+rigs, then a first shot with the mouse; or only what is named.
 
 In this order, since Blender 4.3 crashes by itself when it opens a new file after another scene was
 made with Rigify on.
@@ -14,6 +14,7 @@ import bpy
 sys.path.insert(0, str(Path(__file__).parent))
 from first_shot import first_shot
 from interruptions import interruptions
+from live import live
 from seats import seats
 
 from kit import humanoids
@@ -22,6 +23,7 @@ from kit.window import Waits, play
 PICTURES, *NAMED = sys.argv[sys.argv.index("--") + 1 :]
 PARTS: dict[str, Callable[[Path], Waits]] = {
     "interruptions": interruptions,
+    "live": live,
     "seats": lambda pictures: seats(pictures, humanoids, Path(__file__).parent / "rigs"),
     "first_shot": lambda pictures: first_shot(pictures, humanoids),
 }

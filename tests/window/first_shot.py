@@ -10,7 +10,7 @@ import bpy
 
 from kit.window import Driver, Waits
 
-__all__ = ["first_shot", "progress"]
+__all__ = ["first_shot", "look", "new_stool", "only", "progress"]
 
 
 def progress() -> float | None:
@@ -22,14 +22,14 @@ def progress() -> float | None:
     return None if running is None else running.progress
 
 
-def _look(user: Driver, at: tuple[float, float, float], distance: float) -> None:
+def look(user: Driver, at: tuple[float, float, float], distance: float) -> None:
     """Turn the view to a point."""
     space = user.view.spaces.active
     space.region_3d.view_location, space.region_3d.view_distance = at, distance
     space.shading.color_type = "OBJECT"
 
 
-def _stool() -> bpy.types.Object:
+def new_stool() -> bpy.types.Object:
     """Furniture of the animator's own, in a collection of its own."""
     collection = bpy.data.collections.new("Studio")
     bpy.context.scene.collection.children.link(collection)
@@ -42,7 +42,7 @@ def _stool() -> bpy.types.Object:
     return stool
 
 
-def _only(*selected: bpy.types.Object) -> None:
+def only(*selected: bpy.types.Object) -> None:
     """Select these, the first one active."""
     bpy.context.view_layer.update()
     for each in bpy.context.view_layer.objects:
@@ -65,12 +65,12 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
     yield from user.sidebar("DAFNet")
     yield from user.click("dafnet.add_character")
     ann = scene.objects["Character"]
-    _look(user, (0.9, 0.7, 0.6), 4.5)
+    look(user, (0.9, 0.7, 0.6), 4.5)
     yield from user.picture("add_character")
 
     with user.override():
-        stool = _stool()
-    _only(ann, stool)
+        stool = new_stool()
+    only(ann, stool)
     yield 0.2
     yield from user.click("dafnet.walk_to(goal='SEAT')")
     keys = ann.dafnet.root.animation_data.action
@@ -78,7 +78,7 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
     assert scene.frame_end > 100, (
         "the scene's end follows the walk" if scene.frame_end == 250 else ""
     )
-    _only(ann)
+    only(ann)
     scene.frame_end = int(keys.frame_range[1])
     yield from user.picture("path_and_furniture")
 
@@ -141,7 +141,7 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
     for name, build in (("mixamo", builders.mixamo), ("rigify", builders.rigify)):
         with user.override():
             rig = build(bpy)
-        _only(rig)
+        only(rig)
         yield 0.3
         yield from user.click("dafnet.detect_rig")
         yield from user.click("dafnet.bake_to_rig")
@@ -152,7 +152,7 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
         yield 0.3
         yield from user.picture(f"rig_{name}")
         rig.hide_set(True)
-    _only(ann)
+    only(ann)
     overlays = bpy.context.window_manager.dafnet_overlays
     switches = [name for name, kind in overlays.bl_rna.properties.items() if kind.type == "BOOLEAN"]
     for name in switches:

@@ -7,7 +7,7 @@ import bpy
 
 from ..compat import playback_restorer
 
-__all__ = ["state_restorer", "undone_on_failure"]
+__all__ = ["place_restorer", "state_restorer", "undone_on_failure"]
 
 _TRANSFORM = (
     "rotation_mode",
@@ -36,6 +36,12 @@ def _numbers(bone: bpy.types.PoseBone) -> dict[str, int | float]:
 def _set(owner: bpy.types.Object | bpy.types.PoseBone, channels: _Channels) -> None:
     for name, value in channels.items():
         setattr(owner, name, value)
+
+
+def place_restorer(owner: bpy.types.Object) -> Callable[[], None]:
+    """A function that puts an object back to where it is now."""
+    own = _channels(owner)
+    return lambda: _set(owner, own)
 
 
 def state_restorer(armature: bpy.types.Object) -> Callable[[bpy.types.Object], None]:

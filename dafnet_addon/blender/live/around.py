@@ -1,0 +1,128 @@
+"""What stands around a character that is led live: its furniture, read again where it moves, and
+the seats in it.
+"""
+
+from collections.abc import Generator
+from time import perf_counter
+
+import bpy
+import numpy as np
+
+from ...core.following import Seat
+from ...core.live import Surroundings
+from ...core.nearby import solids_near
+from ...core.solids import Scene
+from ...director.seats import NoSeat, SeatPlace, seats_of
+from ..character.settings import Settings
+from ..scene.dependencies import Dependencies
+from ..scene.furniture import furniture_of
+from ..scene.lookup import find_collection
+
+__all__ = ["LiveFurniture"]
+
+_REREAD = 0.5
+"""Seconds between two readings of furniture that is moving."""
+_AROUND = 0.9
+"""Metres around a dragged root, within which furniture is looked at for seats."""
+
+_LOOKS = 0.008
+"""Seconds of a tick that are spent on looking for seats."""
+
+
+class LiveFurniture:
+    """The furniture of a character ``scale`` times the canonical size; ``unit``: of a Blender unit,
+    metres. ``members``: the objects that are furniture; ``scene``: as it was read, world, metres;
+    ``surroundings``: the same as the body senses it.
+    """
+
+    def __init__(
+        self,
+        context: bpy.types.Context,
+        settings: Settings,
+        *,
+        unit: float,
+        scale: float,
+        floor: float,
+    ) -> None:
+        self._settings = settings
+        self._unit, self._scale = unit, scale
+        self._moved, self._read_at = False, -np.inf
+        self._read(context, floor)
+
+    def _read(self, context: bpy.types.Context, floor: float) -> None:
+        furniture = furniture_of(self._settings, Dependencies(context.scene))
+        self._count = self._objects()
+        self.members: set[bpy.types.Object] = set()
+        self.scene = Scene()
+        if furniture is not None:
+            self.members = furniture.members
+            furniture.begin(context.evaluated_depsgraph_get())
+            self.scene = Scene(furniture.solids(self._unit))
+        self.surroundings = Surroundings(self.scene, floor, self._scale)
+        self._seats: dict[
+            frozenset[int], Generator[float, None, list[SeatPlace]] | tuple[Seat, ...]
+        ] = {}
+
+    def _objects(self) -> int:
+        """How many objects the collection of furniture holds."""
+        name = self._settings.furniture
+        return len(find_collection(name).all_objects) if name else 0
+
+    def note(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Blender has evaluated something anew: it may have been furniture."""
+        if not self._moved:
+            self._moved = any(
+                (update.is_updated_transform or update.is_updated_geometry)
+                and update.id.original in self.members
+                for update in depsgraph.updates
+            )
+
+    def read_again(self, context: bpy.types.Context, floor: float, now: float) -> bool:
+        """Read what was moved, added or removed, twice a second while that goes on; ``now``:
+        seconds. Whether it did.
+
+        ``InputError``: there is none any more.
+        """
+        if now - self._read_at < _REREAD:
+            return False
+        if not self._moved and self._objects() == self._count:
+            return False
+        self._moved, self._read_at = False, now
+        self._read(context, floor)
+        return True
+
+    def seats(
+        self, place: np.ndarray, towards: np.ndarray, patience: float = _LOOKS
+    ) -> tuple[Seat, ...] | None:
+        """The seats around a root at ``place`` (3,), metres, for who comes from ``towards`` (3,);
+        None where nothing is under it that could carry a body, or as long as they are looked for:
+        each time for ``patience`` seconds, and once for all.
+        """
+        if not self.scene.solids or not self.surroundings.carries(place / self._scale):
+            return None
+        near = solids_near(self.scene, place[None], _AROUND, self._scale)
+        key = frozenset(map(id, near.solids))
+        if key not in self._seats:
+            floor, size = float(place[2]), self._scale
+            self._seats[key] = seats_of.steps(
+                near.solids, towards[:2], floor, near=place[:2], size=size
+            )
+        found = self._seats[key]
+        if not isinstance(found, tuple):
+            found = self._seats[key] = _looked_on(found, patience)
+        return found if isinstance(found, tuple) else None
+
+
+def _looked_on(
+    looking: Generator[float, None, list[SeatPlace]], patience: float
+) -> Generator[float, None, list[SeatPlace]] | tuple[Seat, ...]:
+    """A search for seats ``patience`` seconds later, or what it has found."""
+    until = perf_counter() + patience
+    try:
+        while perf_counter() < until:
+            next(looking)
+    except StopIteration as done:
+        return tuple(Seat(each.position, each.yaw, each.aside) for each in done.value)
+    except NoSeat:
+        return ()
+    return looking

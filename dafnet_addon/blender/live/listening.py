@@ -1,0 +1,110 @@
+"""The session that is running, at most one, and what ends it from outside.
+
+Undoing, opening or saving a file would keep, or lose, what is only shown for the time being: before
+any of them the session puts everything back. While it runs, Blender's own undo takes no steps, so
+that all of it is one.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from .session import LiveSession
+
+__all__ = ["LiveState", "begin_live", "end_live", "live_session", "live_state"]
+
+
+class LiveState:
+    """The running ``session``; ``why`` it ended by itself; whether it was asked to end
+    (``ending``); ``draws``: whether the mouse draws a way.
+    """
+
+    def __init__(self, session: LiveSession) -> None:
+        self.session = session
+        self.why: str | None = None
+        self.ending = False
+        self.draws = False
+
+
+_running: list[LiveState] = []  # at most one
+_undoes: list[tuple[bool, bool]] = []
+
+
+def live_state() -> LiveState | None:
+    """The state of the session that is running; None where none is."""
+    return _running[0] if _running else None
+
+
+def live_session() -> LiveSession | None:
+    """The session that is running; None where none is."""
+    return _running[0].session if _running else None
+
+
+def begin_live(session: LiveSession) -> LiveState:
+    """Let a session run."""
+    _running[:] = [LiveState(session)]
+    preferences = bpy.context.preferences
+    _undoes[:] = [(preferences.edit.use_global_undo, preferences.is_dirty)]
+    preferences.edit.use_global_undo = False
+    preferences.is_dirty = _undoes[0][1]
+    session.begin()
+    for event, function in _LISTENERS.items():
+        getattr(bpy.app.handlers, event).append(function)
+    return _running[0]
+
+
+def end_live() -> None:
+    """End the session that runs, if one does: everything is as it was."""
+    if not _running:
+        return
+    session = _running.pop().session
+    for event, function in _LISTENERS.items():
+        handlers = getattr(bpy.app.handlers, event)
+        if function in handlers:
+            handlers.remove(function)
+    if session.recording:
+        session.stop_recording()
+    session.restore()
+    preferences = bpy.context.preferences
+    was_dirty = preferences.is_dirty
+    preferences.edit.use_global_undo = _undoes.pop()[0]
+    preferences.is_dirty = was_dirty
+
+
+def _ended(why: str) -> None:
+    if (state := live_state()) is not None:
+        end_live()
+        state.why = why
+
+
+@persistent
+def _before_loading(*_: Any) -> None:
+    _ended("Live ended, since another file is opened.")
+
+
+@persistent
+def _before_undoing(*_: Any) -> None:
+    _ended("Live ended, since something was undone.")
+
+
+@persistent
+def _before_saving(*_: Any) -> None:
+    _ended("Live ended, so that the file is saved as it was.")
+
+
+@persistent
+def _evaluated(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
+    if depsgraph is not None and (session := live_session()) is not None:
+        session.furniture.note(depsgraph)
+
+
+_LISTENERS: dict[str, Callable[..., None]] = {
+    "load_pre": _before_loading,
+    "undo_pre": _before_undoing,
+    "redo_pre": _before_undoing,
+    "save_pre": _before_saving,
+    "depsgraph_update_post": _evaluated,
+    "frame_change_post": _evaluated,
+}

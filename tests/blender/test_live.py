@@ -1,0 +1,267 @@
+"""Live: the character follows what is dragged, what is recorded becomes a take, and everything else
+is put back, whatever comes between.
+"""
+
+import math
+from types import ModuleType
+
+import bpy
+import numpy as np
+import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.takes import stored_take
+from bl_ext.user_default.dafnet.dafnet_addon.blender.live.keeping import keep_clips
+from bl_ext.user_default.dafnet.dafnet_addon.blender.live.listening import (
+    begin_live,
+    end_live,
+    live_state,
+)
+from bl_ext.user_default.dafnet.dafnet_addon.blender.live.session import LiveSession, Over
+from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end
+from bl_ext.user_default.dafnet.panels.main import DAFNET_PT_character
+
+from kit.panels import drawn_by
+from kit.stage import Stage, key, keys_of
+
+HEIGHT = 1.7
+
+
+@pytest.fixture
+def shot(blender: ModuleType) -> Stage:
+    """A character before a chair, in a scene of 24 frames a second."""
+    made = Stage(height=HEIGHT, fps=24, frames=(1, 48))
+    made.seat("Chair", location=(0, 2.0, 0))
+    made.box("Chair Back", (-0.25, 0.2, 0.45), (0.25, 0.25, 0.95), location=(0, 2.0, 0))
+    made.scene.frame_set(5)
+    return made
+
+
+class Played:
+    """A session that is stepped by a clock of its own, as the operator's timer steps it."""
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self.session = LiveSession(bpy.context, stage.ann)
+        self.session.busy = math.inf
+        self.state = begin_live(self.session)
+        self.clock = 0.0
+        self.session.tick(bpy.context, self.clock)
+
+    def run(self, seconds: float, place: tuple[float, float] | None = None) -> list[np.ndarray]:
+        """Let time pass, the root dragged to a ``place`` within the first half second; where the
+        pelvis is after each frame.
+        """
+        start = np.array(self.stage.root.location)
+        seen = []
+        for k in range(round(seconds * 30)):
+            if place is not None:
+                share = min(1.0, (k + 1) / 15)
+                self.stage.root.location[:2] = (1 - share) * start[:2] + share * np.array(place)
+            self.clock += 1 / 30 + 1e-9
+            bpy.context.view_layer.update()
+            self.session.tick(bpy.context, self.clock)
+            seen.append(self.pelvis())
+        return seen
+
+    def pelvis(self) -> np.ndarray:
+        bpy.context.view_layer.update()
+        ann = self.stage.ann
+        return np.array(ann.matrix_world @ ann.pose.bones["pelvis"].head)
+
+
+@pytest.fixture
+def ended() -> object:
+    """No session outlives a test."""
+    yield
+    end_live()
+
+
+def test_it_follows_the_root_and_puts_all_back(shot: Stage, ended: object) -> None:
+    shot.walk((1, 0.0), (40, 1.0))
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
+    shot.scene.frame_set(5)
+    before, playing = shot.state(), shot.ann.animation_data.action
+    undoes = bpy.context.preferences.edit.use_global_undo
+    played = Played(shot)
+    assert not bpy.context.preferences.edit.use_global_undo
+    assert shot.ann.animation_data.action is None
+
+    way = np.array(played.run(5.0, (2.0, 0.0)))
+    assert np.linalg.norm(way[-1][:2] - (2.0, 0.0)) < 0.15, "it has come to the root"
+    speed = np.linalg.norm(np.diff(way[:, :2], axis=0), axis=1) * 30
+    assert speed.max() < 2.0, "it walks, though the root jumped"
+    end_live()
+    assert shot.state() == before and shot.ann.animation_data.action == playing
+    assert bpy.context.preferences.edit.use_global_undo == undoes
+    assert live_state() is None
+
+
+def test_it_sits_on_a_chair_that_the_root_is_dragged_onto_and_gets_up(
+    shot: Stage, ended: object
+) -> None:
+    played = Played(shot)
+    stands = played.pelvis()[2]
+    sits = np.array(played.run(9.0, (0.0, 2.05)))[-1]
+    assert abs(sits[2] - 0.59 * HEIGHT / 1.75) < 0.06, f"the pelvis is at {sits[2]:.2f}"
+    assert np.linalg.norm(sits[:2] - (0.0, 2.0)) < 0.25
+    facing = shot.ann.matrix_world.to_3x3() @ bpy.context.scene.cursor.location.__class__(
+        (0, -1, 0)
+    )
+    assert facing.y < -0.9, "its back is at the chair's back"
+    stood = np.array(played.run(5.0, (1.0, 0.0)))[-1]
+    assert abs(stood[2] - stands) < 0.06
+
+
+def test_a_dragged_hand_is_reached_for_and_let_go(shot: Stage, ended: object) -> None:
+    hand = shot.own.hand_right
+    played = Played(shot)
+    played.run(0.5)
+    hand.location = 0.3, 0.35, 1.45
+    played.run(1.5)
+    wrist = shot.ann.matrix_world @ shot.ann.pose.bones["right_wrist"].head
+    assert (wrist - hand.location).length < 0.08
+    played.run(4.0, (0.0, -2.0))
+    wrist = shot.ann.matrix_world @ shot.ann.pose.bones["right_wrist"].head
+    assert (wrist - hand.location).length > 1.0, "it walks away"
+    assert not played.session.body.frame.targets
+
+
+def test_recorded_is_a_take_that_can_be_generated_again(shot: Stage, ended: object) -> None:
+    key(shot.root, "location", (1, (0.0, 0.0, 0.0)), (20, (0.5, 0.0, 0.0)))
+    own = shot.root.animation_data.action
+    played = Played(shot)
+    played.run(0.5)
+    played.session.record()
+    seen = np.array(played.run(4.0, (1.5, 0.0)))
+    shot.own.hand_right.location = 1.75, 0.3, 1.3
+    seen = np.concatenate([seen, played.run(1.5)])
+    played.session.stop_recording()
+    end_live()
+    (result,) = run_to_end(keep_clips(played.session))
+
+    take, controls = stored_take(shot.ann.animation_data.action)
+    assert result.action == shot.ann.animation_data.action == shot.own.takes[0].action
+    assert len(take) == len(controls) == 1 + int((len(seen) - 1) * 24 / 30)
+    assert own.use_fake_user and shot.root.animation_data.action != own
+    assert keys_of(shot.root)["location", 0].shape == (len(take), 2)
+    assert shot.own.mode == "EE" and controls.mode == "EE"
+    assert shot.scene.frame_end >= len(take) and shot.scene.frame_current == 5
+
+    # What plays is what was played, but for the clean-up with its look ahead.
+    for frame in range(0, len(take), 10):
+        shot.scene.frame_set(1 + frame)
+        now = seen[min(len(seen) - 1, round(frame / 24 * 30))]
+        assert np.linalg.norm(played.pelvis() - now) < 0.06
+    assert bpy.ops.dafnet.clean_again() == {"FINISHED"}
+    again = shot.read(frame_start=1, frame_end=len(take)).controls
+    assert np.abs(again.root - controls.root).max() < 1e-3
+    assert np.nanmax(np.abs(again.hand_right - controls.hand_right)[-20:]) < 1e-3
+    assert np.abs(again.hand_right_influence - controls.hand_right_influence).max() < 0.02
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
+
+
+def test_late_ticks_lose_no_time(shot: Stage, ended: object) -> None:
+    played = Played(shot)
+    session = played.session
+    assert session.tick(bpy.context, 0.2 + 1e-6) == 6, "all that were due are made"
+    assert session.tick(bpy.context, 10.0) == 15 and session.lost == 279, "and then no more"
+    assert session.tick(bpy.context, 10.0) == 0
+    assert session.tick(bpy.context, 10.04) == 1
+    session.busy = 1e-6
+    assert session.tick(bpy.context, 10.24) == 1 and session.lost == 284, "Blender is not kept busy"
+
+
+def test_furniture_that_is_moved_is_seen_where_it_is(shot: Stage, ended: object) -> None:
+    played = Played(shot)
+    played.run(0.2)
+    bpy.data.objects["Chair"].location.x = 3.0
+    played.run(1.0)
+    (seat, _) = played.session.furniture.scene.solids
+    assert abs(np.asarray(seat.matrix)[0, 3] - 3.0) < 1e-6
+    bpy.data.objects.remove(bpy.data.objects["Chair"])
+    bpy.data.objects.remove(bpy.data.objects["Chair Back"])
+    with pytest.raises(Over, match="Live ended"):
+        played.run(2.0)
+
+
+def test_what_was_drawn_is_walked_along(shot: Stage, ended: object) -> None:
+    played = Played(shot)
+    for x in np.linspace(0.2, 2.5, 30):
+        played.session.way.add(np.array([x, 0.3 * np.sin(3 * x)]))
+    played.run(4.0)
+    assert not played.session.way
+    assert np.linalg.norm(np.array(shot.root.location)[:2] - (2.5, 0.3 * np.sin(7.5))) < 0.06
+    assert np.linalg.norm(played.pelvis()[:2] - np.array(shot.root.location)[:2]) < 0.2
+    played.session.way.add(np.array([-2.0, 0.0]))
+    played.run(0.3)
+    shot.root.location = (0.0, -1.0, 0.0)
+    played.run(0.2)
+    assert not played.session.way, "who drags the root ends the way"
+
+
+def test_what_ends_it(shot: Stage, ended: object, tmp_path) -> None:
+    before = shot.state()
+    played = Played(shot)
+    played.run(0.3, (1.0, 0.0))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    assert live_state() is None and "saved" in str(played.state.why)
+    assert shot.state() == before
+
+    played = Played(shot)
+    played.run(0.2, (1.0, 0.0))
+    bpy.ops.object.mode_set(mode="OBJECT")
+    shot.select(bpy.data.objects["Chair"])
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(Over, match="object and pose mode"):
+        played.run(0.2)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    end_live()
+
+    played = Played(shot)
+    bpy.data.objects.remove(shot.root)
+    with pytest.raises(Over, match="Live ended"):
+        played.session.tick(bpy.context, played.clock + 1.0)
+    end_live()
+    assert [tuple(bone.rotation_quaternion) for bone in shot.ann.pose.bones] == [(1, 0, 0, 0)] * 22
+
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    ann = bpy.data.objects["Ann"]
+    session = LiveSession(bpy.context, ann)
+    state = begin_live(session)
+    session.tick(bpy.context, 0.0)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    assert live_state() is None and "opened" in str(state.why)
+
+
+def test_what_it_cannot_lead_is_said_and_nothing_changes(shot: Stage, ended: object) -> None:
+    before = shot.state()
+    with pytest.raises(RuntimeError, match="needs a window"):
+        bpy.ops.dafnet.live()
+    shot.own.mode = "FULL"
+    with pytest.raises(InputError, match="FREE or EE"):
+        LiveSession(bpy.context, shot.ann)
+    shot.own.mode = "FREE"
+    shot.own.root = None
+    with pytest.raises(InputError, match="has no root"):
+        LiveSession(bpy.context, shot.ann)
+    shot.own.root = shot.root
+    assert shot.state() == before
+
+    played = Played(shot)
+    for operator in (bpy.ops.dafnet.generate, bpy.ops.dafnet.walk_to):
+        assert not operator.poll()
+    shot.root.lock_location[0] = False
+    shot.root.rotation_mode = "QUATERNION"
+    with pytest.raises(RuntimeError, match="rotation mode"):
+        bpy.ops.dafnet.live_record()
+    shot.root.rotation_mode = "XYZ"
+    assert bpy.ops.dafnet.live_record() == {"FINISHED"} and played.session.recording
+    assert bpy.ops.dafnet.live_draw() == {"FINISHED"} and played.state.draws
+    played.run(0.2)
+    words = drawn_by(DAFNET_PT_character, bpy.context).words()
+    assert (
+        "dafnet.live" in words and "dafnet.live_record" in words and "dafnet.generate" not in words
+    )
+    end_live()
+    assert not bpy.ops.dafnet.live_record.poll()
+    assert "dafnet.generate" in drawn_by(DAFNET_PT_character, bpy.context).words()
