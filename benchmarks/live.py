@@ -17,14 +17,8 @@ from pathlib import Path
 from time import perf_counter, thread_time
 from typing import Any
 
-import bpy
 import numpy as np
 
-from dafnet_addon.blender.character.armature import create_character
-from dafnet_addon.blender.character.properties import ensure_registered
-from dafnet_addon.blender.live.listening import begin_live, end_live
-from dafnet_addon.blender.live.session import LiveSession
-from dafnet_addon.blender.showcase.rooms import build
 from dafnet_addon.core.metrics import skate
 from dafnet_addon.core.series import MODEL_FPS
 from dafnet_addon.core.weights import load_weights
@@ -36,11 +30,6 @@ LIMITS = {"step, ms": 12.0, "memory grown, MB": 20.0}
 
 _MINUTES = 5.0
 _WARM = 60.0  # seconds after which memory is first looked at
-_SIDE = 3.0  # metres from the middle of the room, within which the root is dragged
-_HURRY = (0.2, 3.0)  # seconds from one place to the next, and of rest there
-_ON_A_CHAIR = 0.3  # share of the places that are on a chair
-_A_HAND = 0.3  # of those at which a hand is dragged as well
-_PUSHED = 0.05  # of those at which a chair is pushed
 
 
 def _megabytes() -> float:
@@ -52,78 +41,26 @@ def _megabytes() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def _room() -> tuple[bpy.types.Object, list[bpy.types.Object], int]:
-    """A character in the café, the chairs there, and how many triangles all of it has."""
-    ensure_registered()
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    scene = bpy.context.scene
-    build(scene, "cafe")
-    furniture = list(bpy.data.collections["Furniture"].objects)
-    triangles = 0
-    for each in furniture:
-        each.data.calc_loop_triangles()
-        triangles += len(each.data.loop_triangles)
-
-    armature = create_character(bpy.context, "Ann")
-    armature.dafnet.furniture = bpy.data.collections["Furniture"]
-    return armature, [each for each in furniture if "hair" in each.name], triangles
-
-
-class _Hand:
-    """Drags about at random, as a user in a hurry does."""
-
-    def __init__(self, armature: bpy.types.Object, chairs: list[bpy.types.Object]) -> None:
-        self.own = armature.dafnet
-        self.chairs = chairs
-        self._random = np.random.default_rng(0)
-        self._from = self._to = np.zeros(2)
-        self._begins, self._there, self._next = 0.0, 0.1, 0.2
-
-    def drag(self, now: float) -> None:
-        """Move what is dragged to where it is at ``now``, seconds."""
-        rng = self._random
-        if now >= self._next:
-            self._from, self._begins = self._to, now
-            chair = self.chairs[rng.integers(len(self.chairs))]
-            on_it = rng.random() < _ON_A_CHAIR
-            self._to = np.array(chair.location)[:2] if on_it else rng.uniform(-_SIDE, _SIDE, 2)
-            self._there = now + rng.uniform(*_HURRY)
-            self._next = self._there + rng.uniform(*_HURRY)
-            self.own.root.rotation_euler.z += rng.normal(0.0, 1.0)
-            if rng.random() < _A_HAND:
-                place = np.array(self.own.root.location) + rng.uniform(
-                    (-0.5, -0.5, 0.6), (0.5, 0.5, 1.7)
-                )
-                self.own.hand_right.location = place
-            if rng.random() < _PUSHED:
-                chair.location.x += rng.normal(0.0, 0.1)
-        share = min(1.0, (now - self._begins) / (self._there - self._begins))
-        self.own.root.location[:2] = (1.0 - share) * self._from + share * self._to
-
-
 def measure(
     weights: Path | None = None,
     progress: Callable[[float], None] = lambda share: None,
     minutes: float = _MINUTES,
 ) -> tuple[dict[str, Any], str]:
     """The figures, and a table of them."""
-    armature, chairs, triangles = _room()
+    from dafnet_addon.blender.live.trial import Trial
+
     begun = perf_counter()
-    session = LiveSession(bpy.context, armature, load_weights(weights))
-    ready = perf_counter() - begun
-    hand = _Hand(armature, chairs)
+    trial = Trial(load_weights(weights))
+    session, ready = trial.session, perf_counter() - begun
     steps, ticks, work, joints = [], [], [], []
     frames, grown = round(60.0 * minutes * MODEL_FPS), 0.0
-    session.busy = np.inf
-    begin_live(session)
+    trial.begin()
     try:
-        session.tick(bpy.context, 0.0)
         for k in range(1, frames + 1):
             now = k / MODEL_FPS + 1e-6
-            hand.drag(now)
-            bpy.context.view_layer.update()
+            trial.drag(now)
             begun, worked = perf_counter(), thread_time()
-            made = session.tick(bpy.context, now)
+            made = trial.tick(now)
             ticks.append(perf_counter() - begun)
             work.append(thread_time() - worked)
             steps += [*session.durations][-made:]
@@ -134,10 +71,10 @@ def measure(
             progress(k / frames)
         grown += _megabytes()
     finally:
-        end_live()
+        trial.end()
 
     figures = {
-        "triangles": triangles,
+        "triangles": trial.triangles,
         "minutes": minutes,
         "frames": frames,
         "frames lost": session.lost,

@@ -9,6 +9,7 @@ as in half the windows that it was trained on. The root is followed as a person 
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from .skeleton import (
     HIPS,
     MODEL_ORDER,
     PELVIS,
+    REST,
     SHOULDERS,
     TARGETS,
 )
@@ -114,7 +116,7 @@ def controls_of(played: Sequence[LiveFrame], fps: float, scale: float) -> Contro
         resample_positions(np.array([each.position for each in played]), source, target),
         resample_positions(np.array([each.yaw for each in played]), source, target),
     )
-    given: dict[str, np.ndarray] = {}
+    given: dict[str, Any] = {}
     for name in TARGETS:
         shares = np.array([each.shares.get(name, 0.0) for each in played])
         if shares.any():
@@ -199,7 +201,7 @@ class LiveBody:
         self._occupancy: deque[np.ndarray] = deque(maxlen=history)
         self._observation: deque[np.ndarray] = deque(maxlen=history)
         self._given: deque[np.ndarray] = deque(maxlen=history)
-        self._last: np.ndarray | None = None
+        self._last = REST
         self._signs: np.ndarray | None = None
 
         sampler.forget()
@@ -286,7 +288,7 @@ class LiveBody:
         for weights that have learnt of them.
         """
         heard = name in END_EFFECTORS or self._sampler.weights.heeds_legs
-        if self._last is None or name not in lead.targets or not heard:
+        if name not in lead.targets or not heard:
             return None
         place = np.asarray(lead.targets[name], float) / self.scale
         if not np.isfinite(place).all():
@@ -302,7 +304,7 @@ class LiveBody:
         floor = float(here.position[0, 2])
         joints = self._clean_up.step(joints, floor, self._support(joints, here))
         pelvis, frames = fit(joints[None])
-        joints = forward_kinematics(frames, pelvis)[0]
+        shown = forward_kinematics(frames, pelvis)[0]
         rotations = quaternion_from_matrix(local_from_global(frames))[0]
         if self._signs is not None:
             turned_over = (rotations * self._signs).sum(axis=-1) < 0.0
@@ -313,7 +315,7 @@ class LiveBody:
         frame = LiveFrame(
             position=here.position[0] * self.scale,
             yaw=float(here.yaw[0]),
-            joints=joints * self.scale,
+            joints=shown * self.scale,
             rotations=rotations,
             pose=pose,
             action=action,
@@ -326,7 +328,7 @@ class LiveBody:
 
     def _support(self, joints: np.ndarray, here: RootPath) -> Support | None:
         """What carries the body, where it may be carried."""
-        if joints[PELVIS, 2] - here.position[0, 2] > _SITS:
+        if joints[PELVIS][2] - here.position[0, 2] > _SITS:
             return None
         near = self.surroundings.near(here.position[0], 0.3)
         return support_under(near, here) if near.solids else None

@@ -11,7 +11,7 @@ from .cleanup import CleanUp, too_high
 from .following import PointFollower
 from .resting import lifted, on_legs
 from .rotations import normalised
-from .series import MODEL_FPS, smoothstep
+from .series import MODEL_FPS, minimum_jerk
 from .skeleton import ANKLES, FEET, HIPS, KNEES, OFFSETS, PELVIS, TOE_HEIGHT
 from .softness import OVER_HARD, Support
 
@@ -23,9 +23,10 @@ _FOOT = float(np.linalg.norm(OFFSETS[FEET[0]]))
 _LOW = 0.035  # metres over a planted toe base
 _LANDS = 0.35  # metres a second, under which a foot that is low stands
 _LEAVES = 0.80  # metres a second, over which one that stood is lifted
-_SLIPS = 0.11  # metres from its place at which a foot is let go, while the body moves
-_CREEPS = 0.25  # metres at which it is let go though the body rests
-_RESTS = 0.1  # metres a second of a pelvis that rests
+_SLIPS = 0.11  # metres from where the network has it, at which a foot that is held steps there
+_FARTHEST = 0.22  # metres at which it is let go though the other foot steps
+_STEP = 11  # frames of such a step
+_LIFTS = 0.035  # metres
 _GRIPS = 3  # frames in which a foot is brought to a stand
 _FADES = 0.11  # seconds, in which what a foot was held by is down to a third
 _STRAIGHT = 0.985  # of a leg's length: knees that are quite straight snap
@@ -39,17 +40,26 @@ _EITHER_WAY = 0.005  # metres by which bodies rest higher or lower and are left 
 
 class _Foot:
     """One foot: how far it is moved, ``offset`` (3,), from where the network brings its toe base,
-    and the ``place`` (3,) where it is held, None where it is not.
+    and the ``place`` (3,) where it is held, None where it is not. ``steps``: it is lifted to where
+    the network has it, since it was held too far from there.
     """
 
     def __init__(self) -> None:
         self.offset = np.zeros(3)
         self.place: np.ndarray | None = None
         self._before: np.ndarray | None = None
-        self._frames = 0
+        self._gripped = 0
+        self._stepped = _STEP
+        self._from = np.zeros(3)
 
-    def step(self, toe: np.ndarray, floor: float, slips: float) -> None:
-        """The next frame, in which the network brings the toe base to ``toe`` (3,)."""
+    @property
+    def steps(self) -> bool:
+        return self._stepped < _STEP
+
+    def move(self, toe: np.ndarray, floor: float, may_step: bool) -> None:
+        """The next frame, in which the network brings the toe base to ``toe`` (3,); ``may_step``:
+        the other foot stands.
+        """
         before = toe if self._before is None else self._before
         speed = float(np.linalg.norm(toe - before)) * MODEL_FPS
         self._before = toe.copy()
@@ -57,18 +67,25 @@ class _Foot:
 
         if self.place is not None:
             away = float(np.linalg.norm((toe - self.place)[:2]))
-            if not low or speed > _LEAVES or away > slips:
+            if not low or speed > _LEAVES or away > _FARTHEST:
                 self.place = None
-        elif low and speed < _LANDS:
-            self.place, self._frames = toe + self.offset, 0
+            elif away > _SLIPS and may_step:
+                self.place, self._stepped, self._from = None, 0, self.offset
+        elif low and speed < _LANDS and not self.steps:
+            self.place, self._gripped = toe + self.offset, 0
             self.place[2] = floor + TOE_HEIGHT
 
-        if self.place is None:
-            self.offset *= np.exp(-1.0 / (_FADES * MODEL_FPS))
-        else:
-            self._frames += 1
-            share = min(1.0, self._frames / _GRIPS)
+        if self.place is not None:
+            self._gripped += 1
+            share = min(1.0, self._gripped / _GRIPS)
             self.offset = (1.0 - share) * self.offset + share * (self.place - toe)
+        elif self.steps:
+            self._stepped += 1
+            share = self._stepped / _STEP
+            self.offset = self._from * (1.0 - float(minimum_jerk(np.array(share))))
+            self.offset[2] += _LIFTS * np.sin(np.pi * share) ** 2
+        else:
+            self.offset = self.offset * np.exp(-1.0 / (_FADES * MODEL_FPS))
 
 
 class LiveCleanUp:
@@ -99,11 +116,8 @@ class LiveCleanUp:
         strength = self.settings.feet
         if strength == 0.0:
             return joints
-        slips = _CREEPS + (_SLIPS - _CREEPS) * float(
-            smoothstep(np.array(self._speed / _RESTS - 0.5))
-        )
-        for foot, toe in zip(self._feet, FEET, strict=True):
-            foot.step(joints[0, toe], floor, slips)
+        for foot, other, toe in zip(self._feet, self._feet[::-1], FEET, strict=True):
+            foot.move(joints[0, toe], floor, may_step=not other.steps)
 
         moved = strength * np.stack([foot.offset for foot in self._feet])[None]
         joints = joints.copy()
