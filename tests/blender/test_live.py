@@ -18,7 +18,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.live.listening import (
 from bl_ext.user_default.dafnet.dafnet_addon.blender.live.session import LiveSession, Over
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end
-from bl_ext.user_default.dafnet.panels.main import DAFNET_PT_character
+from bl_ext.user_default.dafnet.panels.main import DAFNET_PT_character, DAFNET_PT_shot
 
 from kit.panels import drawn_by
 from kit.stage import Stage, key, keys_of
@@ -259,9 +259,9 @@ def test_what_it_cannot_lead_is_said_and_nothing_changes(shot: Stage, ended: obj
     assert bpy.ops.dafnet.live_draw() == {"FINISHED"} and played.state.draws
     played.run(0.2)
     words = drawn_by(DAFNET_PT_character, bpy.context).words()
-    assert (
-        "dafnet.live" in words and "dafnet.live_record" in words and "dafnet.generate" not in words
-    )
+    assert "dafnet.live" in words and "dafnet.live_record" in words
+    assert not DAFNET_PT_shot.poll(bpy.context)
     end_live()
     assert not bpy.ops.dafnet.live_record.poll()
-    assert "dafnet.generate" in drawn_by(DAFNET_PT_character, bpy.context).words()
+    assert DAFNET_PT_shot.poll(bpy.context)
+    assert "dafnet.live" in drawn_by(DAFNET_PT_shot, bpy.context).words()
