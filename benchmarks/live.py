@@ -52,7 +52,10 @@ def measure(
     begun = perf_counter()
     trial = Trial(load_weights(weights))
     session, ready = trial.session, perf_counter() - begun
-    steps, ticks, work, joints = [], [], [], []
+    steps: list[float] = []
+    ticks: list[float] = []
+    work: list[float] = []
+    joints: list[np.ndarray] = []
     frames, grown = round(60.0 * minutes * MODEL_FPS), 0.0
     trial.begin()
     try:
