@@ -13,7 +13,7 @@ from .resting import lifted, on_legs
 from .rotations import normalised
 from .series import MODEL_FPS, minimum_jerk
 from .skeleton import ANKLES, FEET, HIPS, KNEES, OFFSETS, PELVIS, TOE_HEIGHT
-from .softness import OVER_HARD, Support
+from .softness import Support
 
 __all__ = ["LiveCleanUp"]
 
@@ -136,7 +136,7 @@ class LiveCleanUp:
         wanted, top = 0.0, np.full(1, np.nan)
         if support is not None and np.isfinite(support.top[0]):
             top = support.top
-            over = float(joints[0, PELVIS, 2] - (top + OVER_HARD - support.softness)[0])
+            over = float(joints[0, PELVIS, 2] - support.carried[0])
             if _LOWEST < over < _HIGHEST and self._speed < _STILL:
                 wanted = float(np.clip(over, -_EITHER_WAY, _EITHER_WAY)) - over
         lift = strength * self._lift.step(np.array([wanted]))
