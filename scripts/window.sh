@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
 # Drives a real Blender in a window under a virtual screen with mouse and keys, as tests/window/drive.py says, in a fresh profile.
 # Its pictures go to a folder. The Blender is one on the PATH, or lies in a Debian made by scripts/debian_blender.sh.
+# All parts of drive.py are played, or those that are named.
 #
-#     scripts/window.sh PICTURES [DEBIAN]
+#     [RIGS=FOLDER] scripts/window.sh PICTURES [DEBIAN [PART...]]
 #
-# PARTS names some of the parts of drive.py instead of all; RIGS is a folder of real characters' rest poses, of which two are baked on.
+# RIGS is a folder of real characters' rest poses, of which two are baked on.
 set -euo pipefail
 
 cd "$(dirname "$0")/.."
-pictures=$(realpath -m "$1") debian=${2:-}
+pictures=$(realpath -m "$1") debian=${2:-} parts=("${@:3}")
 scripts/build_zip.sh .venv/bin/python >/dev/null
 work=$(mktemp -d "${debian:-}/tmp/dafnet.XXXXXX")
 trap 'rm -rf "$work"; [[ -z ${mounted:-} ]] || umount "$debian/proc"' EXIT
@@ -32,5 +33,5 @@ fi
     --python-exit-code 1 --window-geometry 0 0 1600 1000 --python "$inside/drive/drive.py" -- "$inside/pictures" "${parts[@]}" 2>&1 |
     tee "$work/log"
 mkdir -p "$pictures"
-cp "$work"/pictures/*.png "$pictures/"
+find "$work/pictures" -name "*.png" -exec cp -t "$pictures" {} +
 grep -q "^Driven to the end" "$work/log"

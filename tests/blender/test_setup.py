@@ -14,6 +14,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.path_sources impo
 from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.surroundings import find_furniture
 from bl_ext.user_default.dafnet.panels import CLASSES, setup
 from bl_ext.user_default.dafnet.panels.setup import add_menu
+from mathutils import Vector
 
 from kit.panels import drawn_by
 from kit.stage import Stage
@@ -439,6 +440,26 @@ def test_examples_keep_the_scene_s_units(bare: Set) -> None:
     )
     root = bpy.context.object.dafnet.root
     assert np.allclose(root.location, MIDDLE * 100 + (-170, 220, 0), atol=1e-2)
+
+
+@pytest.mark.parametrize("kind", ["DESK", "WHITEBOARD", "SOFA", "BED"])
+def test_an_example_stands_beside_what_is_there(bare: Set, kind: str) -> None:
+    bare.scene.cursor.location = (0.0, 0.0, 0.0)
+    bpy.ops.mesh.primitive_cube_add(size=2.0)
+    cube = bpy.context.object
+    bpy.ops.mesh.primitive_plane_add(size=30.0)
+    assert bpy.ops.dafnet.add_example(kind=kind) == {"FINISHED"}
+    made = bpy.context.object
+    assert tuple(bare.scene.cursor.location) == (0.0, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    for piece in made.dafnet.furniture.objects:
+        corners = np.array([piece.matrix_world @ Vector(corner) for corner in piece.bound_box])
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        assert (low[:2] > 1.0).any() or (high[:2] < -1.0).any(), piece.name
+    bare.root = made.dafnet.root
+    path = bare.path(1, bare.scene.frame_end)[:, :2]
+    assert np.abs(path).max(axis=1).min() > 1.0 + 0.2, "nor is the cube in the way"
+    assert np.abs(path).max() < 6.0 and cube.location.length == 0.0
 
 
 def test_each_is_one_step_to_undo(stage: Set) -> None:

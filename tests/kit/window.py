@@ -17,7 +17,7 @@ import bpy
 __all__ = ["Driver", "Waits", "play"]
 
 Waits = Generator[float, None, None]
-_STEP = 9  # pixels between two looks for a button, less than one is high
+_STEP = 15  # pixels between two looks for a button, less than one is high
 
 
 class Driver:
@@ -27,6 +27,8 @@ class Driver:
         self.pictures = pictures
         self.window = bpy.context.window_manager.windows[0]
         self.mouse = (800, 500)
+        self.clicks = 0
+        """Clicks and keys so far; a typed word and the choice of a tab count as one each."""
 
     @property
     def view(self) -> bpy.types.Area:
@@ -53,13 +55,37 @@ class Driver:
         """A key or mouse button, down and up."""
         x, y = self.mouse
         text = {"unicode": key.lower()} if len(key) == 1 else {}
+        if not key.startswith("WHEEL"):
+            self.clicks += 1
         self.window.event_simulate(key, "PRESS", x=x, y=y, **text, **modifiers)
         yield 0.05
         self.window.event_simulate(key, "RELEASE", x=x, y=y, **modifiers)
         yield 0.2
 
+    def menu(self, key: str, entry: str) -> Waits:
+        """Open the 3D view's menu with Shift and a key, type the entry's name, and Return."""
+        before, region = self.clicks, self.region("WINDOW")
+        self.move(region.x + region.width // 3, region.y + region.height // 2)
+        yield 0.2
+        yield from self.press(key, shift=True)
+        yield 0.4
+        for letter in entry.replace(" ", ""):
+            yield from self.press(letter.upper())
+        yield 0.5
+        yield from self.press("RET")
+        yield 0.8
+        self.clicks = before + 3
+
+    def select(self, *objects: bpy.types.Object) -> None:
+        """Select these, the first one active, as a click on each would."""
+        self.clicks += len(objects)
+        for each in bpy.context.view_layer.objects:
+            each.select_set(each in objects)
+        bpy.context.view_layer.objects.active = objects[0]
+
     def sidebar(self, tab: str) -> Waits:
         """Open the sidebar at a tab."""
+        self.clicks += 2
         self.view.spaces.active.show_region_ui = True
         yield 0.4
         self.region("UI").active_panel_category = tab

@@ -1,5 +1,5 @@
-"""What scripts/window.sh plays: what may come between while a take is made, Live, then seats and
-rigs, then a first shot with the mouse; or only what is named.
+"""What scripts/window.sh plays: what may come between while a take is made, Live, seats and rigs,
+how many clicks a first shot takes, and one with the mouse; or only the parts that are named.
 
 In this order, since Blender 4.3 crashes by itself when it opens a new file after another scene was
 made with Rigify on.
@@ -12,6 +12,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
+from clicks import clicks
 from first_shot import first_shot
 from interruptions import interruptions
 from live import live
@@ -25,15 +26,18 @@ PARTS: dict[str, Callable[[Path], Waits]] = {
     "interruptions": interruptions,
     "live": live,
     "seats": lambda pictures: seats(pictures, humanoids, Path(__file__).parent / "rigs"),
+    "clicks": clicks,
     "first_shot": lambda pictures: first_shot(pictures, humanoids),
 }
 
 
 def everything() -> Waits:
-    for name in NAMED or PARTS:
-        bpy.ops.wm.read_homefile(app_template="")
-        yield 0.5
+    for number, name in enumerate(NAMED or PARTS):
+        if number:
+            bpy.ops.wm.read_homefile(app_template="")
+            yield 0.5
         yield from PARTS[name](Path(PICTURES))
+        print(f"{name}: done", flush=True)
 
 
 play(everything)

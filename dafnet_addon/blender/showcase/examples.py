@@ -2,7 +2,7 @@
 targets, ready to generate.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import bpy
@@ -20,6 +20,7 @@ from ..character.armature import create_character, metres_per_unit
 from ..directing.root_keys import write_keys
 from ..directing.walking import extend_range
 from .demo_room import FURNITURE, Part, add_piece, key_channels, new_collection
+from .free_floor import free_floor
 
 __all__ = ["EXAMPLES", "Example", "add_example"]
 
@@ -31,6 +32,8 @@ _BED_TOP = 0.46
 """Metres; height of the mattress."""
 _PILLOW = 0.07
 """Metres; thickness of the pillow."""
+_MARGIN = 0.5
+"""Metres around an example's path that its walker needs."""
 _ORIGIN = Place((0.0, 0.0), 0.0)
 _WRITING_DESK = (  # the demo's, with a sheet of paper where its computer stands
     *(part for part in FURNITURE["Desk"] if part.center[2] < 0.74 or part.round),
@@ -230,7 +233,8 @@ EXAMPLES = {
 
 
 def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
-    """Add an example at the 3D cursor, from the scene's first frame on, and return its character.
+    """Add an example at the 3D cursor, or on the nearest floor that is free, from the scene's first
+    frame on, and return its character.
 
     The furniture goes into a new collection; the scene's end is moved if the example is longer.
     ``InputError``: Blender is not in object mode; nothing is changed then.
@@ -243,20 +247,25 @@ def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
     scene, example = context.scene, EXAMPLES[kind]
     unit, fps = metres_per_unit(scene), scene.render.fps / scene.render.fps_base
     plan = example.plan(fps)
-    middle = scene.cursor.location.copy()
+    cursor = scene.cursor.location.copy()
 
     furniture = new_collection(scene, example.label)
+    made = []
     for name, (parts, place) in example.pieces.items():
         piece = add_piece(furniture, name, parts, place)
         piece.data.transform(Matrix.Scale(1.0 / unit, 4))
-        piece.location = middle + piece.location / unit
+        piece.location /= unit
+        made.append(piece)
+    middle = free_floor(scene, *_floor_of(plan, made, unit), unit, but=made)
+    for piece in made:
+        piece.location += middle
 
     path, first = plan.route.path, scene.frame_start
     try:
         scene.cursor.location = middle + Vector(path.position[0]) / unit
         armature = create_character(context)
     finally:
-        scene.cursor.location = middle
+        scene.cursor.location = cursor
 
     armature.rotation_euler.z += float(path.yaw[0])
     own = armature.dafnet
@@ -269,6 +278,22 @@ def add_example(context: bpy.types.Context, kind: str) -> bpy.types.Object:
     scene.frame_set(first)
 
     return armature
+
+
+def _floor_of(
+    plan: Plan, pieces: Sequence[bpy.types.Object], unit: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The floor from one corner to the other (2,), metres, that an example needs whose furniture
+    stands at the world's middle.
+    """
+    places = [
+        np.array([piece.matrix_basis @ Vector(corner) for corner in piece.bound_box])[:, :2] * unit
+        for piece in pieces
+    ]
+    walked = plan.route.path.position[:, :2]
+    places += [walked - _MARGIN, walked + _MARGIN]
+    every = np.concatenate(places)
+    return every.min(axis=0), every.max(axis=0)
 
 
 def _direct(

@@ -1,0 +1,103 @@
+"""How many clicks a first shot takes, from the menu to a kept take, and a walk that is made anew
+after the seat was moved.
+"""
+
+from pathlib import Path
+
+import bpy
+from first_shot import progress
+
+from kit.window import Driver, Waits
+
+__all__ = ["clicks"]
+
+_MOST = 12
+"""Clicks and keys of a first shot, at most; a typed word counts as one."""
+
+
+def _generated(user: Driver, takes: int) -> Waits:
+    """Press Generate, and wait for the take."""
+    yield from user.click("dafnet.generate(task='NEW')")
+    character = next(o for o in bpy.context.scene.objects if len(o.dafnet.walks) or o.dafnet.root)
+    yield from user.until(
+        lambda: progress() is None and len(character.dafnet.takes) == takes, "the take", 600.0
+    )
+
+
+def _kept(user: Driver, character: bpy.types.Object) -> Waits:
+    """Tick the box of the take that plays."""
+    yield from user.find("dafnet.play_take(index=0", across=0.08)
+    yield from user.click_near("dafnet.accepted", user.mouse[1])
+    assert character.dafnet.takes[0].action.dafnet.accepted, "kept with the mouse"
+
+
+def _example(user: Driver) -> Waits:
+    """The example of the Add menu beside the default cube."""
+    yield from user.menu("A", "Chair and Desk")
+    character = bpy.context.object
+    assert character is not None and character.type == "ARMATURE", "the example is added"
+    cube = bpy.data.objects["Cube"]
+    assert all(
+        abs(o.location.y) + abs(o.location.x) > 1.5 for o in character.dafnet.furniture.objects
+    )
+    assert cube.location.length == 0.0
+    yield from user.sidebar("DAFNet")
+    yield from _generated(user, 1)
+    yield from _kept(user, character)
+    yield from user.picture("first_take_of_the_example")
+    print(f"The example: {user.clicks} clicks", flush=True)
+    assert user.clicks <= _MOST
+
+
+def _own_room(user: Driver) -> Waits:
+    """A seat of one's own: sent there, generated, kept; then the seat is moved."""
+    with user.override():
+        bpy.ops.object.select_all(action="SELECT")
+        bpy.ops.object.delete()
+        bpy.ops.mesh.primitive_cylinder_add(radius=0.24, depth=0.45, location=(1.6, 1.2, 0.225))
+    stool = bpy.context.object
+    stool.name = "Stool"
+    bpy.ops.ed.undo_push(message="Room")
+    user.clicks = 0
+    yield from user.menu("A", "Add Character")
+    character = bpy.context.object
+    yield from user.sidebar("DAFNet")
+    user.select(stool)
+    yield 0.3
+    yield from user.click("dafnet.walk_to(goal='SEAT'")
+    assert len(character.dafnet.walks) == 1, "sent with the seat alone selected"
+    assert bpy.context.window_manager.dafnet_overlays.path, "the path is drawn at once"
+    yield from user.picture("path_of_a_walk")
+    yield from _generated(user, 1)
+    yield from _kept(user, character)
+    print(f"In one's own room: {user.clicks} clicks", flush=True)
+    assert user.clicks <= _MOST
+
+    before = user.clicks
+    assert bpy.context.object == stool, "the seat is still the active object"
+    stool.location.x -= 1.0
+    bpy.ops.ed.undo_push(message="Move")
+    yield from user.click("dafnet.redo_walk")
+    yield from user.until(lambda: progress() is None, "the walk")
+    end = character.dafnet.walks[0].last
+    bpy.context.scene.frame_set(end)
+    assert (character.dafnet.root.location.xy - stool.location.xy).length < 0.3, "to where it is"
+    yield from _generated(user, 2)
+    bpy.context.scene.frame_set(end)
+    pelvis = character.matrix_world @ character.pose.bones["pelvis"].head
+    assert (pelvis.xy - stool.location.xy).length < 0.3 and abs(pelvis.z - 0.57) < 0.1
+    assert user.clicks - before == 2
+    yield from user.picture("redone_walk")
+
+
+def clicks(pictures: Path) -> Waits:
+    """Count them."""
+    user = Driver(pictures)
+    yield from user.press("ESC")  # the splash screen
+    user.clicks = 0
+    yield from _example(user)
+    bpy.ops.wm.read_homefile(app_template="")
+    yield 0.5
+    user = Driver(pictures)
+    yield from user.press("ESC")
+    yield from _own_room(user)
