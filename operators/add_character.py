@@ -5,6 +5,7 @@ from bpy.props import FloatProperty, StringProperty
 
 from ..dafnet_addon.blender.character.armature import create_character
 from ..dafnet_addon.core.skeleton import STATURE
+from ..dafnet_addon.core.units import require_human_height
 from .base import DafnetOperator
 
 __all__ = ["DAFNET_OT_add_character"]
@@ -26,7 +27,7 @@ class DAFNET_OT_add_character(DafnetOperator, bpy.types.Operator):
         min=0.5,
         soft_min=1.4,
         soft_max=2.1,
-        max=4.0,
+        max=3000.0,
         description="Crown to sole, in metres",
     )
 
@@ -48,4 +49,5 @@ class DAFNET_OT_add_character(DafnetOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> None:
         """Add it."""
+        require_human_height(self.height, "A character")
         create_character(context, self.name, self.height, self.build)

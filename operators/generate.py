@@ -18,6 +18,7 @@ from ..dafnet_addon.blender.character.takes import active_take, draw_of, frames_
 from ..dafnet_addon.blender.overlay import display
 from ..dafnet_addon.blender.pipeline import job
 from ..dafnet_addon.blender.pipeline.running import running_job
+from ..dafnet_addon.blender.scene.unit_note import unit_note
 from ..dafnet_addon.core.errors import InputError
 from ..dafnet_addon.core.progress import run_to_end
 from .base import DafnetOperator, idle
@@ -124,6 +125,8 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
         unit = metres_per_unit(context.scene)
         for each in characters:
             bring_root_along(context.scene, each, each.dafnet.root, unit)
+        for note in {unit_note(context.scene, each) for each in characters} - {None}:
+            self.report({"WARNING"}, note)
         if self.task != "NEW" or len(characters) == 1:
             return [self._settings(context)]
         return job.distinct_seeds([job.settings_of(o, context.scene) for o in characters])

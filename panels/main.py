@@ -17,6 +17,7 @@ from ..dafnet_addon.blender.character.targets import (
 from ..dafnet_addon.blender.compat import action_curves
 from ..dafnet_addon.blender.live.listening import live_state
 from ..dafnet_addon.blender.pipeline.running import running_job
+from ..dafnet_addon.blender.scene.unit_note import unit_note
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.add_root import DAFNET_OT_add_root
 from ..operators.add_targets import DAFNET_OT_add_foot_targets, DAFNET_OT_add_targets
@@ -25,6 +26,7 @@ from ..operators.generate import DAFNET_OT_cancel, DAFNET_OT_generate
 from ..operators.live import DAFNET_OT_live
 from .live import draw_live
 from .presets import DAFNET_PT_presets
+from .sentences import draw_sentence
 
 __all__ = ["CharacterPanel", "DAFNET_PT_character", "DAFNET_PT_shot"]
 
@@ -83,6 +85,8 @@ class DAFNET_PT_character(bpy.types.Panel):
         row = layout.row()
         row.label(text=character.name, icon="ARMATURE_DATA", translate=False)
         row.operator(DAFNET_OT_add_character.bl_idname, text="", icon="ADD")
+        if note := unit_note(context.scene, character):
+            draw_sentence(layout.column(align=True), context, note, "ERROR", alert=True)
 
 
 class DAFNET_PT_shot(CharacterPanel, bpy.types.Panel):
@@ -97,6 +101,9 @@ class DAFNET_PT_shot(CharacterPanel, bpy.types.Panel):
         character: Any = character_of(context)
         settings = character.dafnet
         layout.row(align=True).prop(settings, "mode", expand=True)
+        does = settings.bl_rna.properties["mode"].enum_items[settings.mode].description
+        said = bpy.app.translations.pgettext_tip(does)
+        draw_sentence(layout.column(align=True), context, said, "NONE")
         layout.use_property_split = True
         layout.use_property_decorate = False
         animated = any(curve.data_path == "dafnet.mode" for curve in action_curves(character))

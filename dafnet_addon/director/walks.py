@@ -13,6 +13,7 @@ from ..core.root import forward_of
 from ..core.series import MODEL_FPS
 from ..core.solids import Box, Mesh
 from ..core.text import metres
+from ..core.units import FURNITURE, likely_unit
 from .room import HEAD_HIGH, KNEE_LOW
 from .surfaces import HeightField, boxes_of, height_field, parts_of_surfaces
 
@@ -341,10 +342,18 @@ def unit_doubt(
     if not too_small and not (len(judged) and judged.min() > _TALLEST):
         return None
 
-    return (
-        f"The scene is {metres(extent * size)} across: is its unit right? Scale it to the "
-        "character's size."
-    )
+    return f"The scene is {metres(extent * size)} across: is its unit right? {_remedy(judged)}"
+
+
+def _remedy(rises: np.ndarray) -> str:
+    """What to do about a scene of another unit, whose furniture rises so many metres (N,)."""
+    lowest = float(rises.min()) if len(rises) else 0.0
+    if lowest < FURNITURE[0]:
+        return "It looks 100 times too small; multiply its Unit Scale, or all of it, by 100."
+    if (unit := likely_unit(lowest, FURNITURE)) is None:
+        return "Scale it to the character's size."
+    name, size = unit
+    return f"It looks modelled in {name}; multiply its Unit Scale, or all of it, by {size:g}."
 
 
 def around(

@@ -654,15 +654,19 @@ def test_esc_ends_a_walk_and_leaves_the_scene_as_it_was(room: Room) -> None:
 def test_a_walk_among_furniture_of_another_unit_asks_for_it(room: Room, kind: str) -> None:
     room.ann.dafnet.furniture = room.furniture
     job = _walks(room)[kind]
-    sentence = "across: is its unit right? Scale it to the character's size."
+    sentence = "across: is its unit right? It looks "
     assert not any(sentence in warning for warning in run_to_end(job()).warnings)
-    for scale, size in ((100.0, "The scene is 95 m "), (0.01, "The scene is 0.0095 m ")):
+    remedy = "multiply its Unit Scale, or all of it, by"
+    for scale, size, said in (
+        (100.0, "The scene is 95 m ", f"modelled in centimetres; {remedy} 0.01."),
+        (0.01, "The scene is 0.0095 m ", f"100 times too small; {remedy} 100."),
+    ):
         room.chair.scale = (scale, scale, scale)
         room.chair.location = (200.0, 0.0, 0.0) if scale > 1.0 else (0.0, 0.0, 0.0)
         room.root.animation_data_clear()
         room.root.location = (0.0, 0.0, 0.0)
         (warning,) = run_to_end(job()).warnings
-        assert warning == f"{size}{sentence}"
+        assert warning == f"{size}{sentence}{said}"
     tower = room.box("Tower", (4.0, 4.0, 0.0), (30.0, 30.0, 60.0))
     room.chair.scale, room.chair.location = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
     room.root.animation_data_clear()

@@ -226,6 +226,9 @@ def test_a_scene_of_another_unit_is_doubted_by_what_stands_near():
         and unit_doubt(rug, way) is None
     )
     assert "is 610 m across: is its unit right?" in str(unit_doubt(_scaled(room, 100.0), way))
+    assert "modelled in centimetres" in str(unit_doubt(_scaled(room, 100.0), way))
+    assert "modelled in millimetres" in str(unit_doubt(_scaled(room, 1000.0), way))
+    assert "100 times too small" in str(unit_doubt(_scaled(room, 0.01), way))
     assert "is 1,220 m across" in str(unit_doubt(_scaled(room, 100.0), way, size=2.0))
     assert "is 0.061 m across: is its unit right?" in str(unit_doubt(_scaled(room, 0.01), way))
 

@@ -33,6 +33,7 @@ from .keys import key_control, key_object, rekey_rotation
 from .maps import RigMap, require_usable, with_bone_names_of
 from .preparation import overruled, prepare_rig
 from .reading import character_motion, pose_matrices, rigid_parts, shape_of
+from .sizing import require_rig_of_a_person
 
 __all__ = ["Baked", "bake_onto_rig", "frames_played"]
 
@@ -109,6 +110,7 @@ def bake_onto_rig(
 
     rig_map = with_bone_names_of(rig_map, rig.data.bones.keys()) if rig.mode != "EDIT" else rig_map
     require_usable(rig, rig_map)
+    require_rig_of_a_person(context.scene, rig, rig_map)
 
     controls = controls_of(rig, rig_map, limbs, root_motion == "BONE")
     recording = _record(context, character, rig, frames)

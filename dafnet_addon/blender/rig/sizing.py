@@ -8,11 +8,12 @@ import numpy as np
 from ...core.body import canonical_body
 from ...core.errors import InputError
 from ...core.skeleton import JOINTS, STATURE
+from ...core.units import PERSON, likely_unit, require_human_height
 from ..character.armature import character_scale, metres_per_unit
 from .maps import RigMap, require_usable, with_bone_names_of
 from .reading import rest_matrices, rigid_parts, shape_of
 
-__all__ = ["leg_ratio", "size_as_rig"]
+__all__ = ["leg_ratio", "require_rig_of_a_person", "size_as_rig"]
 
 
 def leg_ratio(rig: bpy.types.Object, rig_map: RigMap) -> float:
@@ -28,6 +29,16 @@ def leg_ratio(rig: bpy.types.Object, rig_map: RigMap) -> float:
     return shape_of(rig, rig_map, rest, scale).body.leg() / canonical_body(1.0).leg()
 
 
+def require_rig_of_a_person(scene: bpy.types.Scene, rig: bpy.types.Object, rig_map: RigMap) -> None:
+    """``InputError`` where a rig is so tall that its unit is not the scene's, with the likely
+    one.
+    """
+    height = leg_ratio(rig, rig_map) * metres_per_unit(scene) * STATURE
+    if (unit := likely_unit(height, PERSON)) is not None:
+        remedy = f"scale the armature object by {unit[1]:g}, or import it with that scale"
+        require_human_height(height, f"A person with the legs of '{rig.name}'", remedy)
+
+
 def size_as_rig(
     context: bpy.types.Context,
     character: bpy.types.Object,
@@ -41,6 +52,7 @@ def size_as_rig(
     keyed or driven.
     """
     wanted = leg_ratio(rig, rig_map)
+    require_rig_of_a_person(context.scene, rig, rig_map)
     factor = wanted / character_scale(character)
     data = character.animation_data
     curves = list(data.drivers) if data else []
