@@ -1,6 +1,5 @@
 """The character's takes: which there are, how good they are, and what can be done with them."""
 
-from textwrap import wrap
 from typing import Any
 
 import bpy
@@ -16,25 +15,23 @@ from ..operators.takes import (
     DAFNET_OT_reject_take,
 )
 from .main import CharacterPanel
+from .sentences import draw_sentence
 
 __all__ = ["DAFNET_PT_clean_up", "DAFNET_PT_takes", "DAFNET_UL_takes"]
 
 
-_LETTER = 8.0
-"""Pixels of a letter, more or less."""
-_SHORTEST = 20
-"""Letters of the shortest line of a sentence."""
 _NAME_WIDTH = 0.45
 """Share of a row that the name of a figure takes."""
 
 
-def _text(figure: float, factor: float = 1.0) -> str:
-    """A figure times ``factor``, or a dash where it is negative, which stands for none."""
-    return "–" if figure < 0 else f"{factor * figure:.2f}"
+_NONE = "\u2013"
+"""What stands for a figure that there is none of."""
+_FIGURES = {"slide_cm": "Feet slide, cm", "touching": "Touches, s", "miss_cm": "Misses, cm"}
+"""What the table says of each figure."""
 
 
-def _draw_figure(layout: bpy.types.UILayout, name: str, *values: str) -> None:
-    """Draw a row of the table: a name, and its values."""
+def _draw_names(layout: bpy.types.UILayout, name: str, *values: str) -> None:
+    """Draw the head of the table."""
     split = layout.split(factor=_NAME_WIDTH, align=True)
     split.label(text=name)
     row = split.row(align=True)
@@ -42,16 +39,18 @@ def _draw_figure(layout: bpy.types.UILayout, name: str, *values: str) -> None:
         row.label(text=value)
 
 
-def _draw_finding(layout: bpy.types.UILayout, finding: Any, context: bpy.types.Context) -> None:
-    """Draw a sentence, broken into lines that fit the region."""
-    width = context.region.width if context.region else 0
-    letter = _LETTER * context.preferences.system.ui_scale
-    lines = wrap(finding.text, max(_SHORTEST, round(width / letter)))
-    for k, line in enumerate(lines):
-        row = layout.row()
-        row.alert = not finding.good
-        icon = "BLANK1" if k else "CHECKMARK" if finding.good else "ERROR"
-        row.label(text=line, icon=icon, translate=False)
+def _draw_figure(layout: bpy.types.UILayout, figures: Any, name: str, words: str) -> None:
+    """Draw a row of the table, before and after the clean-up. The figures
+    are properties, since these have tooltips.
+    """
+    split = layout.split(factor=_NAME_WIDTH, align=True)
+    split.label(text=words)
+    row = split.row(align=True)
+    for each in (f"raw_{name}", name):
+        if getattr(figures, each) < 0.0:
+            row.label(text=_NONE, translate=False)
+        else:
+            row.prop(figures, each, text="", emboss=False)
 
 
 class DAFNET_UL_takes(bpy.types.UIList):
@@ -131,7 +130,8 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
         figures = take.dafnet
         column = layout.column(align=True)
         for finding in figures.verdict:
-            _draw_finding(column, finding, context)
+            icon = "CHECKMARK" if finding.good else "ERROR"
+            draw_sentence(column, context, finding.text, icon, alert=not finding.good)
 
         layout.label(
             text=(
@@ -139,14 +139,10 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
                 f"{figures.temperature:.2f}"
             )
         )
-        layout.label(text=f"Likelihood {figures.log_likelihood:.0f} nats per frame")
-
         table = layout.column(align=True)
-        _draw_figure(table, "", "Raw", "Cleaned")
-        _draw_figure(table, "Sliding feet", _text(figures.raw_sliding), _text(figures.sliding))
-        _draw_figure(table, "Collisions", _text(figures.raw_collisions), _text(figures.collisions))
-        _draw_figure(table, "Miss, cm", _text(figures.raw_miss, 100), _text(figures.miss, 100))
-        _draw_figure(table, "Jerk, m/s³", _text(figures.raw_jerk), _text(figures.jerk))
+        _draw_names(table, "", "Raw", "Cleaned")
+        for name, words in _FIGURES.items():
+            _draw_figure(table, figures, name, words)
 
         row = layout.row(align=True)
         row.operator(

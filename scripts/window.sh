@@ -20,7 +20,6 @@ mkdir "$work/drive/rigs"
 for rig in mixamo_gltf_woman vrm_b; do
     if [[ -n ${RIGS:-} ]]; then cp "$RIGS/$rig.json" "$work/drive/rigs/"; fi
 done
-read -ra parts <<<"${PARTS:-}"
 mkdir -p "$work/profile/extensions/user_default" "$work/pictures"
 inside=${work#"$debian"}
 run=(env HOME="$inside" BLENDER_USER_RESOURCES="$inside/profile" LIBGL_ALWAYS_SOFTWARE=1)

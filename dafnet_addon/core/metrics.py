@@ -15,6 +15,7 @@ import numpy as np
 from .root import RootPath
 from .series import MODEL_FPS, runs
 from .skeleton import END_EFFECTORS, FEET, PARENTS, PELVIS, SEAT_TO_PELVIS, TOE_HEIGHT, joint
+from .sliding import slides
 
 __all__ = [
     "BAD_COLLISION_JOINTS",
@@ -307,9 +308,11 @@ def motion_metrics(
     cannot be said (no furniture, no targets) is None.
     """
     collisions: float | None = None
+    touching: float | None = None
     depth: tuple[float, float] | tuple[None, None] = (None, None)
     if distance is not None:
-        collisions = float(bad_collisions(distance(joints[:, list(BAD_COLLISION_JOINTS)])).mean())
+        counts = bad_collisions(distance(joints[:, list(BAD_COLLISION_JOINTS)]))
+        collisions, touching = float(counts.mean()), float((counts > 0).sum() / fps)
         depth = penetration(distance(body_points(joints)))
 
     error = end_effector_distance(joints, targets or {})
@@ -317,7 +320,9 @@ def motion_metrics(
         "foot_sliding_per_frame": float(foot_sliding(joints, fps, floor).mean()),
         "foot_sliding_4mm_s": float(foot_sliding(joints, fps, floor, per_frame=False).mean()),
         "skate_cm": skate(joints, fps, floor),
+        "slide_max": float(slides(joints, fps, floor).max(initial=0.0)),
         "bad_collisions_per_frame": collisions,
+        "bad_collision_seconds": touching,
         "penetration_mean": depth[0],
         "penetration_max": depth[1],
         "end_effector_error": None if np.isnan(error) else error,

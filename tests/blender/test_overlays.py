@@ -421,8 +421,8 @@ def test_the_path_is_drawn_once_a_walk_is_keyed_unless_it_was_turned_off(shot: S
 
 def test_faulty_frames_are_marked_and_unmarked(shot: Shot) -> None:
     joints = standing(30)
-    joints[10:15, [10, 11], 1] += 0.02 * np.arange(1, 6)[:, None]
-    joints[15:, [10, 11], 1] += 0.1
+    joints[6:15, [10, 11], 1] += 0.02 * np.arange(1, 10)[:, None]
+    joints[15:, [10, 11], 1] += 0.18
     action = shot.add(joints, start=11)
     for frame, x in ((11, -0.4), (30, -0.4), (31, joints[0, 4, 0])):  # onto the left knee
         shot.cube.location = (x, 0.0, joints[0, 4, 2])
@@ -432,12 +432,12 @@ def test_faulty_frames_are_marked_and_unmarked(shot: Shot) -> None:
     assert bpy.ops.dafnet.mark_frames() == {"FINISHED"}
     shown = display.shown_faults(action)
     assert shot.scene.frame_current == 17
-    assert np.flatnonzero(shown.sliding).tolist() == list(range(10, 15)) and set(
-        shown.sliding[10:15]
+    assert np.flatnonzero(shown.sliding).tolist() == list(range(5, 15)) and set(
+        shown.sliding[5:15]
     ) == {2}
     assert shown.collisions[:19].max() == 0 and shown.collisions[20:].min() >= 1
     bars = faults.fault_bars(shown, 11)
-    assert bars.first[0] == 21 and bars.last[0] == 25 and bars.row[0] == 0
+    assert bars.first[0] == 16 and bars.last[0] == 25 and bars.row[0] == 0
     assert (
         bars.first[1] == 31
         and bars.last[bars.row == 1].max() == 40

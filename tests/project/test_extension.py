@@ -234,6 +234,7 @@ THE_SAME = {"DAFNet", "DAFNet Rig", "EE", "FREE", "FULL"}
 
 UNSEEN = {
     *("Collisions before", "Convention", "Jerk before", "Miss before", "Row", "Sliding before"),
+    *("Slide before", "Touching before"),
     *("Task", "This"),
 }
 """Names of properties that no panel shows by them."""

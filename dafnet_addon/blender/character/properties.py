@@ -87,8 +87,52 @@ class TakeSettings(bpy.types.PropertyGroup):
             "How likely the model finds its poses, in nats per frame; higher is more typical"
         ),
     )
+    slide_cm: FloatProperty(
+        name="Slide, cm",
+        options=set(),
+        precision=1,
+        description=(
+            "How far a foot slides over the floor at most, in centimetres; landing and rolling off "
+            "do not count. From 2 on it is seen"
+        ),
+    )
+    touching: FloatProperty(
+        name="Touching, s",
+        options=set(),
+        precision=1,
+        description="For how many seconds trunk, head, elbows or knees touch furniture",
+    )
+    miss_cm: FloatProperty(
+        name="Miss, cm",
+        options=set(),
+        precision=1,
+        description="How far head and hands are from their targets on average, in centimetres",
+    )
+    raw_slide_cm: FloatProperty(
+        name="Slide before",
+        options=set(),
+        precision=1,
+        description="How far a foot slid at most before the clean-up, in centimetres",
+    )
+    raw_touching: FloatProperty(
+        name="Touching before",
+        options=set(),
+        precision=1,
+        description="For how many seconds the body touched furniture before the clean-up",
+    )
+    raw_miss_cm: FloatProperty(
+        name="Miss before",
+        options=set(),
+        precision=1,
+        description="How far head and hands were from their targets before the clean-up, in cm",
+    )
     sliding: FloatProperty(
-        name="Sliding", options=set(), description="Sliding feet per frame, 0 to 2"
+        name="Sliding",
+        options=set(),
+        description=(
+            "Low feet that move per frame, 0 to 2, as papers count them: landing and rolling off "
+            "count as well"
+        ),
     )
     collisions: FloatProperty(
         name="Collisions", options=set(), description="Joints that touch furniture, per frame"

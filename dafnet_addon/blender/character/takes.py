@@ -33,12 +33,15 @@ PACKED = "dafnet_take"
 _STATURE = 1.7
 """Metres by which ``end_effector_error`` is divided, so that it does not depend on size."""
 _METRICS = {
-    "sliding": "foot_sliding_per_frame",
-    "collisions": "bad_collisions_per_frame",
-    "miss": "end_effector_error",
-    "jerk": "jerk",
+    "sliding": ("foot_sliding_per_frame", 1.0),
+    "collisions": ("bad_collisions_per_frame", 1.0),
+    "miss": ("end_effector_error", _STATURE),
+    "jerk": ("jerk", 1.0),
+    "slide_cm": ("slide_max", 100.0),
+    "touching": ("bad_collision_seconds", 1.0),
+    "miss_cm": ("end_effector_error", 100.0 * _STATURE),
 }
-"""The metrics of a take by the names of an action's settings."""
+"""The metrics of a take by the names of an action's settings, and by what each is multiplied."""
 _unpacked: dict[int, tuple[int, tuple[Take, Controls]]] = {}
 """The take unpacked last, by its action's pointer, with a hash of what was unpacked."""
 
@@ -63,9 +66,8 @@ def add_take(
     facts.held = draw.held
     facts.log_likelihood = take.log_likelihood
     for prefix, metrics in (("", take.metrics), ("raw_", take.raw_metrics)):
-        for name, metric in _METRICS.items():
+        for name, (metric, factor) in _METRICS.items():
             value = metrics.get(metric)
-            factor = _STATURE if name == "miss" else 1.0
             setattr(facts, prefix + name, -1.0 if value is None else value * factor)
 
     facts.verdict.clear()

@@ -7,9 +7,10 @@ import bpy
 import numpy as np
 
 from ...core.distance import prepared, scaled
-from ...core.metrics import BAD_COLLISION_JOINTS, bad_collisions, foot_sliding
+from ...core.metrics import BAD_COLLISION_JOINTS, bad_collisions
 from ...core.nearby import REACH_OF_A_BODY, solids_near
 from ...core.occupancy import distance
+from ...core.sliding import SEEN, slides
 from ..character.settings import settings_of
 from ..character.takes import frames_of, stored_take
 from ..scene.scene_reader import read_scene
@@ -72,7 +73,7 @@ def faults_of(
         solids, _ = prepared(scaled(near, 1.0 / take.scale), float(np.median(floor)))
         apart = distance(solids, joints[:, list(BAD_COLLISION_JOINTS)], floor)
         found[action.session_uid] = Faults(
-            foot_sliding(joints, take.fps, floor), bad_collisions(apart)
+            (slides(joints, take.fps, floor) > SEEN).sum(axis=1), bad_collisions(apart)
         )
 
     return found
