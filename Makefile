@@ -35,7 +35,7 @@ lint: .venv/.test
 	.venv/bin/python -m ruff format --check .
 	scripts/typecheck.sh .venv/bin/python
 
-zip: setup
+zip: .venv/.test
 	scripts/build_zip.sh .venv/bin/python
 
 # build/release: the zip, its checksum, what it consists of, what has changed. VERSION=0.2.0 sets the version and cuts the changelog

@@ -1,5 +1,6 @@
 """What the animator sees. Panels draw and change nothing."""
 
+from .help import DAFNET_PT_help
 from .main import DAFNET_PT_character, DAFNET_PT_shot
 from .overlays import DAFNET_PT_overlays
 from .presets import DAFNET_MT_presets, DAFNET_PT_presets
@@ -29,4 +30,5 @@ CLASSES = (
     DAFNET_PT_takes,
     DAFNET_PT_clean_up,
     DAFNET_PT_overlays,
+    DAFNET_PT_help,
 )

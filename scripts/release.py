@@ -24,7 +24,7 @@ from typing import Any
 
 ROOT = Path(__file__).absolute().parents[1]
 WEIGHTS = "weights_stub/dafnet.safetensors"
-OURS = {".py", ".toml", ".json", ".md", ".png", ".safetensors", ""}
+OURS = {".py", ".toml", ".json", ".md", ".html", ".png", ".safetensors", ""}
 """Ends of the names that the zip consists of: sources, tables, pages, pictures, weights, LICENSE.
 """
 

@@ -49,7 +49,8 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
     del config
     name = page.file.src_uri
     source = ROOT / ELSEWHERE[name] if name in ELSEWHERE else DOCS / name
-    return for_the_site(markdown, source, name, {file.src_uri for file in files})
+    there = {file.src_uri for file in files if file.inclusion.is_included()}
+    return for_the_site(markdown, source, name, there)
 
 
 def for_the_site(markdown: str, source: Path, name: str, there: set[str]) -> str:

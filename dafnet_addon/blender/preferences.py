@@ -5,12 +5,14 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-__all__ = ["ADDON", "Preferences", "register", "unregister", "weights_path"]
+__all__ = ["ADDON", "Preferences", "draw_help", "register", "unregister", "weights_path"]
 
 ADDON = (__package__ or "").removesuffix(".dafnet_addon.blender")
 """The name by which Blender knows the extension."""
 
-_GUIDE = Path(__file__).parents[2] / "docs" / "guide.md"
+_ROOT = Path(__file__).parents[2]
+_GUIDES = (_ROOT / "pages" / "guide.html", _ROOT / "docs" / "guide.md")
+"""The guide as a page, where the extension was built with its pages, and its source."""
 
 
 class Preferences(bpy.types.AddonPreferences):
@@ -30,10 +32,14 @@ class Preferences(bpy.types.AddonPreferences):
         """Draw the settings."""
         self.layout.use_property_split = True
         self.layout.prop(self, "weights")
-        self.layout.operator("wm.path_open", text="Open the Guide", icon="HELP").filepath = str(
-            _GUIDE
-        )
-        self.layout.operator("dafnet.copy_report", icon="COPYDOWN")
+        draw_help(self.layout)
+
+
+def draw_help(layout: bpy.types.UILayout) -> None:
+    """Draw the ways to help: the guide, and a report to ask with."""
+    guide = next((file for file in _GUIDES if file.exists()), _GUIDES[-1])
+    layout.operator("wm.path_open", text="Open the Guide", icon="HELP").filepath = str(guide)
+    layout.operator("dafnet.copy_report", icon="TEXT")
 
 
 def weights_path(context: bpy.types.Context) -> str | None:

@@ -1,6 +1,7 @@
 """What somebody who is to help has to know, as text: versions, settings, figures and warnings."""
 
 import platform
+import re
 from dataclasses import asdict
 
 import bpy
@@ -13,7 +14,10 @@ from .character.settings import settings_of
 from .character.takes import draw_of, played_take, stored_take
 from .preferences import weights_path
 
-__all__ = ["report_text"]
+__all__ = ["report_text", "write_report"]
+
+_TEXT = "DAFNet Report"
+"""The name of the text block."""
 
 _WORDS = ("mode", "noise")
 """Settings whose text is a word of the interface, not a name of the user's."""
@@ -48,6 +52,14 @@ def report_text(context: bpy.types.Context, armature: bpy.types.Object | None) -
     return "\n".join([*lines, *_take(armature)])
 
 
+def write_report(context: bpy.types.Context, armature: bpy.types.Object | None) -> bpy.types.Text:
+    """The report in a text block of the file, in place of an earlier one."""
+    said = report_text(context, armature)
+    text = bpy.data.texts.get(_TEXT) or bpy.data.texts.new(_TEXT)
+    text.from_string(said)
+    return text
+
+
 def _weights(context: bpy.types.Context) -> str:
     try:
         weights = load_weights(weights_path(context))
@@ -63,4 +75,13 @@ def _take(armature: bpy.types.Object) -> list[str]:
     take, _ = stored_take(action)
     measured = sorted(item for item in take.metrics.items() if item[1] is not None)
     figures = ", ".join(f"{name} {value:.4g}" for name, value in measured)
-    return [f"Take: {draw_of(action)}", f"{len(take)} frames, {figures}", *take.warnings]
+    return [
+        f"Take: {draw_of(action)}",
+        f"{len(take)} frames, {figures}",
+        *(_nameless(each) for each in take.warnings),
+    ]
+
+
+def _nameless(sentence: str) -> str:
+    """A warning without the names of objects that are quoted in it."""
+    return re.sub(r"'[^']*'", "'\u2026'", sentence)

@@ -1,10 +1,16 @@
 """The report that issues ask for."""
 
+from dataclasses import replace
+
 import bpy
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender import report
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.takes import stored_take
 from bl_ext.user_default.dafnet.dafnet_addon.blender.report import report_text
+from bl_ext.user_default.dafnet.panels.help import DAFNET_PT_help
 
 from dafnet_addon.core.manifest import current_version
+from kit.panels import drawn_by
 from kit.stage import Stage
 
 
@@ -35,5 +41,26 @@ def test_it_is_given_without_a_character_and_with_weights_that_are_none(stage: S
         own.weights = ""
 
 
-def test_it_is_copied(stage: Stage) -> None:
-    assert bpy.ops.dafnet.copy_report() == {"FINISHED"}
+def test_it_is_written_into_one_text(stage: Stage) -> None:
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
+    for _ in range(2):
+        assert bpy.ops.dafnet.copy_report() == {"FINISHED"}
+    (text,) = bpy.data.texts
+    said = text.as_string()
+    assert text.name == "DAFNet Report" and "10 frames" in said and bpy.app.version_string in said
+
+
+def test_warnings_lose_the_names_in_them(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert bpy.ops.dafnet.generate() == {"FINISHED"}
+    take, controls = stored_take(stage.ann.dafnet.takes[0].action)
+    take = replace(take, warnings=("'Secret Ground' is 2 km across.",))
+    monkeypatch.setattr(report, "stored_take", lambda _action: (take, controls))
+    said = report_text(bpy.context, stage.ann)
+    assert "is 2 km across." in said and "Secret" not in said
+
+
+def test_help_is_in_the_tab_without_a_character_too(blender: object) -> None:
+    assert DAFNET_PT_help.poll(bpy.context)
+    assert {"wm.path_open", "dafnet.copy_report"} <= set(
+        drawn_by(DAFNET_PT_help, bpy.context).words()
+    )

@@ -33,6 +33,7 @@ SHIPPED = {
     "LICENSE-WEIGHTS.md",
     "README.md",
     "docs",
+    "pages",
 }
 LEFT_OUT = {"model", "data", "training", "baselines"}
 PACKAGES = ("core", "director", "batch", "blender")
@@ -113,6 +114,23 @@ def test_the_zip_holds_what_an_animator_needs(zipped: Path) -> None:
     for package in (*(f"dafnet_addon/{part}" for part in PACKAGES), "operators", "panels"):
         assert {str(path.relative_to(ROOT)) for path in (ROOT / package).rglob("*.py")} <= shipped
     assert any(name.parts[0] == "weights_stub" and name.suffix == ".safetensors" for name in names)
+
+
+def test_the_guide_goes_along_as_pages() -> None:
+    """What scripts/build_zip.sh builds opens from a disk: its links and pictures are in the zip."""
+    pytest.importorskip("mkdocs")
+    pytest.importorskip("bpy")
+    subprocess.run([ROOT / "scripts" / "build_zip.sh", sys.executable], check=True, cwd=ROOT)
+    with zipfile.ZipFile(next((ROOT / "build").glob("dafnet-*.zip"))) as archive:
+        names = set(archive.namelist())
+        pages = {name: archive.read(name).decode() for name in names if name.endswith(".html")}
+    assert {"pages/guide.html", "pages/tasks.html", "pages/reference/operators.html"} <= set(pages)
+    assert sum(map(len, pages.values())) < 400_000, "lean"
+    for name, text in pages.items():
+        assert "<h1" in text
+        for target in re.findall(r'(?:src|href)="([^"#:]+)', text):
+            path = os.path.normpath(PurePosixPath(name).parent / target)
+            assert path in names, (name, target)
 
 
 def test_it_installs_generates_and_goes_without_a_word(zipped: Path, tmp_path: Path) -> None:
@@ -224,7 +242,7 @@ def _is_table(node: ast.stmt) -> TypeGuard[ast.Assign]:
 
 
 BLENDERS_OWN = {
-    *("Action", "End", "FK", "Head", "Height", "IK", "Name", "Next", "Object", "Preset"),
+    *("Action", "End", "FK", "Head", "Height", "Help", "IK", "Name", "Next", "Object", "Preset"),
     *("Previous", "Sensor", "Speed", "Start", "Step"),
 }
 """Words that Blender translates itself."""
