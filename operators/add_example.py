@@ -6,6 +6,7 @@ import bpy
 from bpy.props import EnumProperty
 
 from ..dafnet_addon.blender.showcase.examples import EXAMPLES, add_example
+from ..dafnet_addon.blender.translations import translated_tip
 from .base import DafnetOperator, idle
 
 __all__ = ["DAFNET_OT_add_example"]
@@ -26,10 +27,9 @@ class DAFNET_OT_add_example(DafnetOperator, bpy.types.Operator):
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: Any) -> str:
         """The example's own tooltip."""
-        return (
-            f"{EXAMPLES[properties.kind].description}: furniture at the 3D cursor and a "
-            "character, ready to generate"
-        )
+        does = translated_tip(EXAMPLES[properties.kind].description)
+        gives = translated_tip("furniture at the 3D cursor and a character, ready to generate")
+        return f"{does}: {gives}"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

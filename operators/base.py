@@ -29,8 +29,15 @@ def reported(operator: bpy.types.Operator) -> Iterator[None]:
 class DafnetOperator:
     """An operator whose ``run`` does all its work at once.
 
-    Mixed into ``bpy.types.Operator``, before it.
+    Mixed into ``bpy.types.Operator``, before it. An operator's docstring is its tooltip, in one
+    line, as it is translated.
     """
+
+    bl_description: str
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        cls.bl_description = " ".join((cls.__doc__ or "").split())
 
     def run(self, context: bpy.types.Context) -> None:
         """Do it; an ``InputError`` or ``WeightsError`` says to the user why it cannot be done."""

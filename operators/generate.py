@@ -19,6 +19,7 @@ from ..dafnet_addon.blender.overlay import display
 from ..dafnet_addon.blender.pipeline import job
 from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.blender.scene.unit_note import unit_note
+from ..dafnet_addon.blender.translations import translated_tip
 from ..dafnet_addon.core.errors import InputError
 from ..dafnet_addon.core.progress import run_to_end
 from .base import DafnetOperator, idle
@@ -79,11 +80,10 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: Any) -> str:
         """The task's own tooltip."""
-        return (
-            ""
-            if properties.task == "NEW"
-            else cls.bl_rna.properties["task"].enum_items[properties.task].description
-        )
+        if properties.task == "NEW":
+            return ""
+        does = cls.bl_rna.properties["task"].enum_items[properties.task].description
+        return translated_tip(does)
 
     def _settings(self, context: bpy.types.Context) -> job.Settings:
         """The character's settings, and what the task changes in them."""

@@ -18,6 +18,7 @@ from ..dafnet_addon.blender.compat import action_curves
 from ..dafnet_addon.blender.live.listening import live_state
 from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.blender.scene.unit_note import unit_note
+from ..dafnet_addon.blender.translations import translated_tip
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.add_root import DAFNET_OT_add_root
 from ..operators.add_targets import DAFNET_OT_add_foot_targets, DAFNET_OT_add_targets
@@ -102,8 +103,7 @@ class DAFNET_PT_shot(CharacterPanel, bpy.types.Panel):
         settings = character.dafnet
         layout.row(align=True).prop(settings, "mode", expand=True)
         does = settings.bl_rna.properties["mode"].enum_items[settings.mode].description
-        said = bpy.app.translations.pgettext_tip(does)
-        draw_sentence(layout.column(align=True), context, said, "NONE")
+        draw_sentence(layout.column(align=True), context, translated_tip(does), "NONE")
         layout.use_property_split = True
         layout.use_property_decorate = False
         animated = any(curve.data_path == "dafnet.mode" for curve in action_curves(character))

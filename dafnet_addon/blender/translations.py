@@ -1,10 +1,12 @@
 """The add-on's words in other languages; Blender shows them where its interface is translated. A
-language is one table here.
+language is one table of labels here and one of tooltips.
 """
 
 import bpy
 
-__all__ = ["register", "unregister"]
+from .german_tooltips import TOOLTIPS as _GERMAN_TOOLTIPS
+
+__all__ = ["register", "translated_tip", "unregister"]
 
 _GERMAN = {
     "Add a character first": "Zuerst eine Figur hinzufügen",
@@ -191,8 +193,13 @@ _GERMAN = {
 }
 
 
-_LANGUAGES = {"de_DE": _GERMAN}
+_LANGUAGES = {"de_DE": _GERMAN | _GERMAN_TOOLTIPS}
 """The tables by Blender's names of their languages."""
+
+
+def translated_tip(sentence: str) -> str:
+    """A tooltip in the language of Blender's tooltips, for those that Blender takes as they are."""
+    return str(bpy.app.translations.pgettext_tip(sentence))
 
 
 def register() -> None:

@@ -120,7 +120,7 @@ def test_operators_say_what_they_do_and_their_base_reports(file: Path) -> None:
 def test_nothing_names_the_data_beside_the_repository() -> None:
     for file in [
         *sources(*FOLDERS),
-        *(ROOT / "scripts").glob("*"),
+        *(file for file in (ROOT / "scripts").rglob("*.*") if "__pycache__" not in file.parts),
         ROOT / "Makefile",
         ROOT / "README.md",
     ]:
