@@ -424,8 +424,32 @@ TOOLTIPS = {
     "Sit on a table or a desk as well, if that is selected": (
         "Sich auch auf einen Tisch oder Schreibtisch setzen, wenn der gewählt ist"
     ),
-    "Move a seat out that is tucked under a table, so that the character fits": (
-        "Einen Sitz hervorziehen, der unter einem Tisch steht, damit die Figur Platz hat"
+    "A seat that is tucked under a table, so that the character fits": (
+        "Ein Sitz, der unter einem Tisch steht, damit die Figur Platz hat"
+    ),
+    "Say by how far it has to come out, and do nothing": (
+        "Sagen, wie weit er hervor muss, und nichts tun"
+    ),
+    "Move it out": "Ihn hervorziehen",
+    "Key its location: it comes out before the character is near": (
+        "Seine Position mit Keys versehen: er kommt hervor, ehe die Figur nahe ist"
+    ),
+    (
+        "Keep where one sits on the piece, as the custom property OMI_seat, which glTF files "
+        "take along; it counts the next time"
+    ): (
+        "Am Möbel merken, wo man sitzt, als eigene Eigenschaft OMI_seat, die glTF-Dateien "
+        "mitnehmen; das nächste Mal zählt sie"
+    ),
+    "How long it stays there, in seconds": "Wie lange sie dort bleibt, in Sekunden",
+    (
+        "Walk to the selected bed or sofa, sit down on its edge and lie down: root, targets "
+        "and modes are keyed from the start of the range on. Keys that you have edited are "
+        "kept in an action of their own"
+    ): (
+        "Zum gewählten Bett oder Sofa gehen, sich auf die Kante setzen und hinlegen: Wurzel, "
+        "Ziele und Modi bekommen Keys vom Anfang des Bereichs an. Keys, die du bearbeitet "
+        "hast, bleiben in einer eigenen Aktion"
     ),
     (
         "Make the chosen walk anew, and those after it: to where its seat is now, from where "

@@ -26,7 +26,7 @@ def _generated(user: Driver, takes: int) -> Waits:
 
 def _kept(user: Driver, character: bpy.types.Object) -> Waits:
     """Tick the box of the take that plays."""
-    yield from user.find("dafnet.play_take(index=0", across=0.08)
+    yield from user.find("dafnet.play_take(", across=0.1)
     yield from user.click_near("dafnet.accepted", user.mouse[1])
     assert character.dafnet.takes[0].action.dafnet.accepted, "kept with the mouse"
 
