@@ -125,8 +125,9 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
         unit = metres_per_unit(context.scene)
         for each in characters:
             bring_root_along(context.scene, each, each.dafnet.root, unit)
-        for note in {unit_note(context.scene, each) for each in characters} - {None}:
-            self.report({"WARNING"}, note)
+        for note in {unit_note(context.scene, each) for each in characters}:
+            if note is not None:
+                self.report({"WARNING"}, note)
         if self.task != "NEW" or len(characters) == 1:
             return [self._settings(context)]
         return job.distinct_seeds([job.settings_of(o, context.scene) for o in characters])
