@@ -599,6 +599,24 @@ TOOLTIPS = {
         "Die Bewegung, die die Figur spielt, samt deinen Bearbeitungen, in eine neue Aktion "
         "auf dieser Armatur backen"
     ),
+    (
+        "Let the character follow while you drag its root and its targets; again, or Esc, "
+        "puts everything back, but for what was recorded"
+    ): (
+        "Die Figur folgen lassen, während du ihre Wurzel und ihre Ziele ziehst; noch einmal, "
+        "oder Esc, stellt alles zurück, außer was aufgenommen wurde"
+    ),
+    (
+        "Draw a way on the floor with the left mouse button, which the root is led along; "
+        "again to drag and select as ever"
+    ): (
+        "Mit der linken Maustaste einen Weg auf den Boden zeichnen, den die Wurzel "
+        "entlanggeführt wird; noch einmal, um wie sonst zu ziehen und zu wählen"
+    ),
+    ("Keep what is played from now on as a take; again to stop. Takes are made when Live ends"): (
+        "Was von jetzt an gespielt wird, als Take behalten; noch einmal hält an. Takes "
+        "entstehen, wenn Live endet"
+    ),
     ("The spheres around the root that furniture occupies now: all that the network sees of it"): (
         "Die Kugeln um die Wurzel, die Möbel jetzt belegen: alles, was das Netz davon sieht"
     ),

@@ -11,6 +11,7 @@ import os
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -53,10 +54,14 @@ def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> 
 
 @pytest.fixture
 def blender() -> ModuleType:
-    """The module ``bpy`` with an empty scene."""
+    """The module ``bpy`` with an empty scene, and nothing drawn over it."""
     import bpy
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    display: Any = importlib.import_module(f"{EXTENSION}.dafnet_addon.blender.overlay.display")
+    for kind in display.switched_on():
+        display.switch(kind, False)
+    display._declined.clear()
     return bpy
 
 
