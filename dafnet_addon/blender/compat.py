@@ -1,7 +1,8 @@
 """Everything in which Blender 4.2, 4.5, 5.0 and 5.2 differ for this add-on.
 
 Actions have slots from 4.4 on, and ``Action.fcurves`` is gone in 5.0; images and video are
-media types of their own from 5.0 on.
+media types of their own from 5.0 on; what a modifier gives to its node group is properties of its
+own from 5.2 on.
 """
 
 from collections.abc import Callable
@@ -17,6 +18,7 @@ __all__ = [
     "animated_paths",
     "remove_curves",
     "shares_curves",
+    "node_inputs",
     "node_tree_of",
     "output_image",
     "output_numbers",
@@ -155,6 +157,20 @@ def shares_curves(owner: bpy.types.ID, other: bpy.types.ID) -> bool:
     if mine is None or theirs is None or mine.action is None or theirs.action != mine.action:
         return False
     return not _SLOTS or theirs.action_slot_handle == mine.action_slot_handle
+
+
+def node_inputs(modifier: bpy.types.NodesModifier) -> list[Any]:
+    """The values that a modifier gives to its node group."""
+    if bpy.app.version < (5, 2, 0):
+        return list(modifier.values())
+
+    inputs = modifier.properties.inputs
+    sockets = [
+        getattr(inputs, kind.identifier)
+        for kind in inputs.bl_rna.properties
+        if kind.type == "POINTER" and kind.identifier != "rna_type"
+    ]
+    return [socket.value for socket in sockets if hasattr(socket, "value")]
 
 
 def node_tree_of(material: bpy.types.Material) -> bpy.types.NodeTree:

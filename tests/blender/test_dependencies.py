@@ -234,7 +234,11 @@ def shaped_by_nodes(stage: Stage, prop: Any) -> None:
     tree.links.new(nodes[0].outputs[0], nodes[1].inputs[0])
     modifier = prop.modifiers.new("Nodes", "NODES")
     modifier.node_group = tree
-    modifier[tree.interface.items_tree["Object"].identifier] = stage.ann
+    socket = tree.interface.items_tree["Object"].identifier
+    if bpy.app.version < (5, 2, 0):
+        modifier[socket] = stage.ann
+    else:
+        getattr(modifier.properties.inputs, socket).value = stage.ann
 
 
 def shaped_inside_nodes(stage: Stage, prop: Any) -> None:

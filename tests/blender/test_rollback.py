@@ -99,7 +99,7 @@ def _traced(visit: Callable[[Place, str], None]) -> Iterator[None]:
     is as if it raised.
     """
     writing = {
-        "job.py": {"_bake_steps"},
+        "job.py": {"bake_steps"},
         "baker.py": None,
         "takes.py": None,
         "curves.py": None,
@@ -173,7 +173,7 @@ def test_a_failure_at_any_write_leaves_the_file_as_it_was(
     settings = job.settings_of(armature, blender.context.scene)
 
     def bake() -> None:
-        for _ in job._bake_steps(settings, made, controls, draws):
+        for _ in job.bake_steps(settings, made, controls, draws):
             blender.context.view_layer.update()
 
     before = everything(blender, armature)

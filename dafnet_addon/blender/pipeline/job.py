@@ -258,7 +258,7 @@ def bake_steps(
             if len(names) < len(takes):
                 yield len(names) / len(takes)
 
-        actions = [find_action(name) for name in names]
+        actions = list(map(find_action, names))
         play_take(armature, actions[0])
         undo.pop_all()
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import bpy
 
-from ..compat import animated_paths
+from ..compat import animated_paths, node_inputs
 
 __all__ = ["Dependencies", "Simulation"]
 
@@ -276,7 +276,7 @@ def _effective(blocks: Iterable[Any], owner: bpy.types.Object) -> Iterator[Any]:
 
 def _pointers(block: bpy.types.bpy_struct, depth: int) -> Iterator[bpy.types.ID]:
     """The datablocks that a block's properties point to, including its inputs of a node group."""
-    for each in block.values() if isinstance(block, bpy.types.NodesModifier) else ():
+    for each in node_inputs(block) if isinstance(block, bpy.types.NodesModifier) else ():
         if isinstance(each, bpy.types.ID):
             yield each
 
