@@ -26,6 +26,7 @@ _SEATS = 0.22  # metres of a top over the floor, from where on one is to sit on 
 _DEEP = 0.05  # metres of a body's bones in something hard: its flesh is past it
 _BRIEF = 0.2  # seconds of what is hardly seen
 _SLIDES = 0.06  # metres that a standing foot moves; of captured walkers, as they roll off, 5 cm
+_ROLLS = 0.2  # metres a second of a foot that comes down or rolls off
 _USUAL_TOP = 0.45  # metres over the floor
 _UNNAMED = "the furniture"
 _PER_BONE = 4
@@ -122,10 +123,20 @@ def _part_of(point: int) -> str:
     return f"{side} {_PARTS[name]}".strip()
 
 
+def _slid(places: np.ndarray, fps: float) -> float:
+    """Metres that a foot moves while it stands at places (T, 2), but for how it comes down at first
+    and rolls off at last, which is a part of it at rates that are lower than the model's.
+    """
+    slow = np.flatnonzero(np.linalg.norm(np.gradient(places, axis=0), axis=-1) * fps < _ROLLS)
+    if len(slow) and slow[-1] - slow[0] >= 0.5 * len(places):
+        places = places[slow[0] : slow[-1] + 1]
+    return float(np.linalg.norm(np.ptp(places, axis=0)))
+
+
 def _feet(joints: np.ndarray, fps: float, path: RootPath) -> Iterator[Finding]:
     for foot, side in enumerate(("left", "right")):
         slides = [
-            (float(np.linalg.norm(np.ptp(joints[start:stop, FEET[foot], :2], axis=0))), start)
+            (_slid(joints[start:stop, FEET[foot], :2], fps), start)
             for own, start, stop in standing_still(joints, path.position[:, 2], fps)
             if own == foot and stop - start >= _BRIEF * fps
         ]

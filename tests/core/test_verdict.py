@@ -6,8 +6,8 @@ import numpy as np
 
 from dafnet_addon import Box, CleanUp, Controls, Scene, Take, generate, load_weights
 from dafnet_addon.core.paths import Stop, route
-from dafnet_addon.core.root import root_from_matrices
-from dafnet_addon.core.skeleton import FEET
+from dafnet_addon.core.root import RootPath, root_from_matrices
+from dafnet_addon.core.skeleton import FEET, REST
 from dafnet_addon.core.softness import support_under
 from dafnet_addon.core.storage import packed, unpacked
 from dafnet_addon.core.take import Finding
@@ -61,6 +61,21 @@ def test_a_foot_that_slides_is_named() -> None:
     last[:, FEET[1], 2] = joints[-31, FEET[1], 2]
     words = [each.word for each in _said(joints)]
     assert "right foot slides" in words and "left foot slides" not in words
+
+
+def test_a_foot_that_rolls_off_slowly_does_not_slide() -> None:
+    fps, seconds = 24.0, np.arange(48) / 24.0
+    path = RootPath(np.zeros((48, 3)), np.zeros(48))
+    nothing = support_under(Scene(), path)
+
+    def said(places: np.ndarray) -> set[str]:
+        joints = np.repeat(REST[None], 48, axis=0)
+        joints[:, FEET[0], 1] += places
+        return {each.word for each in verdict(joints, fps, path, Scene(), nothing)}
+
+    leaves = np.maximum(seconds - 1.2, 0.0)
+    assert not said(0.5 * leaves**2), "it gathers speed, and is gone"
+    assert "left foot slides" in said(0.09 * np.minimum(seconds, 1.0))
 
 
 def test_without_furniture_there_is_nothing_to_sit_on() -> None:

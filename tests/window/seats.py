@@ -117,6 +117,7 @@ def seats(pictures: Path, builders: Any, rigs: Path) -> Waits:
     with user.override():
         sofa, chair, bed = _sofa(), _desk(), _bed()
     user.view.spaces.active.shading.color_type = "OBJECT"
+    ann.dafnet.seconds = 1.0
     scene.cursor.location = (0.0, -9.0, 0.0)
 
     yield from _again(user, ann)
@@ -135,14 +136,17 @@ def seats(pictures: Path, builders: Any, rigs: Path) -> Waits:
     yield 2.0
     assert ann.dafnet.root.animation_data is None, "it is tucked under the desk"
     yield from user.picture("tucked")
-    yield from user.find("dafnet.walk_to(goal='SEAT')")
-    region = user.region("UI")
-    user.move(region.x + region.width - 40, user.mouse[1])
+    row, region = user.mouse[1], user.region("UI")
+    user.move(region.x - 500, row - 300)  # away from the message, which closes
+    yield 0.5
+    yield from user.press("ESC")
+    user.move(region.x + region.width - 55, row)
     yield 0.2
     yield from user.press("LEFTMOUSE")
     yield 0.5
     yield from user.picture("ways_to_sit")
-    yield from user.press("K")
+    yield from user.press("DOWN_ARROW")
+    yield from user.press("RET")
     yield from user.until(lambda: ann.dafnet.root.animation_data is not None, "the way to the desk")
     assert chair.animation_data.action is not None, "its location is keyed"
     yield from _generated(user, ann, (1.6, 2.2, 0.5), "desk")
