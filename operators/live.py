@@ -10,13 +10,14 @@ from bpy_extras import view3d_utils
 from ..dafnet_addon.blender.character.armature import character_of
 from ..dafnet_addon.blender.live.keeping import keep_clips
 from ..dafnet_addon.blender.live.listening import (
+    LiveState,
     begin_live,
     end_live,
     live_session,
     live_state,
 )
 from ..dafnet_addon.blender.live.session import LiveSession, Over
-from ..dafnet_addon.core.errors import InputError
+from ..dafnet_addon.core.errors import DafnetError, InputError
 from ..dafnet_addon.core.progress import run_to_end
 from ..dafnet_addon.core.series import MODEL_FPS
 from .base import DafnetOperator, idle, reported
@@ -38,7 +39,9 @@ class DAFNET_OT_live(DafnetOperator, bpy.types.Operator):
 
     _timer: bpy.types.Timer
     _session: LiveSession
+    _state: LiveState
     _told: float
+    _pressed: bool
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -74,7 +77,7 @@ class DAFNET_OT_live(DafnetOperator, bpy.types.Operator):
             finally:
                 context.window.cursor_set("DEFAULT")
             self._state = begin_live(self._session)
-            self._told = 0.0
+            self._told, self._pressed = 0.0, False
             manager = context.window_manager
             self._timer = manager.event_timer_add(1.0 / MODEL_FPS, window=context.window)
             manager.modal_handler_add(self)
@@ -93,11 +96,16 @@ class DAFNET_OT_live(DafnetOperator, bpy.types.Operator):
             return self._finish(context)
 
         if event.type == "TIMER":
+            failed = True
             try:
-                with reported(self):
-                    self._tick(context)
-            except Over as over:
-                return self._finish(context, str(over))
+                self._tick(context)
+                failed = False
+            except (Over, DafnetError) as error:
+                failed = False
+                return self._finish(context, str(error))
+            finally:
+                if failed:
+                    self.cancel(context)
         elif self._state.draws and self._drawn(context, event):
             return {"RUNNING_MODAL"}
         return {"PASS_THROUGH"}
@@ -117,13 +125,12 @@ class DAFNET_OT_live(DafnetOperator, bpy.types.Operator):
 
     def _finish(self, context: bpy.types.Context, why: str | None = None) -> set[str]:
         """Put everything back, and keep what was recorded."""
-        by_itself = why is not None and live_state() is None
         end_live()
         self._stop_listening(context)
         if why is not None:
             self.report({"WARNING"}, why)
-        if by_itself:
-            return {"CANCELLED"}  # undone, loaded or saved: nothing may be added now
+        if self._state.gone:
+            return {"CANCELLED"}  # undone, or another file: nothing may be added now
 
         with reported(self):
             results = run_to_end(keep_clips(self._session))
@@ -155,7 +162,7 @@ class DAFNET_OT_live(DafnetOperator, bpy.types.Operator):
             self._session.way.clear()
             self._session.way.add(place)
             return True
-        if not getattr(self, "_pressed", False):
+        if not self._pressed:
             return False
         if event.type == "MOUSEMOVE":
             place = _on_the_floor(context, event, self._session)

@@ -24,9 +24,8 @@ def draw_live(layout: bpy.types.UILayout, state: LiveState) -> None:
         layout.label(text=f"{seconds:.0f} s", icon="REC", translate=False)
     else:
         layout.label(text="Drag the root with G", icon="INFO")
-    row = layout.row()
-    row.alert = session.lost > 0
-    said = f"{session.milliseconds:.0f} ms"
+    layout.label(text=f"{session.milliseconds:.0f} ms a frame", icon="TIME", translate=False)
     if session.lost:
-        said += f", −{session.lost}"
-    row.label(text=said, icon="TIME", translate=False)
+        row = layout.row()
+        row.alert = True
+        row.label(text=f"{session.lost} frames too late", icon="ERROR", translate=False)

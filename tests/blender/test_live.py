@@ -217,11 +217,18 @@ def test_what_ends_it(shot: Stage, ended: object, tmp_path) -> None:
     bpy.ops.object.mode_set(mode="OBJECT")
     end_live()
 
+    bpy.context.scene.tool_settings.use_keyframe_insert_auto = True
     played = Played(shot)
+    assert not bpy.context.scene.tool_settings.use_keyframe_insert_auto, "drags are not keyed"
+    played.session.record()
+    played.run(0.2)
     bpy.data.objects.remove(shot.root)
     with pytest.raises(Over, match="Live ended"):
         played.session.tick(bpy.context, played.clock + 1.0)
     end_live()
+    assert bpy.context.scene.tool_settings.use_keyframe_insert_auto
+    with pytest.raises(InputError, match="its character is gone"):
+        run_to_end(keep_clips(played.session))
     assert [tuple(bone.rotation_quaternion) for bone in shot.ann.pose.bones] == [(1, 0, 0, 0)] * 22
 
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))

@@ -30,9 +30,12 @@ def keep_clips(session: LiveSession) -> Generator[float, None, tuple[Result, ...
     """A take of each clip of a session that has ended: each is cleaned up as its character's
     settings say. The last one plays, with the root and the targets as they led it.
 
-    What the root and the targets played before stays in the file. Yields progress.
+    What the root and the targets played before stays in the file. Yields progress. ``InputError``:
+    the character or its root is gone.
     """
     results = []
+    if session.clips and not session.there:
+        raise InputError("What was recorded cannot be kept, since its character is gone.")
     for k, clip in enumerate(session.clips):
         job = _keep(session, clip)
         share = k / len(session.clips), (k + 1) / len(session.clips)

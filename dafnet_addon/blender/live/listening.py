@@ -17,13 +17,14 @@ __all__ = ["LiveState", "begin_live", "end_live", "live_session", "live_state"]
 
 
 class LiveState:
-    """The running ``session``; ``why`` it ended by itself; whether it was asked to end
-    (``ending``); ``draws``: whether the mouse draws a way.
+    """The running ``session``; ``why`` it ended by itself, and whether its objects are ``gone``
+    with that; whether it was asked to end (``ending``); ``draws``: whether the mouse draws a way.
     """
 
     def __init__(self, session: LiveSession) -> None:
         self.session = session
         self.why: str | None = None
+        self.gone = False
         self.ending = False
         self.draws = False
 
@@ -73,25 +74,25 @@ def end_live() -> None:
     preferences.is_dirty = was_dirty
 
 
-def _ended(why: str) -> None:
+def _ended(why: str, gone: bool) -> None:
     if (state := live_state()) is not None:
         end_live()
-        state.why = why
+        state.why, state.gone = why, gone
 
 
 @persistent
 def _before_loading(*_: Any) -> None:
-    _ended("Live ended, since another file is opened.")
+    _ended("Live ended, since another file is opened.", gone=True)
 
 
 @persistent
 def _before_undoing(*_: Any) -> None:
-    _ended("Live ended, since something was undone.")
+    _ended("Live ended, since something was undone.", gone=True)
 
 
 @persistent
 def _before_saving(*_: Any) -> None:
-    _ended("Live ended, so that the file is saved as it was.")
+    _ended("Live ended, so that the file is saved as it was.", gone=False)
 
 
 @persistent

@@ -131,6 +131,10 @@ class LiveSession:
             *(place_restorer(each) for each in (self.root, *self.targets.values())),
             lambda: self.scene.frame_set(frame, subframe=subframe),
         ]
+        tools = self.scene.tool_settings
+        if tools.use_keyframe_insert_auto:  # what is dragged now is not meant to be keyed
+            self._undo.append(lambda: setattr(tools, "use_keyframe_insert_auto", True))
+            tools.use_keyframe_insert_auto = False
         data = self.armature.animation_data
         if data is not None:
             mixes = data.use_nla
@@ -229,6 +233,16 @@ class LiveSession:
             matrix[:2, 3] = place / self.unit
             matrix[:3, :3] = yaw_matrix(np.array(yaw)) * size
             self.root.matrix_world = Matrix(matrix.tolist())
+
+    @property
+    def there(self) -> bool:
+        """Whether the character and its root are still in the scene."""
+        try:
+            return all(
+                self.scene.objects.get(each.name) == each for each in (self.armature, self.root)
+            )
+        except ReferenceError:
+            return False
 
     @property
     def floor(self) -> float:
