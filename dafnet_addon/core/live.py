@@ -27,7 +27,7 @@ from .root import AHEAD, RootPath, to_root, to_world, velocities
 from .rotations import quaternion_from_matrix
 from .sampler import Conditions, Sampler
 from .sensor import HEIGHT, SPHERES
-from .series import MODEL_FPS
+from .series import MODEL_FPS, minimum_jerk
 from .skeleton import (
     END_EFFECTORS,
     FEET_ASKED,
@@ -37,6 +37,7 @@ from .skeleton import (
     REST,
     SHOULDERS,
     TARGETS,
+    UPPER,
 )
 from .softness import Support, support_under
 from .solids import Scene
@@ -57,8 +58,10 @@ _REACHES = {"head": 0.85, "hand_left": 0.80, "hand_right": 0.80} | dict.fromkeys
 """Metres from there, within which a target is taken hold of."""
 _HOLDS = 1.15
 """How much farther it may be before it is let go."""
-_EASE = 12
-"""Frames in which a target comes to count, or no longer."""
+_EASE = 18
+"""Frames in which a body comes over from what it has let go."""
+_EASES = [j for j in UPPER if j != PELVIS]
+"""The joints that do."""
 _TARGET_LAG = 0.1
 """Seconds by which head, hands and feet are behind what they are led by."""
 _TARGET_SPEED = 3.0
@@ -87,9 +90,9 @@ class Lead:
 class LiveFrame:
     """One frame of a body, world, metres: its root's ``position`` (3,) and ``yaw`` as it followed,
     its ``joints`` (22, 3) on constant bones, and the ``rotations`` (22, 4) of these, as in
-    ``Take``. ``pose`` (66,): the network's own, canonical metres, in the frame of the root; with
-    its ``action`` (K,) and ``log_likelihood``. ``targets`` (3,): those that counted, as they were
-    followed, by name; ``shares``: how far, up to 1.
+    ``Take``. ``pose`` (66,): the network's own before the clean-up, canonical metres, in the frame
+    of the root; with its ``action`` (K,) and ``log_likelihood``. ``targets`` (3,): those that
+    count, as they are followed, by name; ``shares``: how far, 1, or less of what was let go.
     """
 
     position: np.ndarray
@@ -194,6 +197,9 @@ class LiveBody:
         self._root = RootFollower(start.position / scale, start.yaw)
         self._root.seat = self._root.meant(self._root.position[:2], self._scaled_seats())
         self._led: dict[str, PointFollower] = {}
+        self._asked: dict[str, np.ndarray] = {}
+        self._lets_go, self._since = False, _EASE
+        self._offset = np.zeros((len(_EASES), 3))
         self._shares = dict.fromkeys(TARGETS, 0.0)
 
         history = sizes.history + 2
@@ -255,35 +261,50 @@ class LiveBody:
             given=np.array(self._given),
         )
         made = self._sampler.step(conditions, temperature * next(self._noise)[None])
-        pose = made.poses[0, 0]
-        self._last = pose.reshape(22, 3)
-        return self._shown(pose, made.actions[0, 0], float(made.log_likelihood[0, 0]), here)
+        pose = self._eased(made.poses[0, 0].reshape(22, 3))
+        self._last = pose.copy()
+        return self._shown(
+            pose.reshape(66), made.actions[0, 0], float(made.log_likelihood[0, 0]), here
+        )
+
+    def _eased(self, pose: np.ndarray) -> np.ndarray:
+        """The network's pose (22, 3), which the trunk and arms come over to after something was let
+        go: free, they would be elsewhere at once.
+        """
+        if self._lets_go:
+            self._offset, self._since = (self._last - pose)[_EASES], 0
+        if self._since < _EASE:
+            self._since += 1
+            pose = pose.copy()
+            left = 1.0 - float(minimum_jerk(np.array(self._since / _EASE)))
+            pose[_EASES] += left * self._offset
+        return pose
 
     def _ask(self, lead: Lead, here: RootPath) -> None:
-        """What is asked of head, hands and feet: targets within reach more and more, others less
-        and less.
+        """What is asked of head, hands and feet: targets within reach, led there from where the
+        body has them. Of what is let go, the share only tells how it eases out.
         """
         observation, given = np.zeros((22, 3)), np.zeros(22)
+        self._lets_go = False
         for name in TARGETS:
-            share = self._shares[name]
-            place = self._wanted(name, lead, here, share)
-            if place is not None:
-                if share == 0.0:
-                    free = to_world(here, self._last[None, [TARGETS[name]]])[0, 0]
-                    self._led[name] = PointFollower(free, _TARGET_LAG, _TARGET_SPEED)
-                self._led[name].step(place)
-            share += 1.0 / _EASE if place is not None else -1.0 / _EASE
-            share = self._shares[name] = float(np.clip(share, 0.0, 1.0))
-            if share > 0.0:
-                asked = to_root(here, self._led[name].place[None, None])[0, 0]
-                free = self._last[TARGETS[name]]
-                observation[_SLOTS[name]] = (1.0 - share) * free + share * asked
-                given[_SLOTS[name]] = 1.0
+            holds = self._shares[name] >= 1.0
+            place = self._wanted(name, lead, here, holds)
+            if place is None:
+                self._lets_go |= holds
+                self._shares[name] = max(0.0, self._shares[name] - 1.0 / _EASE)
+                continue
+            if not holds:
+                free = to_world(here, self._last[None, [TARGETS[name]]])[0, 0]
+                self._led[name] = PointFollower(free, _TARGET_LAG, _TARGET_SPEED)
+            followed = self._led[name].step(place)
+            self._asked[name] = to_root(here, followed[None, None])[0, 0]
+            self._shares[name] = 1.0
+            observation[_SLOTS[name]], given[_SLOTS[name]] = self._asked[name], 1.0
 
         self._observation.append(observation.reshape(-1))
         self._given.append(given)
 
-    def _wanted(self, name: str, lead: Lead, here: RootPath, share: float) -> np.ndarray | None:
+    def _wanted(self, name: str, lead: Lead, here: RootPath, holds: bool) -> np.ndarray | None:
         """Where a target is (3,), canonical metres, where it counts: within reach, and, for feet,
         for weights that have learnt of them.
         """
@@ -294,7 +315,7 @@ class LiveBody:
         if not np.isfinite(place).all():
             return None
         base = to_world(here, self._last[None, [_FROM[name]]])[0, 0]
-        reach = _REACHES[name] * (_HOLDS if share > 0.0 else 1.0)
+        reach = _REACHES[name] * (_HOLDS if holds else 1.0)
         return place if np.linalg.norm(place - base) < reach else None
 
     def _shown(
@@ -320,7 +341,10 @@ class LiveBody:
             pose=pose,
             action=action,
             log_likelihood=likelihood,
-            targets={name: self._led[name].place * self.scale for name in counting},
+            targets={
+                name: to_world(here, self._asked[name][None, None])[0, 0] * self.scale
+                for name in counting
+            },
             shares=counting,
         )
         self.memory.append(frame)
