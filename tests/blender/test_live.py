@@ -16,6 +16,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.live.listening import (
     live_state,
 )
 from bl_ext.user_default.dafnet.dafnet_addon.blender.live.session import LiveSession, Over
+from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay import contents
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end
 from bl_ext.user_default.dafnet.panels.main import DAFNET_PT_character, DAFNET_PT_shot
@@ -188,8 +189,10 @@ def test_what_was_drawn_is_walked_along(shot: Stage, ended: object) -> None:
     played = Played(shot)
     for x in np.linspace(0.2, 2.5, 30):
         played.session.way.add(np.array([x, 0.3 * np.sin(3 * x)]))
+    (line,) = contents.drawn_way(bpy.context, played.session.way_left())
+    assert len(line.lines) == 30 and np.abs(line.lines[..., 2]).max() < 0.02
     played.run(4.0)
-    assert not played.session.way
+    assert not played.session.way and not len(played.session.way_left())
     assert np.linalg.norm(np.array(shot.root.location)[:2] - (2.5, 0.3 * np.sin(7.5))) < 0.06
     assert np.linalg.norm(played.pelvis()[:2] - np.array(shot.root.location)[:2]) < 0.2
     played.session.way.add(np.array([-2.0, 0.0]))

@@ -11,6 +11,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
+from ..overlay import display
 from .session import LiveSession
 
 __all__ = ["LiveState", "begin_live", "end_live", "live_session", "live_state"]
@@ -51,6 +52,7 @@ def begin_live(session: LiveSession) -> LiveState:
     preferences.edit.use_global_undo = False
     preferences.is_dirty = _undoes[0][1]
     session.begin()
+    display.show_way(session.way_left)
     for event, function in _LISTENERS.items():
         getattr(bpy.app.handlers, event).append(function)
     return _running[0]
@@ -61,6 +63,7 @@ def end_live() -> None:
     if not _running:
         return
     session = _running.pop().session
+    display.hide_way()
     for event, function in _LISTENERS.items():
         handlers = getattr(bpy.app.handlers, event)
         if function in handlers:

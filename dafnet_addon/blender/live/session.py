@@ -234,6 +234,14 @@ class LiveSession:
             matrix[:3, :3] = yaw_matrix(np.array(yaw)) * size
             self.root.matrix_world = Matrix(matrix.tolist())
 
+    def way_left(self) -> np.ndarray:
+        """The way (N, 3) from the root on that is still to be gone, metres; (0, 3) without one."""
+        ahead = self.way.left()
+        if not len(ahead):
+            return np.zeros((0, 3))
+        places = np.concatenate([self._last.position[None, :2], ahead])
+        return np.column_stack([places, np.full(len(places), self.floor)])
+
     @property
     def there(self) -> bool:
         """Whether the character and its root are still in the scene."""

@@ -40,6 +40,7 @@ __all__ = [
     "CIRCLE",
     "KINDS",
     "drawings",
+    "drawn_way",
     "live_pose",
 ]
 
@@ -83,6 +84,12 @@ def live_pose(context: bpy.types.Context, joints: np.ndarray) -> tuple[Drawing, 
     """The figure of joints (22, 3), world metres, while they are being generated."""
     unit = metres_per_unit(context.scene)
     return (figure(joints / unit, _LIVE_POSE, size=1.0 / unit, width=3.0),)
+
+
+def drawn_way(context: bpy.types.Context, points: np.ndarray) -> tuple[Drawing, ...]:
+    """A way (N, 3), world metres, that is still to be walked."""
+    places = (points + np.array([0.0, 0.0, ABOVE_FLOOR])) / metres_per_unit(context.scene)
+    return (compose([(np.stack([places[:-1], places[1:]], axis=1), NOW)], width=3.0),)
 
 
 def _ghosts(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Drawing, ...]:

@@ -27,9 +27,11 @@ __all__ = [
     "Overlays",
     "hide_faults",
     "hide_live_pose",
+    "hide_way",
     "register",
     "show_faults",
     "show_live_pose",
+    "show_way",
     "shown_faults",
     "suggest",
     "switch",
@@ -41,6 +43,7 @@ _on: set[str] = set()
 _declined: set[str] = set()
 """What was on and was turned off."""
 _live_pose: list[Callable[[], np.ndarray | None]] = []
+_way: list[Callable[[], np.ndarray]] = []
 _faults: dict[int, Faults] = {}
 _drawers: dict[str, tuple[Any, Any]] = {}
 
@@ -135,6 +138,18 @@ def hide_live_pose() -> None:
     _arrange()
 
 
+def show_way(points: Callable[[], np.ndarray]) -> None:
+    """Draw the way (N, 3), world metres, that the function gives at each redraw."""
+    _way[:] = [points]
+    _arrange()
+
+
+def hide_way() -> None:
+    """End ``show_way``."""
+    _way.clear()
+    _arrange()
+
+
 def show_faults(faults: dict[int, Faults]) -> None:
     """Draw these faults (``faults.faults_of``) into the timeline while their takes play."""
     _faults.clear()
@@ -157,7 +172,7 @@ def shown_faults(action: bpy.types.Action | None) -> Faults | None:
 
 def _arrange() -> None:
     """Register what draws and what listens, exactly while there is something to draw."""
-    view = bool(_on or _live_pose)
+    view = bool(_on or _live_pose or _way)
     wanted: dict[str, tuple[Any, Callable[[], None], str]] = {}
     if view:
         wanted |= {"scene": (bpy.types.SpaceView3D, _draw_scene, "POST_VIEW")}
@@ -238,6 +253,8 @@ def _wanted(context: bpy.types.Context) -> dict[str, tuple[Drawing, ...]]:
     wanted = contents.drawings(context, [kind for kind in KINDS if kind in _on])
     if _live_pose and (joints := _live_pose[0]()) is not None:
         wanted["live pose"] = contents.live_pose(context, joints)
+    if _way and len(points := _way[0]()) > 1:
+        wanted["way"] = contents.drawn_way(context, points)
     return wanted
 
 
@@ -287,6 +304,7 @@ def unregister() -> None:
     _on.clear()
     _declined.clear()
     _live_pose.clear()
+    _way.clear()
     _faults.clear()
     _arrange()
     del bpy.types.WindowManager.dafnet_overlays
