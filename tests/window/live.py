@@ -124,7 +124,7 @@ def live(pictures: Path) -> Waits:
     with user.override():
         bpy.ops.ed.undo()
     yield 0.3
-    ann = scene.objects["Character"] if scene.objects else bpy.data.objects["Character"]
+    ann = bpy.context.scene.objects["Character"]
     own = ann.dafnet
     assert not len(own.takes), "one undo takes the recording back"
     assert own.root.animation_data is None or own.root.animation_data.action is None

@@ -10,7 +10,6 @@ import numpy as np
 
 from ...core.following import Seat
 from ...core.live import Surroundings
-from ...core.nearby import solids_near
 from ...core.solids import Scene
 from ...director.seats import NoSeat, SeatPlace, seats_of
 from ..character.settings import Settings
@@ -23,7 +22,9 @@ __all__ = ["LiveFurniture"]
 _REREAD = 0.5
 """Seconds between two readings of furniture that is moving."""
 _AROUND = 0.9
-"""Metres around a dragged root, within which furniture is looked at for seats."""
+"""Canonical metres around a dragged root, within which furniture is looked at for seats."""
+_UNDER = 0.05
+"""Canonical metres around it, within which it is what is to be sat on."""
 
 _LOOKS = 0.008
 """Seconds of a tick that are spent on looking for seats."""
@@ -59,9 +60,8 @@ class LiveFurniture:
             furniture.begin(context.evaluated_depsgraph_get())
             self.scene = Scene(furniture.solids(self._unit))
         self.surroundings = Surroundings(self.scene, floor, self._scale)
-        self._seats: dict[
-            frozenset[int], Generator[float, None, list[SeatPlace]] | tuple[Seat, ...]
-        ] = {}
+        self._seats: dict[frozenset[int], tuple[Seat, ...]] = {}
+        self._looking: dict[frozenset[int], Generator[float, None, list[SeatPlace]]] = {}
 
     def _objects(self) -> int:
         """How many objects the collection of furniture holds."""
@@ -98,31 +98,42 @@ class LiveFurniture:
         None where nothing is under it that could carry a body, or as long as they are looked for:
         each time for ``patience`` seconds, and once for all.
         """
-        if not self.scene.solids or not self.surroundings.carries(place / self._scale):
+        here = place / self._scale
+        if not self.scene.solids or not self.surroundings.carries(here):
             return None
-        near = solids_near(self.scene, place[None], _AROUND, self._scale)
-        key = frozenset(map(id, near.solids))
-        if key not in self._seats:
-            floor, size = float(place[2]), self._scale
-            self._seats[key] = seats_of.steps(
-                near.solids, towards[:2], floor, near=place[:2], size=size
+        under = frozenset(map(id, self.surroundings.near(here, _UNDER).solids))
+        if under not in self._seats:
+            # One search at a time: each holds on to megabytes.
+            if under not in self._looking:
+                self._looking.clear()
+                self._looking[under] = seats_of.steps(
+                    self.surroundings.near(here, _AROUND).solids,
+                    towards[:2] / self._scale,
+                    float(here[2]),
+                    near=here[:2],
+                )
+            found = _looked_on(self._looking[under], patience)
+            if found is None:
+                return None
+            self._looking.clear()
+            self._seats[under] = tuple(
+                Seat(each.position * self._scale, each.yaw, each.aside * self._scale)
+                for each in found
             )
-        found = self._seats[key]
-        if not isinstance(found, tuple):
-            found = self._seats[key] = _looked_on(found, patience)
-        return found if isinstance(found, tuple) else None
+        return self._seats[under]
 
 
 def _looked_on(
     looking: Generator[float, None, list[SeatPlace]], patience: float
-) -> Generator[float, None, list[SeatPlace]] | tuple[Seat, ...]:
-    """A search for seats ``patience`` seconds later, or what it has found."""
+) -> list[SeatPlace] | None:
+    """What a search for seats has found within ``patience`` seconds; None where it goes on."""
     until = perf_counter() + patience
     try:
         while perf_counter() < until:
             next(looking)
     except StopIteration as done:
-        return tuple(Seat(each.position, each.yaw, each.aside) for each in done.value)
+        found: list[SeatPlace] = done.value
+        return found
     except NoSeat:
-        return ()
-    return looking
+        return []
+    return None
