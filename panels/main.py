@@ -156,7 +156,7 @@ class DAFNET_PT_shot(CharacterPanel, bpy.types.Panel):
         row = layout.row()
         row.scale_y = 1.5
         row.operator(DAFNET_OT_generate.bl_idname, icon="PLAY").task = "NEW"
-        layout.operator(DAFNET_OT_live.bl_idname, icon="HAND")
+        layout.operator(DAFNET_OT_live.bl_idname, icon="RESTRICT_SELECT_OFF")
 
 
 def _draw_targets(
