@@ -12,7 +12,14 @@ from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.blender.rig.properties import rig_of
 from ..dafnet_addon.core.errors import DafnetError
 
-__all__ = ["DafnetOperator", "RigOperator", "idle", "remember_character", "reported"]
+__all__ = [
+    "DafnetOperator",
+    "RigOperator",
+    "asked_to_replace",
+    "idle",
+    "remember_character",
+    "reported",
+]
 
 
 @contextmanager
@@ -68,6 +75,23 @@ def idle(operator: Any) -> bool:
         return True
     operator.poll_message_set("Wait for the job that is running, or cancel it with Esc")
     return False
+
+
+def asked_to_replace(
+    operator: bpy.types.Operator, context: bpy.types.Context, event: bpy.types.Event
+) -> set[str]:
+    """Ask whether keys that the user has edited are replaced; what Blender runs then is
+    ``execute``.
+    """
+    manager: Any = context.window_manager
+    answer: set[str] = manager.invoke_confirm(
+        operator,
+        event,
+        title="Replace edited keys?",
+        message="Keys were edited since they were made. A copy of their action is kept.",
+        confirm_text="Replace",
+    )
+    return answer
 
 
 class RigOperator(DafnetOperator):

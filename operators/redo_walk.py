@@ -10,7 +10,7 @@ from ..dafnet_addon.blender.character.armature import character_of
 from ..dafnet_addon.blender.directing.made_walks import edited_from
 from ..dafnet_addon.blender.directing.redo import redo_walks
 from ..dafnet_addon.blender.directing.walking import Walk
-from .base import idle
+from .base import asked_to_replace, idle
 from .walking import WalkOperator
 
 __all__ = ["DAFNET_OT_redo_walk"]
@@ -48,13 +48,7 @@ class DAFNET_OT_redo_walk(WalkOperator, bpy.types.Operator):
         character: Any = character_of(context)
         if not self.replace_edited and edited_from(character, character.dafnet.active_walk):
             self.replace_edited = True
-            return context.window_manager.invoke_confirm(
-                self,
-                event,
-                title="Replace edited keys?",
-                message="Keys of this walk were edited since. A copy of their action is kept.",
-                confirm_text="Replace",
-            )
+            return asked_to_replace(self, context, event)
         return super().invoke(context, event)
 
     def steps(self, context: bpy.types.Context) -> Generator[float, None, Walk]:

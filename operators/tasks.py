@@ -13,9 +13,10 @@ from ..dafnet_addon.blender.character.armature import (
 )
 from ..dafnet_addon.blender.character.standing import bring_root_along
 from ..dafnet_addon.blender.character.task_rows import TaskRow, add_row, tasks_of
+from ..dafnet_addon.blender.directing.plan_keys import plan_edited
 from ..dafnet_addon.blender.directing.tasks import Assignment, Directed, direct
 from ..dafnet_addon.blender.overlay import display
-from .base import DafnetOperator, idle
+from .base import DafnetOperator, asked_to_replace, idle
 from .long import LongOperator
 
 __all__ = [
@@ -103,6 +104,15 @@ class DAFNET_OT_plan_tasks(LongOperator, bpy.types.Operator):
         return context.mode == "OBJECT" and any(
             len(o.dafnet.tasks) for o in selected_characters(context)
         )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask before edited keys are replaced."""
+        for each in selected_characters(context):
+            own = each.dafnet
+            first = context.scene.frame_start if own.use_scene_range else own.frame_start
+            if len(own.tasks) and plan_edited(each, first):
+                return asked_to_replace(self, context, event)
+        return super().invoke(context, event)
 
     def steps(self, context: bpy.types.Context) -> Generator[float, None, tuple[Directed, ...]]:
         """Plan and key them, in the order of their names."""

@@ -186,8 +186,8 @@ _GERMAN = {
     "Kind": "Art",
     "Replace edited keys?": "Bearbeitete Keys ersetzen?",
     "Replace": "Ersetzen",
-    "Keys of this walk were edited since. A copy of their action is kept.": (
-        "Keys dieses Gangs wurden seither bearbeitet. Eine Kopie ihrer Aktion bleibt."
+    "Keys were edited since they were made. A copy of their action is kept.": (
+        "Keys wurden seither bearbeitet. Eine Kopie ihrer Aktion bleibt."
     ),
     "Your Rig": "Dein Rig",
 }

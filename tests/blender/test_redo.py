@@ -11,6 +11,7 @@ import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.walk_rows import title_of_walk
 from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
 from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import redo
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.plan_keys import plan_edited
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.panels.setup import DAFNET_PT_setup, DAFNET_PT_walks
 
@@ -262,6 +263,18 @@ def test_a_plan_of_tasks_takes_the_place_of_walks(room: Room) -> None:
     row.verb, row.about = "SIT_ON", "Stool"
     assert bpy.ops.dafnet.plan_tasks() == {"FINISHED"}
     assert not room.own.walks and not bpy.ops.dafnet.redo_walk.poll()
+
+
+def test_a_plan_knows_whether_it_would_replace_edited_keys(room: Room) -> None:
+    assert not plan_edited(room.ann, 1), "there are none"
+    room.go(0.0, 2.0)
+    assert plan_edited(room.ann, 1)
+    row = room.own.tasks.add()
+    row.verb, row.about = "SIT_ON", "Stool"
+    assert bpy.ops.dafnet.plan_tasks() == {"FINISHED"}
+    assert not plan_edited(room.ann, 1)
+    next(iter(action_curves(room.root))).keyframe_points[2].co[1] += 0.2
+    assert plan_edited(room.ann, 1)
 
 
 def test_the_panel_shows_the_walk_s_fields_and_the_button(room: Room) -> None:

@@ -30,7 +30,7 @@ from .root_keys import (
     unchanged_on_failure,
 )
 
-__all__ = ["key_plan"]
+__all__ = ["key_plan", "plan_edited"]
 
 _A_SECOND = 10
 """How many keys a second what moves gets."""
@@ -67,7 +67,7 @@ def key_plan(
         for role, owner in owners.items():
             require_keyable(owner, "root" if role == "root" else "target")
 
-        if _digest(armature, first) != own.planned:
+        if plan_edited(armature, first):
             undo.callback(_remove_actions, copies)
             copies += _copies([*owners.values(), armature], armature, first)
         for owner in (*owners.values(), armature):
@@ -88,6 +88,13 @@ def key_plan(
         made.clear()
         copies.clear()
     return kept
+
+
+def plan_edited(armature: bpy.types.Object, first: int) -> bool:
+    """Whether a plan from frame ``first`` on would take the place of keys that the user has made or
+    edited.
+    """
+    return _digest(armature, first) not in ("", armature.dafnet.planned)
 
 
 def _remove(made: list[bpy.types.Object], armature: bpy.types.Object) -> None:
