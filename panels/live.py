@@ -17,7 +17,8 @@ def draw_live(layout: bpy.types.UILayout, state: LiveState) -> None:
     row.operator(DAFNET_OT_live.bl_idname, text="End Live", icon="PAUSE", depress=True)
     row.operator(DAFNET_OT_live_record.bl_idname, icon="REC", depress=session.recording)
     layout.operator(DAFNET_OT_live_draw.bl_idname, icon="GREASEPENCIL", depress=state.draws)
-    layout.prop(session.armature.dafnet, "temperature", slider=True)
+    if session.there:  # it may be drawn before a tick finds that the character was deleted
+        layout.prop(session.armature.dafnet, "temperature", slider=True)
 
     if session.recording:
         seconds = len(session.clips[-1].played) / 30.0

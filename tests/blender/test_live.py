@@ -16,6 +16,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.live.listening import (
     live_state,
 )
 from bl_ext.user_default.dafnet.dafnet_addon.blender.live.session import LiveSession, Over
+from bl_ext.user_default.dafnet.dafnet_addon.blender.live.trial import Trial
 from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay import contents
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end
@@ -225,7 +226,9 @@ def test_what_ends_it(shot: Stage, ended: object, tmp_path) -> None:
     assert not bpy.context.scene.tool_settings.use_keyframe_insert_auto, "drags are not keyed"
     played.session.record()
     played.run(0.2)
+    assert "temperature" in drawn_by(DAFNET_PT_character, bpy.context).words()
     bpy.data.objects.remove(shot.root)
+    assert "temperature" not in drawn_by(DAFNET_PT_character, bpy.context).words()
     with pytest.raises(Over, match="Live ended"):
         played.session.tick(bpy.context, played.clock + 1.0)
     end_live()
@@ -275,3 +278,19 @@ def test_what_it_cannot_lead_is_said_and_nothing_changes(shot: Stage, ended: obj
     assert not bpy.ops.dafnet.live_record.poll()
     assert DAFNET_PT_shot.poll(bpy.context)
     assert "dafnet.live" in drawn_by(DAFNET_PT_shot, bpy.context).words()
+
+
+@pytest.mark.slow
+def test_a_hand_in_a_hurry_in_a_full_room(blender: ModuleType, ended: object) -> None:
+    """What ``dafnet bench live`` does for five minutes."""
+    trial = Trial()
+    assert trial.triangles > 50_000
+    trial.begin()
+    bones = bpy.data.objects["Ann"].pose.bones
+    for k in range(1, 151):
+        trial.drag(k / 30 + 1e-6)
+        assert trial.tick(k / 30 + 1e-6) == 1
+    assert np.isfinite(trial.session.body.frame.joints).all()
+    assert tuple(bones["left_knee"].rotation_quaternion) != (1, 0, 0, 0)
+    trial.end()
+    assert tuple(bones["left_knee"].rotation_quaternion) == (1, 0, 0, 0)

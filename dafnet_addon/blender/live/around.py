@@ -8,6 +8,7 @@ from time import perf_counter
 import bpy
 import numpy as np
 
+from ...core.distance import FLOOR
 from ...core.following import Seat
 from ...core.live import Surroundings
 from ...core.solids import Scene
@@ -52,7 +53,7 @@ class LiveFurniture:
 
     def _read(self, context: bpy.types.Context, floor: float) -> None:
         furniture = furniture_of(self._settings, Dependencies(context.scene))
-        self._count = self._objects()
+        self._count, self._floor = self._objects(), floor
         self.members: set[bpy.types.Object] = set()
         self.scene = Scene()
         if furniture is not None:
@@ -78,14 +79,15 @@ class LiveFurniture:
             )
 
     def read_again(self, context: bpy.types.Context, floor: float, now: float) -> bool:
-        """Read what was moved, added or removed, twice a second while that goes on; ``now``:
-        seconds. Whether it did.
+        """Read what was moved, added or removed, or all of it where the root is on another floor,
+        twice a second while that goes on; ``now``: seconds. Whether it did.
 
         ``InputError``: there is none any more.
         """
         if now - self._read_at < _REREAD:
             return False
-        if not self._moved and self._objects() == self._count:
+        same_floor = abs(floor - self._floor) < FLOOR
+        if not self._moved and same_floor and self._objects() == self._count:
             return False
         self._moved, self._read_at = False, now
         self._read(context, floor)

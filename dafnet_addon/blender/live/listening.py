@@ -51,10 +51,14 @@ def begin_live(session: LiveSession) -> LiveState:
     _undoes[:] = [(preferences.edit.use_global_undo, preferences.is_dirty)]
     preferences.edit.use_global_undo = False
     preferences.is_dirty = _undoes[0][1]
-    session.begin()
-    display.show_way(session.way_left)
-    for event, function in _LISTENERS.items():
-        getattr(bpy.app.handlers, event).append(function)
+    try:
+        session.begin()
+        display.show_way(session.way_left)
+        for event, function in _LISTENERS.items():
+            getattr(bpy.app.handlers, event).append(function)
+    except BaseException:
+        end_live()
+        raise
     return _running[0]
 
 
