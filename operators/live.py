@@ -1,5 +1,7 @@
 """Live: the character follows while its root and targets are dragged."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from time import perf_counter
 from typing import ClassVar
 
@@ -71,11 +73,8 @@ class DAFNET_OT_live(DafnetOperator, bpy.types.Operator):
             state.ending = True
             return {"CANCELLED"}
         with reported(self):
-            context.window.cursor_set("WAIT")
-            try:
+            with _waiting(context):
                 self._session = LiveSession(context, character_of(context))
-            finally:
-                context.window.cursor_set("DEFAULT")
             self._state = begin_live(self._session)
             self._told, self._pressed = 0.0, False
             manager = context.window_manager
@@ -132,7 +131,7 @@ class DAFNET_OT_live(DafnetOperator, bpy.types.Operator):
         if self._state.gone:
             return {"CANCELLED"}  # undone, or another file: nothing may be added now
 
-        with reported(self):
+        with reported(self), _waiting(context):
             results = run_to_end(keep_clips(self._session))
             for warning in dict.fromkeys(each for one in results for each in one.warnings):
                 self.report({"WARNING"}, warning)
@@ -218,6 +217,19 @@ class DAFNET_OT_live_draw(DafnetOperator, bpy.types.Operator):
         """Let the mouse draw, or no longer."""
         if (state := live_state()) is not None:
             state.draws = not state.draws
+
+
+@contextmanager
+def _waiting(context: bpy.types.Context) -> Iterator[None]:
+    """A block during which the mouse says that Blender works."""
+    window = context.window
+    if window:
+        window.cursor_set("WAIT")
+    try:
+        yield
+    finally:
+        if window:
+            window.cursor_set("DEFAULT")
 
 
 def _on_the_floor(
