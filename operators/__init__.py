@@ -24,9 +24,12 @@ from .redo_walk import DAFNET_OT_redo_walk
 from .size_as_rig import DAFNET_OT_size_as_rig
 from .takes import (
     DAFNET_OT_clean_again,
+    DAFNET_OT_export_take,
     DAFNET_OT_keep_accepted,
+    DAFNET_OT_mark_take,
     DAFNET_OT_play_take,
     DAFNET_OT_reject_take,
+    DAFNET_OT_take_to_nla,
 )
 from .tasks import (
     DAFNET_OT_add_task,
@@ -56,6 +59,9 @@ CLASSES = (
     DAFNET_OT_reject_take,
     DAFNET_OT_keep_accepted,
     DAFNET_OT_clean_again,
+    DAFNET_OT_take_to_nla,
+    DAFNET_OT_mark_take,
+    DAFNET_OT_export_take,
     DAFNET_OT_mark_frames,
     DAFNET_OT_add_preset,
     DAFNET_OT_copy_report,

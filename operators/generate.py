@@ -56,6 +56,12 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
                 "From Here On",
                 "Keep the chosen take up to the current frame, and generate the rest anew",
             ),
+            (
+                "BETWEEN",
+                "From Here to There",
+                "Generate the frames of the preview range anew, and keep the chosen take before "
+                "and after it",
+            ),
         ],
     )
 
@@ -96,11 +102,29 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
             raise InputError("Choose a take in the list of takes first.")
 
         first, last = frames_of(take)
+        scene = context.scene
+        if self.task == "BETWEEN":
+            if not scene.use_preview_range:
+                raise InputError(
+                    "Mark the part that is to be made anew as the preview range: P in the timeline."
+                )
+            return job.settings_of(
+                character,
+                scene,
+                kept=take.name_full,
+                begins_as=take.name_full,
+                kept_until=scene.frame_preview_start,
+                kept_from=scene.frame_preview_end + 1,
+                frame_start=first,
+                frame_end=last,
+            )
+
         if self.task == "ONWARD":
             return job.settings_of(
                 character,
                 context.scene,
                 kept=take.name_full,
+                begins_as=take.name_full,
                 kept_until=context.scene.frame_current,
                 frame_start=first,
             )
@@ -110,6 +134,7 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
             character,
             context.scene,
             take_count=1,
+            begins_as=take.name_full,
             seed=draw.seed,
             temperature=draw.temperature,
             noise=HELD if draw.held else COMES_AND_GOES,

@@ -1,19 +1,25 @@
 """Operators whose work takes long: it is done between the user's events, and Esc cancels it."""
 
 from collections.abc import Callable, Generator
+from contextlib import ExitStack
 from time import perf_counter
 from typing import Any, ClassVar
 
 import bpy
 
-from ..dafnet_addon.blender.pipeline.running import RunningJob, begin_job, end_job
+from ..dafnet_addon.blender.pipeline.pace import Pace
+from ..dafnet_addon.blender.pipeline.running import RunningJob, begin_job, end_job, running_job
+from ..dafnet_addon.blender.pipeline.view import drawn_once
 from ..dafnet_addon.core.progress import run_to_end
 from .base import DafnetOperator, remember_character, reported
 
 __all__ = ["LongOperator"]
 
-_TICK = 0.02
-"""Seconds of work before the user's input is looked at again."""
+_FIRST_WORK = 0.05
+_FIRST_READING = 0.6
+"""Seconds of work before the window is drawn for the first time, and where that reads the scene,
+since Blender draws it for each of its frames that is set.
+"""
 _VIEW_EVENTS = {
     "MOUSEMOVE",
     "INBETWEEN_MOUSEMOVE",
@@ -40,11 +46,13 @@ class LongOperator(DafnetOperator):
 
     report: Callable[[set[str], str], None]
 
+    _pace: Pace
     _running: RunningJob
     _share: float
     _started: float
     _steps: Generator[float, None, Any]
     _timer: bpy.types.Timer
+    _view: ExitStack
 
     def steps(self, context: bpy.types.Context) -> Generator[float, None, Any]:
         """The job, which leaves the scene as it was if it is closed. Its result is never None."""
@@ -63,10 +71,21 @@ class LongOperator(DafnetOperator):
         remember_character(context)
         with reported(self):
             self._steps, self._started, self._share = self.steps(context), perf_counter(), 0.0
-            if (result := self._advance(self.seconds_before_modal)) is not None:
+            self._view, self._running, listens = ExitStack(), begin_job(), False
+            try:
+                seconds = max(self.seconds_before_modal, _FIRST_WORK)
+                result = self._advance(seconds, max(seconds, _FIRST_READING))
+                if result is None:
+                    self._listen(context)
+                    listens = True
+            finally:
+                if not listens:
+                    end_job()
+            if result is not None:
                 self.report_result(result)
                 return {"FINISHED"}
-            self._listen(context)
+
+            self._pace = Pace()
             return {"RUNNING_MODAL"}
         return {"CANCELLED"}
 
@@ -90,14 +109,16 @@ class LongOperator(DafnetOperator):
         running = False
         try:
             with reported(self):
-                result = self._advance(_TICK)
+                result = self._advance(self._pace.resume(), self._pace.longest)
                 running = result is None
         finally:
             if not running:
                 self.cancel(context)
 
         if running:
-            self._show(context)
+            self._note_progress()
+            if self._pace.pause():
+                self._show(context)
             return {"RUNNING_MODAL"}
         if result is None:
             return {"CANCELLED"}
@@ -109,6 +130,7 @@ class LongOperator(DafnetOperator):
         """End the job, which leaves the scene untouched unless it has finished."""
         self._steps.close()
         end_job()
+        self._view.close()
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
         if context.workspace:
@@ -121,26 +143,36 @@ class LongOperator(DafnetOperator):
         self._timer = manager.event_timer_add(0.01, window=context.window)
         manager.progress_begin(0, 100)
         manager.modal_handler_add(self)
-        self._running = begin_job()
+        self._view.enter_context(drawn_once(context.preferences))
 
-    def _advance(self, seconds: float) -> Any:
-        """Work for some ``seconds``; the result once it is there, else None."""
-        now = perf_counter()
-        until, step = now + seconds, 0.0
-        # After a long step another one is likely, which had better have a tick of its own.
-        while now < until and step < seconds / 2:
+    def _advance(self, seconds: float, longest: float) -> Any:
+        """Work for some ``seconds``, and up to ``longest`` while the scene is changed by it; the
+        result once it is there, else None.
+        """
+        started = now = perf_counter()
+        while True:
             try:
                 self._share = next(self._steps)
             except StopIteration as done:
                 return done.value
             step, now = perf_counter() - now, perf_counter()
 
-        return None
+            changed, job = False, running_job()
+            if job is not None:
+                changed, job.changed = job.changed, False
+            # After a long step another one is likely, which had better have a tick of its own.
+            over = now - started >= (longest if changed else seconds)
+            if over or (step >= seconds / 2 and not changed):
+                return None
+
+    def _note_progress(self) -> None:
+        share, spent = self._share, perf_counter() - self._started
+        self._running.progress = share
+        self._running.seconds_left = spent * (1.0 - share) / max(share, 0.01)
 
     def _show(self, context: bpy.types.Context) -> None:
-        share, spent = self._share, perf_counter() - self._started
-        left = spent * (1.0 - share) / max(share, 0.01)
-        self._running.progress, self._running.seconds_left = share, left
+        """Say how far the job is, which has Blender draw the window."""
+        share, left = self._running.progress, self._running.seconds_left
         context.window_manager.progress_update(100 * share)
         context.workspace.status_text_set(
             f"DAFNet: {100 * share:.0f} %, {left:.0f} s left. Esc cancels"

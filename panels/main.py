@@ -128,11 +128,19 @@ class DAFNET_PT_shot(CharacterPanel, bpy.types.Panel):
             if missing_targets(context, character, FEET):
                 layout.operator(DAFNET_OT_add_foot_targets.bl_idname, icon="EMPTY_ARROWS")
 
+        column = layout.column()
+        column.prop(settings, "look_at", icon="HIDE_OFF")
+        if settings.look_at is not None:
+            row = column.row()
+            row.use_property_decorate = True
+            row.prop(settings, "look_at_influence", text="Influence", slider=True)
+
         if settings.mode == "FULL" or animated:
             layout.prop(settings, "upper_body_source", icon="ARMATURE_DATA")
             if settings.upper_body_source is None:
                 layout.prop(settings, "upper_body_take", icon="ACTION")
-            else:
+            layout.prop(settings, "lower_body_source", icon="ARMATURE_DATA")
+            if settings.upper_body_source or settings.lower_body_source:
                 row = layout.row(align=True)
                 row.prop(settings, "source_offset")
                 row.prop(settings, "source_loops", toggle=True)
@@ -144,6 +152,7 @@ class DAFNET_PT_shot(CharacterPanel, bpy.types.Panel):
         if not settings.use_scene_range:
             column.prop(settings, "frame_start")
             column.prop(settings, "frame_end")
+        column.prop(settings, "begins")
 
         column = layout.column()
         column.prop(settings, "temperature", slider=True)

@@ -10,9 +10,12 @@ from ..dafnet_addon.blender.character.takes import active_take
 from ..operators.generate import DAFNET_OT_generate
 from ..operators.takes import (
     DAFNET_OT_clean_again,
+    DAFNET_OT_export_take,
     DAFNET_OT_keep_accepted,
+    DAFNET_OT_mark_take,
     DAFNET_OT_play_take,
     DAFNET_OT_reject_take,
+    DAFNET_OT_take_to_nla,
 )
 from .main import CharacterPanel
 from .sentences import draw_sentence
@@ -144,13 +147,29 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
         for name, words in _FIGURES.items():
             _draw_figure(table, figures, name, words)
 
-        row = layout.row(align=True)
+        column = layout.column(align=True)
+        row = column.row(align=True)
         row.operator(
             DAFNET_OT_generate.bl_idname, text="Vary the Legs", icon="MOD_DYNAMICPAINT"
         ).task = "LEGS"
         row.operator(
             DAFNET_OT_generate.bl_idname, text="From Here On", icon="FRAME_NEXT"
         ).task = "ONWARD"
+        row = column.row(align=True)
+        scene = context.scene
+        row.active = scene.use_preview_range
+        row.operator(
+            DAFNET_OT_generate.bl_idname,
+            text=f"Frames {scene.frame_preview_start} to {scene.frame_preview_end} Anew"
+            if scene.use_preview_range
+            else "From Here to There",
+            icon="PREVIEW_RANGE",
+        ).task = "BETWEEN"
+
+        row = layout.row(align=True)
+        row.operator(DAFNET_OT_take_to_nla.bl_idname, icon="NLA_PUSHDOWN")
+        row.operator(DAFNET_OT_mark_take.bl_idname, icon="ASSET_MANAGER")
+        row.operator(DAFNET_OT_export_take.bl_idname, icon="EXPORT")
 
 
 class DAFNET_PT_clean_up(CharacterPanel, bpy.types.Panel):

@@ -12,6 +12,7 @@ import bpy
 
 __all__ = [
     "new_action",
+    "add_strip",
     "assign_action",
     "playback_restorer",
     "action_curves",
@@ -63,6 +64,14 @@ def assign_action(owner: bpy.types.Object, action: bpy.types.Action) -> None:
     if _SLOTS:
         # Without one the action would not play.
         data.action_slot = action.slots[0]
+
+
+def add_strip(track: bpy.types.NlaTrack, action: bpy.types.Action) -> bpy.types.NlaStrip:
+    """Add a strip that plays an action at its own frames."""
+    strip = track.strips.new(action.name, round(action.frame_range[0]), action)
+    if _SLOTS:
+        strip.action_slot = action.slots[0]
+    return strip
 
 
 def playback_restorer(owner: bpy.types.Object) -> Callable[[bpy.types.Object], None]:

@@ -641,4 +641,67 @@ TOOLTIPS = {
     "furniture at the 3D cursor and a character, ready to generate": (
         "Möbel am 3D-Cursor und eine Figur, bereit zum Erzeugen"
     ),
+    "A .glb for engines and the web": ("Ein .glb für Engines und das Web"),
+    "A .usdc for pipelines": ("Ein .usdc für Pipelines"),
+    "A bone over the hips moves through the room": (
+        "Ein Knochen über der Hüfte bewegt sich durch den Raum"
+    ),
+    (
+        "Armature whose legs are copied, in the mode FULL: another character, or any rig whose "
+        "bones are mapped. Leave it empty to have them generated"
+    ): (
+        "Armatur, deren Beine im Modus FULL kopiert werden: eine andere Figur oder irgendein Rig,"
+        " dessen Knochen zugeordnet sind. Leer lassen, damit sie erzeugt werden"
+    ),
+    "Bones alone, for motion tools": ("Nur Knochen, für Bewegungsprogramme"),
+    "For Unreal, Unity, Maya, MotionBuilder": ("Für Unreal, Unity, Maya, MotionBuilder"),
+    "Generate the frames of the preview range anew, and keep the chosen take before and after it": (
+        "Die Bilder des Vorschaubereichs neu erzeugen und den gewählten Take davor und danach "
+        "behalten"
+    ),
+    (
+        "How much what is looked at counts; at 0 the head turns as it likes. Keyframe it to look "
+        "at something and away again"
+    ): (
+        "Wie sehr zählt, was angesehen wird; bei 0 dreht sich der Kopf, wie er will. Mit "
+        "Keyframes sieht die Figur etwas an und wieder weg"
+    ),
+    "Mark the chosen take as an asset, with tags and a picture; its catalog stays as it is": (
+        "Den gewählten Take als Asset markieren, mit Schlagwörtern und einem Bild; sein Katalog "
+        "bleibt, wie er ist"
+    ),
+    "Put the chosen take as a strip onto a track of its own in the Nonlinear Animation editor": (
+        "Den gewählten Take als Strip auf eine eigene Spur im Editor für nichtlineare Animation "
+        "legen"
+    ),
+    "Replace files that are there already": ("Dateien ersetzen, die schon da sind"),
+    "The character stands at the root before the first frame": (
+        "Die Figur steht vor dem ersten Bild an der Wurzel"
+    ),
+    "The hips move through the room": ("Die Hüfte bewegt sich durch den Raum"),
+    "What takes begin with": ("Womit Takes beginnen"),
+    (
+        "What the character looks at, in any mode: an empty, a piece of furniture, somebody. The "
+        "head turns to it, and the chest where that is not enough, as far and as fast as people "
+        "do; the body stays where it is"
+    ): (
+        "Was die Figur ansieht, in jedem Modus: ein Empty, ein Möbel, jemanden. Der Kopf wendet "
+        "sich hin, und die Brust, wo das nicht genügt, so weit und so schnell, wie Menschen es "
+        "tun; der Körper bleibt, wo er ist"
+    ),
+    (
+        "With the pose and the motion that the character has in the first frame and before it: go"
+        " on from another take, from an animation, or from a pose"
+    ): (
+        "Mit der Pose und der Bewegung, die die Figur im ersten Bild und davor hat: weiter nach "
+        "einem anderen Take, einer Animation oder aus einer Pose"
+    ),
+    (
+        "Write the chosen take of each selected character into a file for other programs: her "
+        "bones and meshes, one action, and the way through the room on a root bone or the hips"
+    ): (
+        "Den gewählten Take jeder gewählten Figur in eine Datei für andere Programme schreiben: "
+        "ihre Knochen und Netze, eine Action, und den Weg durch den Raum auf einem Wurzelknochen "
+        "oder der Hüfte"
+    ),
 }

@@ -37,7 +37,9 @@ _OBJECTS = {
     "hand-right": "hand_right",
     "foot-left": "foot_left",
     "foot-right": "foot_right",
+    "look-at": "look_at",
     "upper-body": "upper_body_source",
+    "lower-body": "lower_body_source",
 }
 """Options that name an object or a collection, and the character's settings that they override."""
 
@@ -51,6 +53,9 @@ _SHARES = {
     "smooth": "0 leaves the motion as generated, 1 smooths out abrupt changes",
 }
 """Options of the clean-up, each from 0 to 1, and what they do."""
+
+_BEGINS = {"standing": "STANDING", "as-it-is": "AS_IT_IS"}
+"""The words of the option ``--begins``, and the setting's values."""
 
 _NOISES = {"comes-and-goes": "COMES_AND_GOES", "held": "HELD"}
 """The words of the option ``--noise``, and the setting's values."""
@@ -90,6 +95,11 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
             f"--{name}", dest=setting, metavar="NAME", help="overrides the character's own setting"
         )
 
+    parser.add_argument(
+        "--begins",
+        choices=sorted(_BEGINS),
+        help="whether it stands at first, or begins with the pose and motion that it has there",
+    )
     parser.add_argument("--mode", choices=MODES, help="one mode for all frames")
     parser.add_argument(
         "--frames",
@@ -150,6 +160,7 @@ def _changes(options: argparse.Namespace) -> dict[str, Any]:
     """What the options set on the character, by the setting's name."""
     changes = {setting: getattr(options, setting) for setting in _SETTINGS}
     changes["noise"] = _NOISES.get(options.noise)
+    changes["begins"] = _BEGINS.get(options.begins)
     if options.frames:
         changes["frame_start"], changes["frame_end"] = options.frames
     return {setting: value for setting, value in changes.items() if value is not None}

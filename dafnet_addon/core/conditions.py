@@ -29,7 +29,7 @@ from .rotations import frame_from, normalised, rotate, transpose
 from .sampler import Conditions
 from .sensor import SPHERES
 from .series import MODEL_FPS, smoothstep
-from .skeleton import FEET_ASKED, LOWER, MODEL_ORDER, OFFSETS, PARENTS, TARGETS, UPPER
+from .skeleton import FEET_ASKED, LOWER, MODEL_ORDER, OFFSETS, PARENTS, PELVIS, TARGETS, UPPER
 from .solids import Box, Mesh, Scene
 from .take import Controls
 
@@ -70,6 +70,7 @@ STAYS = (
 )
 """What is said of a root that does not move in the whole shot."""
 _STILL = 0.02  # metres or radians in the whole shot, under which a root does not move
+_FAR_FROM_ROOT = 1.0  # metres that a pelvis may be beside its root where the character begins
 _CROWDED = 0.35  # share of the sensor that furniture fills, above which the user is told
 _AROUND = 6  # spheres of the sensor's innermost ring
 _UNDER = (
@@ -116,7 +117,8 @@ class Shot:
     """``conditions`` of ``PREROLL`` + N frames at 30 fps; ``path`` (N): R^τ, canonical metres;
     ``request``: what is asked at its frames; ``scene``: the furniture within reach at these frames,
     canonical metres. ``own_path``, ``own_request``, ``own_scene``: the same at the controls' own
-    frames. ``warnings``: sentences for the user.
+    frames. ``warnings``: sentences for the user. ``before`` (PREROLL + 1, 66): the body's poses
+    before the first frame and in it, where they are given.
     """
 
     conditions: Conditions
@@ -127,12 +129,15 @@ class Shot:
     own_request: Request
     own_scene: Scene
     warnings: tuple[str, ...]
+    before: np.ndarray | None = None
 
 
 def _path_of(
     controls: Controls, times: np.ndarray, target: np.ndarray, warnings: list[str]
-) -> RootPath:
-    """R^τ: the root flattened, at 30 fps, smoothed once."""
+) -> tuple[RootPath, RootPath]:
+    """R^τ: the root flattened, at 30 fps, smoothed once; and that of the ``PREROLL`` frames before
+    it, in which it stands unless it is said how it moved.
+    """
     raw, tilt = root_from_matrices(np.asarray(controls.root, float))
     if tilt > _TILT:
         warnings.append(
@@ -156,9 +161,58 @@ def _path_of(
             "slow it down there."
         )
 
+    earlier = 0
+    if controls.before_root is not None:
+        earlier = PREROLL
+        whole = np.concatenate([controls.before_root[:-1], controls.root])
+        raw, _ = root_from_matrices(whole)
+        times = np.concatenate([_times_before(controls)[:-1], times])
+        target = np.concatenate([_model_times_before(controls)[:-1], target])
+
     position = resample_positions(raw.position / controls.scale, times, target)
-    path = RootPath(position, resample_positions(raw.yaw, times, target))
-    return smoothed(path)
+    path = smoothed(RootPath(position, resample_positions(raw.yaw, times, target)))
+    if not earlier:
+        held = RootPath(rolled(path.position)[:PREROLL], rolled(path.yaw)[:PREROLL])
+        return path, held
+    return (
+        RootPath(path.position[earlier:], path.yaw[earlier:]),
+        RootPath(path.position[:earlier], path.yaw[:earlier]),
+    )
+
+
+def _times_before(controls: Controls) -> np.ndarray:
+    """Seconds of what is given of the time before the first frame, up to it: 0."""
+    frames = 0 if controls.before is None else len(controls.before)
+    return -frame_times(frames, controls.fps)[::-1]
+
+
+def _model_times_before(controls: Controls) -> np.ndarray:
+    """The same of the model's ``PREROLL`` frames and the first one; what came before all that is
+    given was as its first frame.
+    """
+    return np.maximum(-frame_times(PREROLL + 1, MODEL_FPS)[::-1], _times_before(controls)[0])
+
+
+def _poses_before(controls: Controls, path: RootPath, lead: RootPath) -> np.ndarray | None:
+    """The body's poses (PREROLL + 1, 66) before the first frame and in it; None where nothing is
+    said of them. Raises InputError where the body is far from its root.
+    """
+    if controls.before is None:
+        return None
+    joints = resample_positions(
+        controls.before / controls.scale, _times_before(controls), _model_times_before(controls)
+    )
+    there = RootPath(
+        np.concatenate([lead.position, path.position[:1]]), np.concatenate([lead.yaw, path.yaw[:1]])
+    )
+    poses = to_root(there, joints)
+    away = float(np.linalg.norm(poses[-1, PELVIS, :2]))
+    if away > _FAR_FROM_ROOT:
+        raise InputError(
+            f"The character is {away * controls.scale:.1f} m from its root in the first frame; "
+            "bring the root there, or let the character begin standing."
+        )
+    return poses.reshape(PREROLL + 1, -1)
 
 
 def _targets(
@@ -463,7 +517,7 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     warnings: list[str] = []
     frames = covering_frames(len(controls), controls.fps)
     times, target = frame_times(len(controls), controls.fps), frame_times(frames, MODEL_FPS)
-    path = _path_of(controls, times, target, warnings)
+    path, lead = _path_of(controls, times, target, warnings)
     request = _request(controls, path, MODEL_FPS, warnings)
 
     if not scene.solids:
@@ -489,7 +543,9 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     # Before the first frame nothing but a seat under the root is there, so that who starts beside
     # furniture starts standing.
     before = occupied[:1] if over_a_seat(occupied[0]) else np.zeros_like(occupied[:1])
-    whole = RootPath(rolled(path.position), rolled(path.yaw))
+    whole = RootPath(
+        np.concatenate([lead.position, path.position]), np.concatenate([lead.yaw, path.yaw])
+    )
     conditions = Conditions(
         velocity=velocities(whole),
         ahead=ahead(whole),
@@ -507,6 +563,7 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
         own_request=_request(controls, own_path, controls.fps, []),
         own_scene=_with_grids(own_scene, scene),
         warnings=tuple(warnings),
+        before=_poses_before(controls, path, lead),
     )
 
 

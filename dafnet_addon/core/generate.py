@@ -2,7 +2,7 @@
 Python API.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
@@ -13,16 +13,10 @@ from .checks import MAX_SEED, number, whole
 from .cleanup import CleanUp, cleaned, reach_targets
 from .conditions import PREROLL, Change, Shot, rolled, shot_steps, targets_of, turns_of
 from .errors import InputError
-from .kinematics import (
-    Bent,
-    come_over,
-    fit,
-    forward_kinematics,
-    global_from_local,
-    local_from_global,
-    turned,
-)
+from .kinematics import Bent, Turn, come_over, global_from_local, local_from_global, turned
 from .live import LiveFrame
+from .looking import counting, head_turn, with_chest_turned
+from .meeting import TRIES, bent, led_to, met, nearest, on_joints, require_same_root
 from .metrics import motion_metrics
 from .occupancy import distance
 from .progress import stepwise, within
@@ -31,7 +25,7 @@ from .root import RootPath, to_root, to_world
 from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix
 from .sampler import Conditions, Run, Sampler, Samples, Unchanged
 from .series import MODEL_FPS
-from .skeleton import UPPER, model_order
+from .skeleton import UPPER, WRISTS, model_order
 from .softness import Support, support_under
 from .solids import Scene
 from .take import Controls, Take
@@ -60,6 +54,7 @@ _LEAD = 30  # frames before a change of mode that tell how straight limbs were t
 _CONDITIONED = 0.15  # progress when the conditions are known
 _FRAMES_AT_ONCE = 12_000  # of all people who are made side by side
 _SAMPLED = 0.85  # progress when the poses are made
+_STRIDE = 7919  # from the seed of one try to the next one's
 _LEGS = slice(len(UPPER), None)  # joints in the model's order
 _LEGS_UNHEARD = (
     "These weights were not trained with targets for feet and legs; only Reach Targets brings the "
@@ -97,29 +92,60 @@ class Draw:
             )
 
 
-def _kept(resume: Take, frame: int, controls: Controls, path: RootPath) -> np.ndarray:
-    """The resumed take's poses (PREROLL + N, 66) before a frame of the controls, in the new path's
-    frames.
+@dataclass(frozen=True)
+class _Kept:
+    """What stays of motion that is known: ``poses`` (PREROLL + N, 66), in the frames of the shot's
+    path, but those of the ``middle``, a stretch (first, stop) of the shot's frames that is made
+    anew between two that stay.
+    """
+
+    poses: np.ndarray
+    middle: tuple[int, int] | None = None
+
+    def of_takes(self, takes: int) -> np.ndarray:
+        """The poses (PREROLL + N, B, 66) as the sampler takes them."""
+        poses = np.repeat(self.poses[:, None], takes, axis=1)
+        if self.middle is not None:
+            poses[PREROLL + self.middle[0] : PREROLL + self.middle[1]] = np.nan
+        return poses
+
+
+def _kept(resume: Take, frame: int, until: int | None, controls: Controls, path: RootPath) -> _Kept:
+    """What is kept of the resumed take: its poses before a frame of the controls, and from the
+    frame ``until`` on, in the new path's frames.
 
     The two may have other rates, and the body another size: it keeps its place in the world beside
     the take's root.
     """
     seconds = len(resume) / resume.fps
-    if not 0 < frame / controls.fps <= seconds * (1.0 + _HAIR):
+    for each, doing in ((frame, "go on"), (until, "come back to it")):
+        if each is not None and not 0 < each / controls.fps <= seconds * (1.0 + _HAIR):
+            raise InputError(
+                f"Frame {each} is not inside the take, which lasts {seconds:.2f} s; {doing} from a "
+                "frame in it."
+            )
+    if until is not None and until <= frame:
         raise InputError(
-            f"Frame {frame} is not inside the take, which lasts {seconds:.2f} s; go on from a "
-            "frame in it."
+            f"The part that is made anew ends at frame {until}, before its start at {frame}; give "
+            "it a frame at least."
         )
 
-    count = min(covering_frames(frame, controls.fps), len(resume.path), len(path))
+    longest = min(len(resume.path), len(path))
+    first = min(covering_frames(frame, controls.fps), longest)
+    count = first if until is None else longest
     old = RootPath(
         resume.path.position[:count] * (resume.scale / controls.scale), resume.path.yaw[:count]
     )
     new = RootPath(path.position[:count], path.yaw[:count])
     shot = resume.poses[PREROLL : PREROLL + count].reshape(count, 22, 3)
-    return np.concatenate(
+    poses = np.concatenate(
         [resume.poses[:PREROLL], to_root(new, to_world(old, shot)).reshape(count, 66)]
     )
+    if until is None:
+        return _Kept(poses)
+    stop = min(covering_frames(until + 1, controls.fps) - 1, longest)
+    require_same_root(old, new, stop)
+    return _Kept(poses, (first, stop))
 
 
 @stepwise
@@ -159,18 +185,6 @@ def _led_over(observation: np.ndarray, share: np.ndarray, free: np.ndarray) -> n
     return (1.0 - way) * free + way * observation
 
 
-def _bent(joints: np.ndarray, fps: float = MODEL_FPS) -> Bent:
-    """The motion of the body whose bones fit joints (T, 22, 3) best."""
-    pelvis, frames = fit(joints, fps=fps)
-    return Bent(continuous_signs(quaternion_from_matrix(local_from_global(frames))), pelvis)
-
-
-def _joints(motion: Bent) -> np.ndarray:
-    return forward_kinematics(
-        global_from_local(matrix_from_quaternion(motion.local)), motion.pelvis
-    )
-
-
 def _model_joints(poses: np.ndarray, path: RootPath) -> np.ndarray:
     """World joints (N, 22, 3) of the model's poses (PREROLL + N, 66)."""
     return to_world(path, poses[PREROLL:].reshape(-1, 22, 3))
@@ -183,7 +197,7 @@ def _as_unchanged(poses: np.ndarray, unchanged: np.ndarray, change: Change, path
     begin, frames = max(0, change.start - _LEAD), change.frames
     after = RootPath(path.position[begin : frames.stop], path.yaw[begin : frames.stop])
     whole = np.concatenate([poses[begin : PREROLL + change.start], unchanged])
-    local, pelvis = _bent(_model_joints(whole, after))
+    local, pelvis = bent(_model_joints(whole, after))
     return Bent(local[change.start - begin :], pelvis[change.start - begin :])
 
 
@@ -197,6 +211,26 @@ def _eased(motion: Bent, poses: np.ndarray, unchanged: np.ndarray, shot: Shot) -
         changes.append((change.start, change.ease, _as_unchanged(poses, own, change, shot.path)))
         used += len(change.ease)
     return come_over(motion, changes)
+
+
+def _frames(motion: Bent) -> np.ndarray:
+    """Global joint frames (T, 22, 3, 3)."""
+    return global_from_local(matrix_from_quaternion(motion.local))
+
+
+def _turned(motion: Bent, turns: Mapping[str, Turn]) -> Bent:
+    """The motion with head, hands and feet turned."""
+    local = local_from_global(turned(_frames(motion), turns))
+    return motion._replace(local=continuous_signs(quaternion_from_matrix(local)))
+
+
+def _looked_at(controls: Controls) -> tuple[np.ndarray, np.ndarray]:
+    """What is looked at (T, 3), canonical metres, and how far it counts (T,)."""
+    if controls.look_at is None:
+        return np.full((len(controls), 3), np.nan), np.zeros(len(controls))
+    share = controls.look_at_influence
+    given = np.ones(len(controls)) if share is None else np.clip(share, 0.0, 1.0)
+    return controls.look_at / controls.scale, counting(controls.look_at, given, controls.fps)
 
 
 def _finished_steps(
@@ -237,38 +271,48 @@ def _finished_steps(
         )
 
     joints = _model_joints(poses, shot.path)
-    motion = _eased(_bent(joints), poses, unchanged, shot)
+    motion = _eased(bent(joints), poses, unchanged, shot)
     yield 0.2
     own = at_own_rate(motion)
-    metrics = raw = judged(_joints(own))
+    metrics = raw = judged(on_joints(own))
     yield 0.4
-    if clean_up.asked:
-        joints = yield from within(
-            cleaned_up.steps(
-                _joints(motion), shot, replace(clean_up, reach=0.0), support if same else None
-            ),
-            0.4,
-            0.6,
-        )
+    looked_at, counts = _looked_at(controls)
+    if clean_up.asked or counts.any():
+        joints = on_joints(own)
+        if clean_up.asked:
+            joints = yield from within(
+                cleaned_up.steps(
+                    on_joints(motion), shot, replace(clean_up, reach=0.0), support if same else None
+                ),
+                0.4,
+                0.6,
+            )
+            if not same:
+                joints = on_joints(at_own_rate(bent(joints)))
         yield 0.6
-        if not same:
-            joints = _joints(at_own_rate(_bent(joints)))
+        if counts.any():
+            holds = touches(joints, controls.fps, floor, reach, targets)[:, : len(WRISTS)]
+            frames = _frames(bent(joints, controls.fps))
+            joints = with_chest_turned(
+                joints, frames, looked_at, counts, holds=holds, fps=controls.fps
+            )
         if clean_up.reach > 0.0:
             joints = reach_targets(joints, targets, clean_up.reach, controls.fps)
 
-        own = _bent(joints, controls.fps)
+        own = bent(joints, controls.fps)
         yield 0.8
-        metrics = judged(_joints(own))
+        metrics = judged(on_joints(own))
 
     yield 1.0
 
-    if turns := turns_of(controls, shot.own_path):
-        frames = turned(global_from_local(matrix_from_quaternion(own.local)), turns)
-        own = own._replace(
-            local=continuous_signs(quaternion_from_matrix(local_from_global(frames)))
-        )
+    turns = turns_of(controls, shot.own_path)
+    if counts.any():
+        look = head_turn(on_joints(own), _frames(own), looked_at, counts, controls.fps)
+        own = _turned(own, {"head": look})
+    if turns:
+        own = _turned(own, turns)
 
-    joints = _joints(own)
+    joints = on_joints(own)
     root = RootPath(shot.own_path.position * controls.scale, shot.own_path.yaw)
     return Take(
         fps=controls.fps,
@@ -381,6 +425,7 @@ def takes_steps(
     *,
     resume: Take | None = None,
     resume_frame: int = 0,
+    resume_until: int | None = None,
     device: str | None = None,
     clean_up: CleanUp = RAW,
     watch: Callable[[int, np.ndarray], None] | None = None,
@@ -389,17 +434,18 @@ def takes_steps(
     1].
 
     ``resume``: a take whose motion before ``resume_frame`` (a frame of the controls) is kept, and
-    gone on from. ``device``: None runs on NumPy, else on that torch device. ``clean_up``: what is
-    done to the joints after the model; nothing by default. ``watch`` is shown each frame of the
-    first take as it is made: its index at 30 fps, and the joints (22, 3) in the world, metres.
-    Raises InputError for what cannot be used, WeightsError for weights that do not fit.
+    gone on from; ``resume_until``: a frame from which it is kept as well, so that only the middle
+    is made anew, and meets it. ``device``: None runs on NumPy, else on that torch device.
+    ``clean_up``: what is done to the joints after the model; nothing by default. ``watch`` is shown
+    each frame of the first take as it is made: its index at 30 fps, and the joints (22, 3) in the
+    world, metres. Raises InputError for what cannot be used, WeightsError for weights that do not
+    fit.
     """
 
-    def kept(path: RootPath) -> np.ndarray | None:
+    def kept(shot: Shot) -> _Kept | None:
         if resume is None or resume_frame == 0:
-            return None
-        poses = _kept(resume, resume_frame, controls, path)
-        return np.repeat(poses[:, None], len(draws), axis=1)
+            return None if shot.before is None else _Kept(shot.before)
+        return _kept(resume, resume_frame, resume_until, controls, shot.path)
 
     def shown(path: RootPath, frame: int, pose: np.ndarray) -> None:
         if watch is not None and frame >= PREROLL:
@@ -414,6 +460,7 @@ def takes_steps(
         Sampler(weights, device),
         clean_up=clean_up,
         kept=kept,
+        tries=TRIES if resume_until is not None else 1,
         shown=shown if watch is not None else None,
     )
     return (yield from job)[0]
@@ -457,16 +504,18 @@ def _together(
     sampler: Sampler,
     *,
     clean_up: CleanUp,
-    kept: Callable[[RootPath], np.ndarray | None] = lambda path: None,
+    kept: Callable[[Shot], _Kept | None] = lambda shot: None,
+    tries: int = 1,
     shown: Callable[[RootPath, int, np.ndarray], None] | None = None,
 ) -> Generator[float, None, list[list[Take]]]:
-    """The takes of people who go through the network side by side. ``kept``, ``shown``: of one who
-    is alone, with his path: the poses that stay, and what is shown each frame.
+    """The takes of people who go through the network side by side. ``kept``, ``tries``, ``shown``:
+    of one who is alone: what stays of a motion, how often a part in its middle is tried, and what
+    is shown each frame.
     """
     started, count = perf_counter(), len(people)
     wanted: list[_Wanted] = []
     for k, asked in enumerate(people):
-        job = _wanted(scene, asked, weights, sampler)
+        job = _wanted(scene, _tried(asked, tries), weights, sampler)
         low, high = _CONDITIONED * k / count, _CONDITIONED * (k + 1) / count
         wanted.append((yield from within(job, low, high)))
     conditioned, sampling = perf_counter(), _CONDITIONED
@@ -479,10 +528,17 @@ def _together(
         for k, each in zip(partly, calm, strict=True):
             wanted[k] = wanted[k].led_from(model_order(each.poses[:, 0]))
 
-    path = wanted[0].shot.path
+    path, stays = wanted[0].shot.path, kept(wanted[0].shot)
+    if stays is not None and stays.middle is not None:
+        leading = led_to(sampler, wanted[0].conditions, stays.poses, stays.middle[1], wanted[0].z)
+        before, sampling = sampling, (sampling + _SAMPLED) / 2
+        wanted[0] = replace(wanted[0], z=(yield from within(leading, before, sampling)))
     watch = None if shown is None else partial(shown, path)
     runs = [each.run() for each in wanted]
-    made = yield from within(sampler.run_several(runs, kept(path), watch), sampling, _SAMPLED)
+    poses = None if stays is None else stays.of_takes(runs[0].z.shape[1])
+    made = yield from within(sampler.run_several(runs, poses, watch), sampling, _SAMPLED)
+    if stays is not None and stays.middle is not None:
+        made = [_meeting(made[0], stays.poses, path, stays.middle, len(people[0].draws))]
     now = perf_counter()
     seconds = {
         "conditions": (conditioned - started) / count,
@@ -495,6 +551,38 @@ def _together(
         finishing = _finished(people[k], wanted[k].shot, samples, clean_up, seconds)
         found.append((yield from within(finishing, low, low + one)))
     return found
+
+
+def _tried(asked: Asked, tries: int) -> Asked:
+    """The same with so many draws for each of his, if they can differ."""
+    if tries == 1:
+        return asked
+    draws = [
+        replace(
+            draw,
+            seed=(draw.seed + k * _STRIDE) % (MAX_SEED + 1),
+            lower_seed=None
+            if draw.lower_seed is None
+            else (draw.lower_seed + k * _STRIDE) % (MAX_SEED + 1),
+        )
+        for draw in asked.draws
+        for k in range(tries)
+    ]
+    return replace(asked, draws=tuple(draws))
+
+
+def _meeting(
+    made: Samples, kept: np.ndarray, path: RootPath, middle: tuple[int, int], takes: int
+) -> Samples:
+    """Of the tries for each of the takes the one that comes nearest to what is ``kept`` (PREROLL +
+    N, 66) after the middle, led to it.
+    """
+    count = made.poses.shape[1] // takes
+    tried = made.poses.reshape(len(made.poses), takes, count, 66)
+    chosen = np.arange(takes) * count + nearest(tried, kept, path, middle)
+    made = Samples(*(each[:, chosen] for each in made))
+    poses = [met(made.poses[:, k], kept, path, middle) for k in range(takes)]
+    return made._replace(poses=np.stack(poses, axis=1))
 
 
 def _finished(
@@ -612,6 +700,7 @@ def generate(
     held: bool = False,
     resume: Take | None = None,
     resume_frame: int = 0,
+    resume_until: int | None = None,
     device: str | None = None,
     clean_up: CleanUp = RAW,
 ) -> Generator[float, None, Take]:
@@ -628,6 +717,7 @@ def generate(
         [Draw(seed, lower_seed, temperature, held=held)],
         resume=resume,
         resume_frame=resume_frame,
+        resume_until=resume_until,
         device=device,
         clean_up=clean_up,
     )

@@ -390,6 +390,21 @@ class Sampler:
         noise = xp.concatenate([made[i] for i in self._as_pose], axis=-1)
         return Frame(pose, noise, inputs, log_det)
 
+    def noise_of(
+        self, conditions: Conditions, poses: np.ndarray
+    ) -> Generator[float, None, np.ndarray]:
+        """The noise (T, B, 66) that poses (T, B, 66) in SMPL order, metres, are made of; yields
+        progress in [0, 1].
+        """
+        yield from within(self.start_steps(conditions, poses.shape[1]), 0.0, 0.0)
+        known = self.backend.array(self.standardised(poses))
+        found: list[Array] = []
+        for t in range(len(poses)):
+            with one_thread(), np.errstate(over="ignore", invalid="ignore"):
+                found.append(self.encode(t, known[t]).noise)
+            yield (t + 1) / len(poses)
+        return self._stacked(found)
+
     def _inputs_at(self, index: int) -> Array:
         past = self._memory.past
         return self.inputs.at(self._shot.by_take(self._shot.scene[index], len(past)), past)
@@ -441,9 +456,10 @@ class Sampler:
         """Make every frame of B takes; yields progress in [0, 1].
 
         ``z`` (T, B, 66): the noise of each take and frame, upper part first; or (B, 66), one vector
-        a take, held constant. ``kept`` (N, B, 66), SMPL order, metres: the first N frames as they
-        are to stay; the model goes on from them, and what the noise that the last kept pose is made
-        of has over ``z`` dies away over ten frames, so that nothing jumps. ``watch`` is shown each
+        a take, held constant. ``kept`` (N, B, 66), SMPL order, metres: those of the first N frames
+        that are to stay, NaN for the others; the model goes on from them, and what the noise that
+        the last kept pose is made of has over ``z`` dies away over ten frames, so that nothing
+        jumps. ``watch`` is shown each
         frame of the first take as it is made: its index and pose (66,) as above. ``unchanged``:
         stretches to be made besides, as the run would go on. Raises WeightsError where the poses
         are not a body's.
@@ -479,20 +495,22 @@ class Sampler:
         self._shot = self._together(advance, takes)
         self._memory = self._mean_past(int(stops[-1]))
         nothing = np.zeros((0, int(stops[-1]), POSE_SIZE))
-        known = array(nothing if kept is None else self.standardised(kept))
+        stays = np.isfinite(nothing if kept is None else kept).all(axis=(1, 2))
+        known = array(np.nan_to_num(self.standardised(nothing if kept is None else kept)))
 
-        last_kept = own_noise[0]
+        last, last_kept = 0, own_noise[0]
         frames: list[Frame] = []
         aside: list[_Stretch] = []
         for t in range(lengths[0]):
             active = int(stops[sum(length > t for length in lengths) - 1])
             if active < len(self._memory.past):
                 self._memory = self._memory.rows(slice(0, active))
-            if len(known) and t < len(known):
+            keep = t < len(stays) and bool(stays[t])
+            if keep:
                 noise = last_kept
             elif len(known):
-                share = float(smoothstep(np.array((t - len(known) + 1) / _PASSING)))
-                noise = own_noise[t] + (last_kept - own_noise[len(known) - 1]) * (1.0 - share)
+                share = float(smoothstep(np.array((t - last) / _PASSING)))
+                noise = own_noise[t] + (last_kept - own_noise[last]) * (1.0 - share)
             else:
                 noise = own_noise[t, :active]
 
@@ -508,9 +526,9 @@ class Sampler:
             # Frame by frame: whoever runs this generator has the threads back in between. Poses are
             # checked below.
             with one_thread(), np.errstate(over="ignore", invalid="ignore"):
-                if t < len(known):
+                if keep:
                     frame = self.encode(t, known[t])
-                    last_kept = frame.noise
+                    last, last_kept = t, frame.noise
                 else:
                     frame = self.decode(t, noise)
 

@@ -23,7 +23,7 @@ from .errors import InputError
 from .network import MAX_ACTIONS
 from .resampling import covering_frames
 from .root import RootPath
-from .skeleton import LOWER, TARGETS, UPPER
+from .skeleton import JOINTS, LOWER, TARGETS, UPPER
 from .take import Controls, Finding, Take
 from .text import printable, read_json
 
@@ -40,6 +40,8 @@ _ROWS: dict[str, tuple[int, ...]] = {
     **{f"controls.{name}": (3,) for name in TARGETS},
     **{f"controls.{name}_rotation": (3, 3) for name in TARGETS},
     **{f"controls.{name}_influence": () for name in TARGETS},
+    "controls.look_at": (3,),
+    "controls.look_at_influence": (),
     "take.joints": (22, 3),
     "take.rotations": (22, 4),
     "take.root": (4, 4),
@@ -47,7 +49,9 @@ _ROWS: dict[str, tuple[int, ...]] = {
 }
 """The arrays that have a row for each frame of the controls, and the shape of a row."""
 _FREE = {name for name in _ROWS if name.startswith("controls.") and name != "controls.root"}
-_LATER = {"take.unchanged", "take.touches"}
+_BEFORE = {"controls.before": (len(JOINTS), 3), "controls.before_root": (4, 4)}
+"""The arrays that have a row for each frame before the first one, and for it."""
+_LATER = {"take.unchanged", "take.touches", *_BEFORE}
 """What takes that were packed before it was needed lack."""
 _MAX_HEADER = 256  # bytes
 _HEADER = re.compile(
@@ -193,7 +197,9 @@ def _arrays(file: zipfile.ZipFile, fps: float) -> dict[str, np.ndarray]:
         "take.path.yaw": (made,),
         "take.unchanged": (-1, 66),
     }
+    wanted |= {name: (-1, *row) for name, row in _BEFORE.items()}
     longest = {"take.action": MAX_ACTIONS, "take.unchanged": 2 * made}
+    longest |= dict.fromkeys(_BEFORE, MAX_FRAMES)
     arrays = {}
     for name, shape in wanted.items():
         if name not in _FREE | _LATER or f"{name}.npy" in there:

@@ -12,7 +12,7 @@ from .checks import FARTHEST, MAX_FRAMES, inside, number, rotations, shaped
 from .errors import InputError
 from .resampling import covering_frames
 from .root import RootPath
-from .skeleton import LOWER, TARGETS, UPPER
+from .skeleton import JOINTS, LOWER, TARGETS, UPPER
 from .text import printable
 
 __all__ = ["MODES", "Controls", "Finding", "Take"]
@@ -41,6 +41,11 @@ class Controls:
     pelvis counts, or only the rest of it. ``…_influence`` (T,): how far a target counts, from 0,
     where it is free, to 1; all of it where None. ``blend``: seconds in which the body comes over
     where the mode changes. ``scale``: the character's size over the canonical body of 1.75 m.
+    ``look_at`` (T, 3): what is looked at, in any mode, NaN where nothing is: the head turns to it,
+    and the chest where that is not enough; the network is not told.
+    ``before`` (K, 22, 3), ``before_root`` (K, 4, 4): the joints and the root in the frames before
+    the first one and, last of all, in it: the take begins with that motion, else from standing.
+    Of more than 70 / 30 seconds the last count; before the first of them it is taken to be still.
 
     Lists will do for arrays. Raises InputError, which names the field, for what cannot be used:
     another shape, what is not a number, a rotation that is none, a mode that is unknown, more than
@@ -70,6 +75,10 @@ class Controls:
     pelvis_given: bool = True
     blend: float = 1 / 3
     scale: float = 1.0
+    look_at: np.ndarray | None = None
+    look_at_influence: np.ndarray | None = None
+    before: np.ndarray | None = None
+    before_root: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         hold = partial(object.__setattr__, self)
@@ -95,6 +104,7 @@ class Controls:
             "upper_body": (frames, len(UPPER), 3),
             "lower_body": (frames, len(LOWER), 3),
         }
+        shapes |= {"look_at": (frames, 3), "look_at_influence": (frames,)}
         for name in TARGETS:
             shapes |= {
                 name: (frames, 3),
@@ -115,6 +125,19 @@ class Controls:
                     fix="give numbers from 0 to 1" if is_share else free,
                 )
                 hold(name, rotations(found, what) if name.endswith("_rotation") else found)
+
+        if (self.before is None) != (self.before_root is None):
+            raise InputError("'before' and 'before_root' belong together; give both, or neither.")
+        if self.before is not None:
+            before = shaped(self.before, "'before'", (-1, len(JOINTS), 3))
+            like = ", like 'before'"
+            root = shaped(self.before_root, "'before_root'", (len(before), 4, 4), like=like)
+            for found, what in ((before, "'before'"), (root, "'before_root'")):
+                if not len(found):
+                    raise InputError(f"{what} has no frames; give at least the first one.")
+                inside(found, what, FARTHEST)
+            hold("before", before)
+            hold("before_root", root)
 
     def __len__(self) -> int:
         return len(self.root)

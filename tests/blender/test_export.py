@@ -2,9 +2,7 @@
 the scene's rate, in metres; and nothing of the user's is changed.
 """
 
-import json
 import math
-import struct
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -17,7 +15,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, detection
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import JOINTS
 
 from kit import humanoids
-from kit.delivered import Shot
+from kit.delivered import Shot, glb
 from kit.stage import bone_heads
 
 KINDS = {"fbx": "fbx", "gltf": "glb", "usd": "usdc", "bvh": "bvh"}
@@ -40,13 +38,6 @@ def read_back(kind: str, file: Path, fps: tuple[int, float]) -> Any:
     (armature,) = (each for each in scene.objects if each.type == "ARMATURE")
     assert len(bpy.data.actions) == 1 or kind == "gltf"
     return armature
-
-
-def glb(file: Path) -> Any:
-    """The JSON in a .glb file."""
-    data = file.read_bytes()
-    (length,) = struct.unpack_from("<I", data, 12)
-    return json.loads(data[20 : 20 + length])
 
 
 @pytest.mark.parametrize("root_motion", ["bone", "hips"])

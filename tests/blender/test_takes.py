@@ -194,6 +194,73 @@ def test_from_here_on_counts_seconds_where_the_rate_has_changed(shot: Shot) -> N
     assert np.abs(after.poses[-2:] - before.poses[-2:]).max() > 0.01
 
 
+def test_the_preview_range_is_made_anew_between_two_ends_that_stay(shot: Shot) -> None:
+    scene, own = shot.scene, shot.ann.dafnet
+    scene.frame_end = 130
+    shot.walk((11, 0.0), (130, 3.2))
+    own.temperature = 1.0
+    bpy.ops.dafnet.generate()
+    (old,) = shot.listed()
+    assert bpy.ops.dafnet.generate.poll()
+    with pytest.raises(RuntimeError, match=r"Mark the part .* as the preview range"):
+        bpy.ops.dafnet.generate(task="BETWEEN")
+
+    scene.use_preview_range = True
+    scene.frame_preview_start, scene.frame_preview_end = 51, 100
+    own.seed = 5
+    assert bpy.ops.dafnet.generate(task="BETWEEN") == {"FINISHED"}
+    new = shot.listed()[1]
+    assert frames_of(new) == frames_of(old) == (11, 130) and new.dafnet.seed == 5
+    was, now = shot.motion(old), shot.motion(new)
+    off = np.linalg.norm(now - was, axis=-1).max(axis=1)
+    first, stop = 51 - 11, 101 - 11
+    assert off[first:stop].max() > 0.05, "another middle"
+    assert max(off[: first - 10].max(), off[stop + 10 :].max()) < 0.01, "the ends stay"
+    fastest = np.abs(np.diff(was, 2, axis=0)).max()
+    assert np.abs(np.diff(now, 2, axis=0)).max() < 1.5 * fastest, "and nothing pops"
+
+    scene.frame_preview_start = 11
+    with pytest.raises(RuntimeError, match="Frame 11 is not inside the take"):
+        bpy.ops.dafnet.generate(task="BETWEEN")
+    scene.frame_preview_start, scene.frame_preview_end = 51, 130
+    with pytest.raises(RuntimeError, match="Frame 131 is not inside the take"):
+        bpy.ops.dafnet.generate(task="BETWEEN")
+    scene.frame_preview_end = 100
+    shot.walk((115, 2.0))
+    with pytest.raises(RuntimeError, match="The root no longer goes as in the take"):
+        bpy.ops.dafnet.generate(task="BETWEEN")
+    assert len(shot.listed()) == 2
+
+
+def test_a_take_begins_as_the_character_is(shot: Shot) -> None:
+    """From the take before it, while it walks; its own list goes on from it as well."""
+    scene, own = shot.scene, shot.ann.dafnet
+    scene.frame_end = 130
+    shot.walk((11, 0.0), (130, 3.2))
+    bpy.ops.dafnet.generate()
+    scene.frame_start, own.begins, own.temperature = 91, "AS_IT_IS", 1.0
+    bpy.ops.dafnet.generate()
+    whole, later = (shot.motion(action) for action in shot.listed())
+    assert np.linalg.norm(later[0] - whole[80], axis=-1).max() < 0.03
+    joined = np.concatenate([whole[:80], later])
+    swiftest = np.abs(np.diff(whole, 2, axis=0)).max()
+    assert np.abs(np.diff(joined, 2, axis=0))[76:84].max() < 1.5 * swiftest, "in mid-stride"
+    own.begins = "STANDING"
+    bpy.ops.dafnet.generate()
+    standing = shot.motion(shot.listed()[2])
+    assert np.linalg.norm(standing[0] - whole[80], axis=-1).max() > 0.1
+
+    own.begins, own.active_take = "AS_IT_IS", 1
+    bpy.ops.dafnet.generate(task="LEGS")
+    first, second = (stored_take(shot.listed()[k])[0].poses[:71] for k in (1, 3))
+    assert np.abs(first - second).max() < 1e-4, "it begins as the chosen one"
+
+    shot.root.animation_data_clear()
+    shot.root.location = (5.0, 0.0, 0.0)
+    with pytest.raises(RuntimeError, match=r"The character is 5\.\d m from its root"):
+        bpy.ops.dafnet.generate()
+
+
 def test_cleaned_again_makes_a_new_take_and_leaves_the_old(shot: Shot) -> None:
     own = shot.ann.dafnet
     own.plant_feet = 0.0

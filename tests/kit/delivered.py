@@ -1,5 +1,7 @@
 """A short shot in Blender with a camera, somebody to look at, and what is delivered of it."""
 
+import json
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.core.wishes import Wishes
 
 from kit.stage import Stage
 
-__all__ = ["Shot", "numbers_in"]
+__all__ = ["Shot", "glb", "numbers_in"]
 
 
 class Shot:
@@ -68,3 +70,10 @@ def numbers_in(file: Path) -> np.ndarray:
     image.pixels.foreach_get(pixels)
     bpy.data.images.remove(image)
     return np.round(pixels.reshape(height, width, 4)[::-1, :, 0] * 65535).astype(int)
+
+
+def glb(file: Path) -> Any:
+    """The JSON in a .glb file."""
+    data = file.read_bytes()
+    (length,) = struct.unpack_from("<I", data, 12)
+    return json.loads(data[20 : 20 + length])

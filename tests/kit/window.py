@@ -10,6 +10,7 @@ import sys
 import traceback
 from collections.abc import Callable, Generator
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import bpy
@@ -152,7 +153,8 @@ class Driver:
 
     def until(self, done: Callable[[], bool], what: str, seconds: float = 240.0) -> Waits:
         """Wait for something."""
-        for _ in range(int(seconds / 0.1)):
+        latest = monotonic() + seconds
+        while monotonic() < latest:
             if done():
                 return
             yield 0.1

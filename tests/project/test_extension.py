@@ -248,7 +248,7 @@ BLENDERS_OWN = {
 }
 """Words that Blender translates itself."""
 
-THE_SAME = {"DAFNet", "DAFNet Rig", "EE", "FREE", "FULL"}
+THE_SAME = {"BVH", "DAFNet", "DAFNet Rig", "EE", "FBX", "FREE", "FULL", "USD", "glTF"}
 """Words that are the same in all languages."""
 
 UNSEEN = {

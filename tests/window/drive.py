@@ -1,5 +1,6 @@
-"""What scripts/window.sh plays: what may come between while a take is made, Live, seats and rigs,
-how many clicks a first shot takes, and one with the mouse; or only the parts that are named.
+"""What scripts/window.sh plays: what may come between while a take is made, a slow view, what is
+done with takes, Live, seats and rigs, how many clicks a first shot takes, and one with the mouse;
+or only the parts that are named.
 
 In this order, since Blender 4.3 crashes by itself when it opens a new file after another scene was
 made with Rigify on.
@@ -17,6 +18,8 @@ from first_shot import first_shot
 from interruptions import interruptions
 from live import live
 from seats import seats
+from slow_redraw import slow_redraw
+from uses_of_takes import uses_of_takes
 
 from kit import humanoids
 from kit.window import Waits, play
@@ -25,6 +28,8 @@ PICTURES, *NAMED = sys.argv[sys.argv.index("--") + 1 :]
 PARTS: dict[str, Callable[[Path], Waits]] = {
     "interruptions": interruptions,
     "live": live,
+    "slow_redraw": slow_redraw,
+    "uses_of_takes": uses_of_takes,
     "seats": lambda pictures: seats(pictures, humanoids, Path(__file__).parent / "rigs"),
     "clicks": clicks,
     "first_shot": lambda pictures: first_shot(pictures, humanoids),

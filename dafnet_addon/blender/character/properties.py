@@ -18,7 +18,7 @@ from bpy.props import (
 
 from ...core.solids import SOFTEST
 from ..rig import properties as rig_properties
-from .settings import COMES_AND_GOES, HELD, MAX_TAKES
+from .settings import AS_IT_IS, COMES_AND_GOES, HELD, MAX_TAKES, STANDING
 from .takes import PACKED
 from .task_rows import TaskRow
 from .walk_rows import GROUPS as WALK_GROUPS
@@ -279,6 +279,30 @@ class CharacterSettings(bpy.types.PropertyGroup):
             "the foot as well: Y points along the toes, Z out of the back of the foot"
         ),
     )
+    look_at: PointerProperty(
+        override=_LOCALLY,
+        name="Look At",
+        type=bpy.types.Object,
+        poll=_is_not_the_character,
+        options=set(),
+        description=(
+            "What the character looks at, in any mode: an empty, a piece of furniture, somebody. "
+            "The head turns to it, and the chest where that is not enough, as far and as fast as "
+            "people do; the body stays where it is"
+        ),
+    )
+    look_at_influence: FloatProperty(
+        override=_LOCALLY,
+        name="Look At Influence",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        description=(
+            "How much what is looked at counts; at 0 the head turns as it likes. Keyframe it to "
+            "look at something and away again"
+        ),
+    )
     upper_body_source: PointerProperty(
         override=_LOCALLY,
         name="Source",
@@ -297,6 +321,17 @@ class CharacterSettings(bpy.types.PropertyGroup):
         poll=_is_take,
         options=set(),
         description="Take whose upper body is copied when no source armature is chosen",
+    )
+    lower_body_source: PointerProperty(
+        override=_LOCALLY,
+        name="Lower Body",
+        type=bpy.types.Object,
+        poll=_is_armature,
+        options=set(),
+        description=(
+            "Armature whose legs are copied, in the mode FULL: another character, or any rig whose "
+            "bones are mapped. Leave it empty to have them generated"
+        ),
     )
     source_offset: IntProperty(
         override=_LOCALLY,
@@ -332,6 +367,22 @@ class CharacterSettings(bpy.types.PropertyGroup):
         default=250,
         options=set(),
         description="Last frame to generate",
+    )
+    begins: EnumProperty(
+        override=_LOCALLY,
+        name="Begins",
+        default=STANDING,
+        options=set(),
+        description="What takes begin with",
+        items=[
+            (STANDING, "Standing", "The character stands at the root before the first frame"),
+            (
+                AS_IT_IS,
+                "As It Is",
+                "With the pose and the motion that the character has in the first frame and before "
+                "it: go on from another take, from an animation, or from a pose",
+            ),
+        ],
     )
     seed: IntProperty(
         override=_LOCALLY,

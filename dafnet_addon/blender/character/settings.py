@@ -10,13 +10,25 @@ from ...core.errors import InputError
 from ...core.skeleton import TARGETS
 from ...core.take import MODES
 
-__all__ = ["CLEAN_UP", "COMES_AND_GOES", "HELD", "MAX_TAKES", "Settings", "settings_of"]
+__all__ = [
+    "AS_IT_IS",
+    "CLEAN_UP",
+    "COMES_AND_GOES",
+    "HELD",
+    "MAX_TAKES",
+    "STANDING",
+    "Settings",
+    "settings_of",
+]
 
 MAX_TAKES = 64
 """How many takes one job may make."""
 
 COMES_AND_GOES, HELD = "COMES_AND_GOES", "HELD"
 """Values of ``noise``: all of it, or only what lasts all along a take."""
+
+STANDING, AS_IT_IS = "STANDING", "AS_IT_IS"
+"""Values of ``begins``: from standing at the root, or with the motion that the character has."""
 
 CLEAN_UP = {
     "plant_feet": "feet",
@@ -39,9 +51,11 @@ class Settings:
     ``mode``: None reads the armature's property frame by frame, a mode overrides it.
     ``frame_start`` and ``frame_end`` are both generated. ``take_count``: takes to make;
     ``lower_seed``, ``lower_temperature``: the legs' own; None for those of the upper body.
-    ``source_offset``: frames by which the upper body's source plays later; ``source_loops``: over
-    and over. ``kept``: the action of a take whose motion stays before the scene's frame
-    ``kept_until``. ``plant_feet`` and those below it: strengths of the clean-up.
+    ``source_offset``: frames by which sources play later; ``source_loops``: over
+    and over. ``begins``: what the take begins from; ``begins_as``: the action of a take that it
+    begins as instead. ``kept``: the action of a take whose motion stays before the scene's frame
+    ``kept_until`` and, if it is given, from ``kept_from`` on. ``plant_feet`` and those below it:
+    strengths of the clean-up.
     """
 
     armature: str
@@ -53,11 +67,15 @@ class Settings:
     hand_right: str | None = None
     foot_left: str | None = None
     foot_right: str | None = None
+    look_at: str | None = None
     upper_body_source: str | None = None
     upper_body_take: str | None = None
+    lower_body_source: str | None = None
     source_offset: int = 0
     source_loops: bool = False
     mode: str | None = None
+    begins: str = STANDING
+    begins_as: str | None = None
     frame_start: int = 1
     frame_end: int = 250
     seed: int = 0
@@ -68,6 +86,7 @@ class Settings:
     take_count: int = 1
     kept: str | None = None
     kept_until: int = 0
+    kept_from: int | None = None
     blend_frames: int = 10
     plant_feet: float = 1.0
     rest_on_seats: float = 1.0
@@ -107,8 +126,10 @@ def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides:
         "root",
         "furniture",
         *TARGETS,
+        "look_at",
         "upper_body_source",
         "upper_body_take",
+        "lower_body_source",
     )
 
     values: dict[str, Any] = {
@@ -120,6 +141,7 @@ def settings_of(armature: bpy.types.Object, scene: bpy.types.Scene, **overrides:
         **{
             name: getattr(own, name)
             for name in (
+                "begins",
                 "seed",
                 "temperature",
                 "noise",

@@ -32,13 +32,14 @@ from ..rig.properties import map_of
 from ..rig.reading import pose_matrices, rigid_parts
 from .people import Played, facing_of, file_names, playing
 
-__all__ = ["export_steps"]
+__all__ = ["ENDINGS", "export_steps"]
 
 _ROOT = "root"
 """The bone that carries the body where the armature has none for that."""
 _ROOT_LENGTH = 0.2  # of the way from it to the hips at rest
 _SAME = 1e-6  # by which places and sizes of bones may differ from rest without being keyed
-_ENDINGS = {"fbx": ".fbx", "gltf": ".glb", "usd": ".usdc", "bvh": ".bvh"}
+ENDINGS = {"fbx": ".fbx", "gltf": ".glb", "usd": ".usdc", "bvh": ".bvh"}
+"""Of the files of each format."""
 _ADD_ONS = {"fbx": "io_scene_fbx", "gltf": "io_scene_gltf2", "bvh": "io_anim_bvh"}
 """What has to be enabled in Blender for a format; USD is always there."""
 
@@ -62,9 +63,11 @@ def export_steps(
     kinds: Sequence[str],
     root_motion: str,
     folder: Path,
+    names: Sequence[str] | None = None,
 ) -> Generator[float, None, tuple[str, ...]]:
     """Write a take of everybody: ``kinds`` are some of ``wishes.EXPORTED``, ``root_motion`` bone or
-    hips. A job that yields its progress.
+    hips; ``names``: of the files, without endings, else people's own. A job that yields its
+    progress.
 
     Raises InputError where Blender lacks the exporter or cannot write.
     """
@@ -75,14 +78,15 @@ def export_steps(
     with ExitStack() as undo:
         for kind in kinds:
             undo.enter_context(_enabled(kind))
-        for k, (person, name) in enumerate(zip(people, file_names(people), strict=True)):
+        named = names or file_names(people)
+        for k, (person, name) in enumerate(zip(people, named, strict=True)):
             frames, take = person.frames(number), person.takes[number]
             title = f"{person.name} take {number + 1}"
-            with _stage(context.scene, title, frames) as stage, ExitStack() as names:
-                copied = _copy(stage, person, unit=unit, root_motion=root_motion, undo=names)
+            with _stage(context.scene, title, frames) as stage, ExitStack() as copies:
+                copied = _copy(stage, person, unit=unit, root_motion=root_motion, undo=copies)
                 copied.play(recordings[k], take, frames, unit)
                 for kind in kinds:
-                    _write(stage, copied.armature, kind, folder / f"{name}{_ENDINGS[kind]}")
+                    _write(stage, copied.armature, kind, folder / f"{name}{ENDINGS[kind]}")
             yield 0.3 + 0.7 * (k + 1) / len(people)
     return ()
 
@@ -401,4 +405,4 @@ _WRITERS: dict[str, Callable[[str, bpy.types.Scene], None]] = {
     "usd": _write_usd,
     "bvh": _write_bvh,
 }
-assert _WRITERS.keys() == {*EXPORTED} == _ENDINGS.keys()
+assert _WRITERS.keys() == {*EXPORTED} == ENDINGS.keys()

@@ -15,7 +15,7 @@ from ...core.take import Take
 from ...director.plans import Plan
 from ..character.armature import is_character, objects_of
 from ..character.mannequin import FACING
-from ..character.takes import PACKED
+from ..character.takes import PACKED, active_take, stored_take
 from ..compat import assign_action
 from ..pipeline.rollback import state_restorer
 from ..rig.maps import RigMap, with_bone_names_of
@@ -38,6 +38,7 @@ __all__ = [
     "file_names",
     "playing",
     "takes_to_play",
+    "with_chosen_take",
 ]
 
 
@@ -76,6 +77,14 @@ class Played:
             if any(m.type == "ARMATURE" and m.object == self.armature for m in each.modifiers)
         }
         return worn | objects_of(self.armature)
+
+
+def with_chosen_take(armature: bpy.types.Object) -> Played:
+    """A character with the take that is chosen in her list. ``InputError`` where none is."""
+    action = active_take(armature)
+    if action is None:
+        raise InputError(f"'{armature.name}' has no take that is chosen; choose one in the list.")
+    return Played(armature, [stored_take(action)[0]], [action])
 
 
 def takes_to_play(people: Sequence[Played]) -> range:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import bpy
 import numpy as np
@@ -27,6 +27,7 @@ from ..scene.lookup import find_action, find_object, find_scene, names_in_use
 from ..scene.scene_reader import read_scene
 from .baker import bake
 from .rollback import state_restorer, undone_on_failure
+from .running import note_change
 
 if TYPE_CHECKING:
     from ...core.weights import Weights
@@ -134,7 +135,7 @@ def run(
 
     started = perf_counter()
     used = names_in_use(settings)
-    resume, resume_frame = _kept_take(settings)
+    kept = _kept_take(settings)
 
     try:
         read = yield from within(read_scene.steps(context, settings), 0.0, _READ)
@@ -146,14 +147,19 @@ def run(
     seconds = {"reading": perf_counter() - started}
 
     draws = draws_of(settings)
+    controls = read.controls
+    if settings.begins_as is not None:
+        _, told = stored_take(find_action(settings.begins_as))
+        controls = replace(controls, before=told.before, before_root=told.before_root)
     takes = yield from within(
         takes_steps(
             read.scene,
-            read.controls,
+            controls,
             weights,
             draws,
-            resume=resume,
-            resume_frame=resume_frame,
+            resume=None if kept is None else kept.take,
+            resume_frame=0 if kept is None else kept.until,
+            resume_until=None if kept is None else kept.again,
             device=device,
             clean_up=clean_up_of(settings),
             watch=watch,
@@ -166,7 +172,7 @@ def run(
     if gone := used - names_in_use(settings):
         raise InputError(f"'{min(gone)}' is no longer in the scene; generate again.")
 
-    actions = yield from within(bake_steps(settings, takes, read.controls, draws), _GENERATED, 1.0)
+    actions = yield from within(bake_steps(settings, takes, controls, draws), _GENERATED, 1.0)
     seconds |= takes[0].seconds | {"fitting": sum(take.seconds["fitting"] for take in takes)}
     seconds["baking"] = perf_counter() - started
     yield 1.0
@@ -208,16 +214,23 @@ def run_all(
     return tuple(results)
 
 
-def _kept_take(settings: Settings) -> tuple[Take | None, int]:
-    """The take that is kept in part, and its first frame that is generated anew; None and 0 where
-    nothing is kept.
+class _Kept(NamedTuple):
+    """A ``take`` that is kept in part: before the frame ``until`` of the range and, if it is given,
+    from the frame ``again`` on.
     """
+
+    take: Take
+    until: int
+    again: int | None
+
+
+def _kept_take(settings: Settings) -> _Kept | None:
+    """The take that is kept in part; None where nothing is kept."""
     if settings.kept is None:
-        return None, 0
+        return None
 
     action = find_action(settings.kept)
     take, _ = stored_take(action)
-    index = settings.kept_until - settings.frame_start
     if action.dafnet.frame_start != settings.frame_start:
         raise InputError(
             f"The take '{action.name}' begins at another frame than the range; let the range "
@@ -225,13 +238,17 @@ def _kept_take(settings: Settings) -> tuple[Take | None, int]:
         )
 
     render = find_scene(settings).render
-    if not 0.0 < index * render.fps_base / render.fps < len(take) / take.fps:
-        raise InputError(
-            f"Frame {settings.kept_until} is not inside the take '{action.name}'; go to a "
-            "frame in it."
-        )
+    rate = render.fps_base / render.fps
+    for frame in (settings.kept_until, settings.kept_from):
+        if frame is not None and not (
+            0.0 < (frame - settings.frame_start) * rate < len(take) / take.fps
+        ):
+            raise InputError(
+                f"Frame {frame} is not inside the take '{action.name}'; go to a frame in it."
+            )
 
-    return take, index
+    again = None if settings.kept_from is None else settings.kept_from - settings.frame_start
+    return _Kept(take, settings.kept_until - settings.frame_start, again)
 
 
 def bake_steps(
@@ -255,6 +272,7 @@ def bake_steps(
                 )
                 names.append(action.name_full)
 
+            note_change()
             if len(names) < len(takes):
                 yield len(names) / len(takes)
 
@@ -291,7 +309,12 @@ def clean_up_again(
     take, controls = stored_take(action)
     start = action.dafnet.frame_start
     settings = settings_of(
-        armature, context.scene, frame_start=start, frame_end=start + len(take) - 1, mode="FREE"
+        armature,
+        context.scene,
+        frame_start=start,
+        frame_end=start + len(take) - 1,
+        mode="FREE",
+        begins_as=action.name_full,
     )
     read = read_scene(context, settings)
     again = run_to_end(clean_again_steps(read.scene, controls, take, clean_up_of(settings)))

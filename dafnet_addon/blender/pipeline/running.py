@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["RunningJob", "begin_job", "end_job", "running_job"]
+__all__ = ["RunningJob", "begin_job", "end_job", "note_change", "running_job"]
 
 
 @dataclass
@@ -16,13 +16,15 @@ class RunningJob:
 
     ``progress``: the share done, in [0, 1]. ``seconds_left``: an estimate. ``joints`` (22, 3): of
     the frame generated last, world, metres; None before the first one. ``cancel_requested``: the
-    job is to end at its next step.
+    job is to end at its next step. ``changed``: its last step has changed the scene, which Blender
+    will draw.
     """
 
     progress: float = 0.0
     seconds_left: float = 0.0
     joints: np.ndarray | None = None
     cancel_requested: bool = False
+    changed: bool = False
 
 
 _running: list[RunningJob] = []  # at most one
@@ -42,3 +44,9 @@ def begin_job() -> RunningJob:
 def end_job() -> None:
     """From now on no job is running."""
     _running.clear()
+
+
+def note_change() -> None:
+    """The job that is running, if one is, has changed the scene: a frame of it, or an action."""
+    for job in _running:
+        job.changed = True

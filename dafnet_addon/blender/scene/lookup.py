@@ -66,7 +66,7 @@ def names_in_use(settings: Settings) -> set[str]:
         settings.root,
         *(getattr(settings, role) for role in TARGETS),
     }
-    named.add(settings.upper_body_source)
+    named |= {settings.upper_body_source, settings.lower_body_source, settings.look_at}
     used = {o.name_full for o in find_scene(settings).objects if o.name_full in named}
     for collection in bpy.data.collections:
         if collection.name_full == settings.furniture:

@@ -8,6 +8,7 @@ from contextlib import contextmanager, nullcontext
 import bpy
 
 from ...core.errors import InputError
+from ..pipeline.running import note_change
 from .dependencies import Simulation
 
 __all__ = ["frame_kept", "frames_to_play", "play_steps"]
@@ -69,6 +70,7 @@ def play_steps(
                     if frame >= frames[0]:
                         look(frame, context.evaluated_depsgraph_get(), shaped)
                 last = scene.frame_current
+            note_change()
             yield min(start + _BATCH, len(played)) / (len(played) + 1)
 
 

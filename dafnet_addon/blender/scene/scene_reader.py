@@ -12,34 +12,33 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
+from ...core.conditions import PREROLL
 from ...core.errors import InputError
 from ...core.progress import stepwise, within
+from ...core.resampling import covering_frames
+from ...core.series import MODEL_FPS
 from ...core.skeleton import JOINTS
 from ...core.solids import Scene
 from ...core.take import Controls
-from ..character.armature import metres_per_unit
-from ..character.settings import Settings
+from ..character.armature import is_character, metres_per_unit
+from ..character.settings import AS_IT_IS, Settings
 from ..compat import action_curves
 from ..pipeline.baker import has_bone_overrides, require_bakeable
-from ..rig.maps import RigMap
 from ..rig.reading import pose_matrices
 from .dependencies import Dependencies, Simulation
 from .furniture import Furniture, array, furniture_of
 from .lookup import find_object, find_scene
 from .playback import play_steps
-from .upper_body import (
-    frames_of_source,
-    rigid_matrices,
-    upper_body_of_source,
-    upper_body_of_take,
-    upper_body_source,
-)
+from .upper_body import PARTS, Source, rigid_matrices, source_of, upper_body_of_take
 
 __all__ = ["ReadScene", "read_scene"]
 
 _UNTURNED = np.radians(0.1)
 """Radians of rotation up to which a target counts as not turned."""
+_SHAPED = {"MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES", "POINTCLOUD", "VOLUME"}
+"""Kinds of objects that have a middle."""
 _TARGETS = {
     "head": "head target",
     "hand_left": "left hand target",
@@ -73,14 +72,15 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     are warned about. The character, whatever follows it in any way, the root and the targets are
     never furniture, nor are helpers: see ``furniture``.
 
+    What is looked at: the face of another character, else the middle of an object.
+
     Targets: the empties' places. Their rotations count where they are keyed, or where a target was
     ever turned in its parent's space; a target that was only moved leaves head, hands and
     feet free to turn.
 
-    Upper body: the source's bones, carried from the source's root onto this character's and to its
-    size. The source is another character or any rig whose bones are known
-    (``rig.properties.map_of``). Its root is its object if it is one of our characters, else it is
-    found from hips and shoulders.
+    Upper and lower body: a source's bones, carried from its root onto this character's and to its
+    size. The source is another character or any rig whose bones are known (``rig.properties``).
+    Its root is its object if it is one of our characters, else it is found from hips and shoulders.
 
     ``InputError``: something that is needed is missing, gone, linked, empty or not a number, or
     follows the character itself.
@@ -100,65 +100,99 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
     names = {role: name for role in _TARGETS if (name := getattr(settings, role))}
     targets = {role: find_object(settings, name, _TARGETS[role]) for role, name in names.items()}
 
-    source, source_map = upper_body_source(settings, armature)
-    places = [source_map.place(name) if source_map else name for name in JOINTS]
+    frames = range(settings.frame_start, settings.frame_end + 1)
+    copied = [
+        each for part in PARTS if (each := source_of(settings, part, armature, frames)) is not None
+    ]
 
     dependencies = Dependencies(scene)
     leading = {f"root '{root.name}'": root}
     leading |= {f"{_TARGETS[role]} '{target.name}'": target for role, target in targets.items()}
+    look_at = settings.look_at and find_object(settings, settings.look_at, "target of Look At")
+    if look_at:
+        leading[f"target of Look At '{look_at.name}'"] = look_at
+    led = [root, *targets.values(), *([look_at] if look_at else [])]
     _require_independent(dependencies, armature, leading)
 
     furniture = furniture_of(settings, dependencies)
-    sources, members = [source] if source else [], furniture.members if furniture else set()
-    frames = range(settings.frame_start, settings.frame_end + 1)
-    simulations = dependencies.simulations([root, *targets.values(), *members], shaped=False)
+    members = furniture.members if furniture else set()
+    sources = [*dict.fromkeys(each.armature for each in copied)]
+    simulations = dependencies.simulations([*led, *members], shaped=False)
     simulations += dependencies.simulations(sources)
 
     # Furniture is read at the first frame; simulations that began earlier have shaped it by then.
     simulations += [each for each in dependencies.simulations(members) if each.since < frames[0]]
-    tracks = _Tracks(armature, root=root, targets=targets, source=source, places=places)
-    seen, at = frames_of_source(settings, source, frames) if source else (frames, np.arange(0))
+    tracks = _Tracks(armature, root=root, targets=targets, look_at=look_at)
+    # Sources may play at other frames than the scene; those that do are seen by themselves.
+    shifted = [each for each in copied if each.seen != frames]
 
     def look(frame: int, depsgraph: bpy.types.Depsgraph, shaped: set[bpy.types.Object]) -> None:
         if frame == frames[0]:
-            _require_enabled(depsgraph, [armature, root, *targets.values(), *sources])
+            _require_enabled(depsgraph, [armature, *led, *sources])
         if furniture and frame == frames[0]:
             furniture.begin(depsgraph)
         elif furniture:
             furniture.add(depsgraph, shaped)
         tracks.add(depsgraph)
-        if seen == frames:
-            tracks.add_source(depsgraph)
-
-    def look_at_source(_frame: int, depsgraph: bpy.types.Depsgraph, _shaped: Any) -> None:
-        tracks.add_source(depsgraph)
+        for each in copied:
+            if each not in shifted:
+                each.add(depsgraph)
 
     job = play_steps(context, frames, simulations, look)
-    yield from within(job, 0.0, 0.9 if seen == frames else 0.5)
-    if seen != frames:
-        job = play_steps(context, seen, dependencies.simulations(sources), look_at_source)
-        yield from within(job, 0.5, 0.9)
+    yield from within(job, 0.0, 0.5 if shifted else 0.9)
+    for k, each in enumerate(shifted):
+
+        def look_at_source(
+            _frame: int, depsgraph: bpy.types.Depsgraph, _shaped: Any, each: Source = each
+        ) -> None:
+            each.add(depsgraph)
+
+        job = play_steps(context, each.seen, dependencies.simulations(sources), look_at_source)
+        low, one = 0.5 + 0.4 * k / len(shifted), 0.4 / len(shifted)
+        yield from within(job, low, low + one)
+
+    fps = scene.render.fps / scene.render.fps_base
+    given: dict[str, Any] = tracks.given(unit)
+    if settings.begins == AS_IT_IS and settings.begins_as is None:
+        earlier = covering_frames(PREROLL + 1, MODEL_FPS, fps)
+        before = range(frames[0] - earlier + 1, frames[0] + 1)
+        earlier_root, bodies, poses = [], [], []
+
+        def look_before(_frame: int, depsgraph: bpy.types.Depsgraph, _shaped: Any) -> None:
+            earlier_root.append(array(root.evaluated_get(depsgraph).matrix_world))
+            shown = armature.evaluated_get(depsgraph)
+            bodies.append(array(shown.matrix_world))
+            poses.append(pose_matrices(shown, [*JOINTS]))
+
+        yield from within(play_steps(context, before, simulations, look_before), 0.9, 1.0)
+        joints = (np.array(bodies)[:, None] @ np.array(poses))[..., :3, 3]
+        given["before"] = unit * joints
+        given["before_root"] = rigid_matrices(np.array(earlier_root), unit, f"root '{root.name}'")
 
     modes = [settings.mode] * len(frames) if settings.mode else tracks.modes
     warnings = tuple(_warnings(armature, furniture, dependencies, simulations))
-    fps = scene.render.fps / scene.render.fps_base
     root_matrices = rigid_matrices(np.array(tracks.root), unit, f"root '{root.name}'")
 
-    given: dict[str, Any] = tracks.given(unit)
     if "FULL" in modes:
-        given["upper_body"], wrong = _upper_body(
-            settings,
-            tracks,
-            dependencies,
-            source_map=source_map,
-            at=at,
-            modes=modes,
-            root=root_matrices,
-            unit=unit,
-            size=size,
-            fps=fps,
-        )
-        warnings += wrong
+        if not copied and not settings.upper_body_take:
+            raise InputError(
+                f"The mode of '{armature.name}' is FULL but no source is set; choose one to copy "
+                "from."
+            )
+        full = np.array([mode == "FULL" for mode in modes])
+        if settings.upper_body_source is None and settings.upper_body_take:
+            given["upper_body"] = upper_body_of_take(
+                settings, full=full, root=root_matrices, size=size, fps=fps
+            )
+        for each in copied:
+            if dependencies.follows(each.armature, armature):
+                raise InputError(
+                    f"The {each.what} follows the character itself; mute what links the two."
+                )
+            given[each.part], off = each.joints(unit=unit, root=root_matrices, size=size, fps=fps)
+            if off:
+                name = each.armature.name
+                warnings += (f"'{name}' is copied, but {off}; check its bones in Your Rig.",)
 
     mode = modes[0] if len(set(modes)) == 1 else tuple(modes)
     controls = Controls(
@@ -204,14 +238,12 @@ class _Tracks:
         armature: bpy.types.Object,
         root: bpy.types.Object,
         targets: dict[str, bpy.types.Object],
-        source: bpy.types.Object | None,
-        places: list[str | None],
+        look_at: bpy.types.Object | None,
     ) -> None:
         self.armature = armature
-        self.source = source
         self._root = root
         self._targets = targets
-        self._places = places
+        self._look_at = look_at
 
         self.modes: list[str] = []
         self.head_follows: list[str] = []
@@ -219,8 +251,8 @@ class _Tracks:
         self.root: list[np.ndarray] = []
         self.targets: dict[str, list[np.ndarray]] = {role: [] for role in targets}
         self.local: dict[str, list[np.ndarray]] = {role: [] for role in targets}
-        self.bodies: list[np.ndarray] = []
-        self.bones: list[np.ndarray] = []
+        self.looked_at: list[np.ndarray] = []
+        self.looks: list[float] = []
 
     def add(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Note the frame that the scene shows now."""
@@ -233,13 +265,9 @@ class _Tracks:
             self.influences[role].append(getattr(own, f"{role}_influence"))
             self.targets[role].append(array(evaluated.matrix_world))
             self.local[role].append(array(evaluated.matrix_local))
-
-    def add_source(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Note how the upper body's source is in the frame that the scene shows now."""
-        if self.source:
-            evaluated = self.source.evaluated_get(depsgraph)
-            self.bodies.append(array(evaluated.matrix_world))
-            self.bones.append(pose_matrices(evaluated, self._places))
+        if self._look_at:
+            self.looked_at.append(_middle(self._look_at.evaluated_get(depsgraph)))
+            self.looks.append(own.look_at_influence)
 
     def given(self, unit: float) -> dict[str, np.ndarray]:
         """The targets as ``Controls`` takes them, in metres: places, rotations where they count,
@@ -261,54 +289,22 @@ class _Tracks:
             if min(self.influences[role]) < 1.0:
                 given[f"{role}_influence"] = np.array(self.influences[role])
 
+        if self._look_at:
+            given["look_at"] = unit * np.array(self.looked_at)
+            if min(self.looks) < 1.0:
+                given["look_at_influence"] = np.array(self.looks)
         return given
 
 
-def _upper_body(
-    settings: Settings,
-    tracks: _Tracks,
-    dependencies: Dependencies,
-    *,
-    source_map: RigMap | None,
-    at: np.ndarray,
-    modes: list[str],
-    root: np.ndarray,
-    unit: float,
-    size: float,
-    fps: float,
-) -> tuple[np.ndarray, tuple[str, ...]]:
-    """The joints that FULL copies (T, 14, 3), world metres, and what is wrong with them;
-    ``InputError`` where there is nothing to copy, or it follows the character.
+def _middle(seen: bpy.types.Object) -> np.ndarray:
+    """Where somebody is looked at who looks at an evaluated object: into the face of a character,
+    else the middle of what has a shape; world, Blender units.
     """
-    armature, source = tracks.armature, tracks.source
-    if source is None and settings.upper_body_take:
-        full = np.array([mode == "FULL" for mode in modes])
-        return upper_body_of_take(settings, full=full, root=root, size=size, fps=fps), ()
-
-    if source is None:
-        raise InputError(
-            f"The mode of '{armature.name}' is FULL but no source is set; choose one to copy from."
-        )
-
-    if dependencies.follows(source, armature):
-        raise InputError(
-            f"The upper body's source '{source.name}' follows the character itself; mute what "
-            "links the two."
-        )
-
-    joints, off = upper_body_of_source(
-        source,
-        source_map,
-        bones=np.array(tracks.bones),
-        bodies=np.array(tracks.bodies),
-        at=at,
-        unit=unit,
-        root=root,
-        size=size,
-        fps=fps,
-    )
-    wrong = f"'{source.name}' is copied, but {off}; check its bones in Your Rig."
-    return joints, (wrong,) if off else ()
+    if is_character(seen):
+        head = seen.pose.bones["head"]
+        return np.array(seen.matrix_world @ (0.5 * (head.head + head.tail)))
+    corners = np.array(seen.bound_box) if seen.type in _SHAPED else np.zeros((1, 3))
+    return np.array(seen.matrix_world @ Vector(corners.mean(axis=0).tolist()))
 
 
 def _require_independent(
