@@ -90,6 +90,14 @@ def _own_room(user: Driver) -> Waits:
     assert user.clicks - before == 2
     yield from user.picture("redone_walk")
 
+    with user.override():
+        bpy.ops.dafnet.add_character(name="Bob")
+    user.select(next(child for child in character.children if child.type == "MESH"))
+    yield 0.5
+    user.select(stool)
+    yield 0.5
+    assert character.dafnet.chosen, "the tab is whose body was selected last"
+
 
 def clicks(pictures: Path) -> Waits:
     """Count them."""
