@@ -17,7 +17,7 @@ from ..dafnet_addon.blender.character.targets import (
 from ..dafnet_addon.blender.compat import action_curves
 from ..dafnet_addon.blender.live.listening import live_state
 from ..dafnet_addon.blender.pipeline.running import running_job
-from ..dafnet_addon.blender.scene.unit_note import unit_note
+from ..dafnet_addon.blender.scene.unit_note import unit_note_lately
 from ..dafnet_addon.blender.translations import translated_tip
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.add_root import DAFNET_OT_add_root
@@ -86,7 +86,7 @@ class DAFNET_PT_character(bpy.types.Panel):
         row = layout.row()
         row.label(text=character.name, icon="ARMATURE_DATA", translate=False)
         row.operator(DAFNET_OT_add_character.bl_idname, text="", icon="ADD")
-        if note := unit_note(context.scene, character):
+        if note := unit_note_lately(context.scene, character):
             draw_sentence(layout.column(align=True), context, note, "ERROR", alert=True)
 
 
