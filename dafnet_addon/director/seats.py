@@ -5,6 +5,7 @@ thighs end at an edge or before it, legs hang there, the trunk has room, and, if
 is within a lean's reach behind. Every even part of a piece is looked at from all of its sides.
 """
 
+from bisect import bisect_left
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -511,6 +512,7 @@ class _Lines:
         along, aside = part.places @ way, part.places @ across
         self._wide = round(0.15 / field.cell)
         self.along = np.arange(along.min() - 0.42, along.max() + 0.66, field.cell)
+        self._rows_at = self.along.tolist()
         margin = self._wide * field.cell
         wide = np.arange(aside.min() - margin, aside.max() + margin + 1e-6, field.cell)
         self.aside = wide[self._wide : len(wide) - self._wide]
@@ -521,6 +523,7 @@ class _Lines:
         at = tuple(np.moveaxis(np.where(inside[..., None], cells, 0), -1, 0))
         self._mask = part.mask[at] & inside
         self._heights = np.where(self._mask, part.heights[at], np.nan)
+        self._counts = np.pad(np.cumsum(self._mask, axis=1), ((0, 0), (1, 0)))
         long = part.length > _LONGER * part.width
         self.middle = 0.5 * float(aside.min() + aside.max())
         self._away = _AWAY * float(part.away @ way)
@@ -528,8 +531,7 @@ class _Lines:
 
     def _rows(self, low: float, high: float) -> slice:
         """Between two distances along the direction."""
-        first, last = np.searchsorted(self.along, (low, high))
-        return slice(int(first), int(last))
+        return slice(bisect_left(self._rows_at, low), bisect_left(self._rows_at, high))
 
     def _columns(self, k: int, half: float) -> slice:
         reach = min(self._wide, round(half / self._cell))
@@ -539,13 +541,17 @@ class _Lines:
         """Whether a line has enough of the seat under hips."""
         if not 0 <= k < len(self.aside):
             return False
-        hips = self._columns(k, _HIPS)
-        return bool((self._mask[:, hips].mean(axis=1) >= 0.6).any())
+        return bool(self._carried(self._columns(k, _HIPS)).any())
+
+    def _carried(self, hips: slice) -> np.ndarray:
+        """The rows in which enough of the seat is under ``hips``."""
+        within = self._counts[:, hips.stop] - self._counts[:, hips.start]
+        return np.asarray(within / (hips.stop - hips.start) >= 0.6)
 
     def fit(self, k: int) -> _Fit | None:
         """How a body fits on line ``k``; None where it does not."""
         hips = self._columns(k, _HIPS)
-        carried = self._mask[:, hips].mean(axis=1) >= 0.6
+        carried = self._carried(hips)
         best: _Fit | None = None
         for first, last in runs(carried, gap=2):
             if (last - first) * self._cell < _SHORTEST:
@@ -558,7 +564,7 @@ class _Lines:
     def _on(self, k: int, first: int, last: int, hips: slice) -> _Fit | None:
         """How a body fits on the rows from ``first`` to ``last`` (exclusive)."""
         begins, ends = self.along[first] - 0.5 * self._cell, self.along[last - 1] + 0.5 * self._cell
-        level = float(np.nanmedian(self._heights[first:last, hips]))
+        level = _median(self._heights[first:last, hips])
         middle = 0.5 * (begins + ends)
         trunk = self._columns(k, 0.12)
 
@@ -588,9 +594,9 @@ class _Lines:
         patch = self._rows(ahead - 0.08, ahead + 0.08)
         if self._mask[patch, hips].mean() < 0.7:
             return None
-        height = float(np.nanmedian(self._heights[patch, hips]))
+        height = _median(self._heights[patch, hips])
         slope = self._heights[patch, hips.stop - 1] - self._heights[patch, hips.start]
-        if np.isfinite(slope).any() and abs(np.nanmedian(slope)) > _LEVEL:
+        if np.isfinite(slope).any() and abs(_median(slope)) > _LEVEL:
             return None
 
         lap = self._layers[self._rows(ahead - 0.08, ahead + _LAP), hips]
@@ -623,7 +629,15 @@ class _Lines:
         hollow = self._heights[self._rows(ends - _THIGH - 0.09, ends - _THIGH), hips]
         if not (np.isfinite(front).any() and np.isfinite(hollow).any()):
             return 0.0
-        return float(np.clip(np.nanmedian(front) - np.nanmedian(hollow), 0.0, 0.1))
+        return float(np.clip(_median(front) - _median(hollow), 0.0, 0.1))
+
+
+def _median(values: np.ndarray) -> float:
+    """Of the heights that are known; NaN where none is."""
+    known = np.sort(values[np.isfinite(values)], axis=None)
+    if not len(known):
+        return float("nan")
+    return float(0.5 * (known[(len(known) - 1) // 2] + known[len(known) // 2]))
 
 
 def _back(thirds: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple[int, int]:

@@ -194,7 +194,7 @@ class Columns:
     @staticmethod
     def between(low: float, high: float) -> np.uint64:
         """The bits of the layers from ``low`` to ``high`` metres over the floor."""
-        first, last = (int(np.clip(round(z / _LAYER), 0, 64)) for z in (low, high))
+        first, last = (min(max(round(z / _LAYER), 0), 64) for z in (low, high))
         return np.uint64((1 << max(last, first)) - (1 << first))
 
     def at(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
