@@ -30,6 +30,7 @@ _STEPS = 0.45  # metres a second of steps aside and back, while one keeps lookin
 _TURNING = 0.12  # metres a second of who still turns to where he will go
 _NEAR, _FAR = 0.4, 0.9  # metres still to go, up to which one steps, and from which on one walks
 _COMING = 0.5  # seconds, of whose way at the present speed is counted with what is to go
+_RECENT = 2.0  # seconds, in which a root that is dragged on and on is walked after
 _TURN_LAG = 0.3  # seconds
 _TURN = np.radians(150.0)  # a second, at most
 _WHIRLS = np.radians(600.0)  # a second squared, at most
@@ -95,6 +96,7 @@ class RootFollower:
         self.seat: Seat | None = None
         self._velocity, self._turn = np.zeros(2), 0.0
         self._leaves = False
+        self._goals: deque[np.ndarray] = deque(maxlen=round(_RECENT * MODEL_FPS))
 
     @property
     def speed(self) -> float:
@@ -108,7 +110,9 @@ class RootFollower:
         place, turn = self._bound_for(np.asarray(goal[:2], float), yaw, seats)
         to_go = place - self.position[:2]
         away = float(np.linalg.norm(to_go))
-        walks = 0.0 if self.seat else self._walks(away)
+        self._goals.append(place)
+        dragged = float(np.linalg.norm(place - self._goals[0]))
+        walks = 0.0 if self.seat else self._walks(away, dragged)
         looks_to = turn
         if walks > 0.0:
             ahead = float(yaw_of(to_go + 0.2 * self._velocity))
@@ -118,9 +122,11 @@ class RootFollower:
         self._go(to_go, away, walks)
         self.position[2] += (goal[2] - self.position[2]) * (1.0 - np.exp(-_CLIMB / MODEL_FPS))
 
-    def _walks(self, away: float) -> float:
-        """From 0, where one only steps, to 1, where one walks and looks where one goes."""
-        counted = away + _COMING * self.speed
+    def _walks(self, away: float, dragged: float) -> float:
+        """From 0, where one only steps, to 1, where one walks and looks where one goes: it is far
+        ``away``, or was ``dragged`` far in the last seconds, however slowly.
+        """
+        counted = max(away + _COMING * self.speed, dragged)
         return float(smoothstep(np.array((counted - _NEAR) / (_FAR - _NEAR))))
 
     def _turn_to(self, yaw: float) -> None:

@@ -123,6 +123,17 @@ def test_it_looks_where_it_goes_and_as_the_root_when_it_is_there() -> None:
         assert abs(follower.yaw) < 0.2, "a small step aside needs no turn"
 
 
+def test_who_is_dragged_backwards_on_and_on_turns_round() -> None:
+    follower, y = RootFollower(np.zeros(3), 0.0), 0.0
+    for _ in range(120):
+        y -= 0.4 / FPS
+        follower.step(np.array([0.0, y, 0.0]), 0.0)
+    assert math.cos(follower.yaw) < -0.9, "nobody walks backwards for metres"
+    for _ in range(120):
+        follower.step(np.array([0.0, y, 0.0]), 0.0)
+    assert math.cos(follower.yaw) > 0.99
+
+
 @pytest.mark.parametrize("start", [(0.0, 0.0), (2.0, 5.0), (3.5, 3.2), (2.1, 2.2)])
 def test_a_seat_is_come_to_from_in_front_and_left_ahead(start: tuple[float, float]) -> None:
     follower = RootFollower(np.array([*start, 0.0]), 0.3)
