@@ -6,7 +6,7 @@ import bpy
 
 __all__ = ["draw_sentence"]
 
-_LETTER = 8.0
+_LETTER = 6.5
 """Pixels of a letter, more or less."""
 _SHORTEST = 20
 """Letters of the shortest line."""
