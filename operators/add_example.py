@@ -5,6 +5,7 @@ from typing import Any
 import bpy
 from bpy.props import EnumProperty
 
+from ..dafnet_addon.blender.overlay import display
 from ..dafnet_addon.blender.showcase.examples import EXAMPLES, add_example
 from ..dafnet_addon.blender.translations import translated_tip
 from .base import DafnetOperator, idle
@@ -40,8 +41,9 @@ class DAFNET_OT_add_example(DafnetOperator, bpy.types.Operator):
         return context.mode == "OBJECT"
 
     def run(self, context: bpy.types.Context) -> None:
-        """Add it."""
+        """Add it, and draw its path."""
         armature = add_example(context, self.kind)
+        display.suggest("path")
         self.report(
             {"INFO"}, f"'{armature.name}' is ready: press Generate in the sidebar's tab DAFNet."
         )

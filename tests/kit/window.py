@@ -18,7 +18,7 @@ import bpy
 __all__ = ["Driver", "Waits", "play"]
 
 Waits = Generator[float, None, None]
-_STEP = 15  # pixels between two looks for a button, less than one is high
+_STEP = 11  # pixels between two looks for a button, less than one is high
 
 
 class Driver:
@@ -105,12 +105,21 @@ class Driver:
             for y in range(region.y + region.height - 30, region.y + 4, -_STEP):
                 self.move(x, y)
                 yield 0.06
-                if action in self._under_mouse():
+                if (yield from self._is_under_mouse(action)):
                     return x, y
             self.move(x, region.y + region.height // 2)
             for _ in range(4):
                 yield from self.press("WHEELDOWNMOUSE")
         raise AssertionError(f"no button in the sidebar does '{action}'")
+
+    def _is_under_mouse(self, action: str) -> Generator[float, None, bool]:
+        """Whether the button under the mouse does ``action``, and still does a moment later: a slow
+        window may be told where the mouse was before.
+        """
+        if action not in self._under_mouse():
+            return False
+        yield 0.3
+        return action in self._under_mouse()
 
     def _under_mouse(self) -> str:
         """Python command and data path of the button under the mouse, as its context menu would
@@ -139,7 +148,7 @@ class Driver:
         for x in range(region.x + region.width - 30, region.x + 10, -_STEP):
             self.move(x, y)
             yield 0.06
-            if action in self._under_mouse():
+            if (yield from self._is_under_mouse(action)):
                 yield from self.press("LEFTMOUSE")
                 return
         raise AssertionError(f"no button in that row does '{action}'")
