@@ -15,6 +15,7 @@ import hashlib
 from collections import OrderedDict
 from collections.abc import Generator, Iterator
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -72,7 +73,20 @@ def rigid_split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def rigid_frames(solid: Box | Mesh) -> np.ndarray:
     """The frames (4, 4) or (T, 4, 4) in which a solid's distances are measured."""
-    return solid.matrices() if isinstance(solid, Box) else rigid_split(solid.matrix)[0]
+    if isinstance(solid, Box):
+        return solid.matrices()
+    matrix = np.asarray(solid.matrix, float)
+    return _rigid_frame(matrix.tobytes()) if matrix.ndim == 2 else rigid_split(matrix)[0]
+
+
+@lru_cache(maxsize=4096)
+def _rigid_frame(matrix: bytes) -> np.ndarray:
+    """The rigid frame (4, 4) of what stands still, which is asked for at every frame that is played
+    live; not to be written to.
+    """
+    frame = rigid_split(np.frombuffer(matrix).reshape(4, 4))[0]
+    frame.flags.writeable = False
+    return frame
 
 
 def _welded(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
