@@ -156,6 +156,7 @@ def seats(pictures: Path, builders: Any, rigs: Path) -> Waits:
     for file in sorted(rigs.glob("*.json")):
         with user.override():
             rig = builders.of_file(bpy, file)
+        rig.data.display_type, rig.show_in_front = "STICK", True
         _only(rig)
         yield 0.3
         yield from user.click("dafnet.detect_rig")
