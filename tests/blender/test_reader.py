@@ -259,6 +259,31 @@ def test_the_upper_body_of_another_character(stage: Stage) -> None:
     stage.cannot_be_read("no source")
 
 
+def test_the_lower_body_of_another_character(stage: Stage) -> None:
+    """Alone, and beside another one's upper body; carried to our root and size as that is."""
+    stage.scene.cursor.location = (4, 5, 0.2)
+    bob = create_character(bpy.context, "Bob", 1.4)
+    bob.pose.bones["left_knee"].rotation_quaternion = (0.9, 0.4, 0.0, 0.0)
+    stage.ann.dafnet.root.location = (1, 0, 0)
+    stage.ann.dafnet.lower_body_source = bob
+    stage.box("Chair")
+    stage.ann.dafnet.mode = "FULL"
+    controls = stage.read().controls
+    assert controls.lower_body.shape == (10, 8, 3) and controls.upper_body is None
+    rest = skeleton.REST[list(skeleton.LOWER)] + np.array([1, 0, 0])
+    shin = [skeleton.LOWER.index(skeleton.joint(f"left_{name}")) for name in ("ankle", "foot")]
+    others = [k for k in range(8) if k not in shin]
+    assert np.abs(controls.lower_body[0][others] - rest[others]).max() < 1e-4
+    assert np.abs(controls.lower_body[0][shin] - rest[shin]).max() > 0.1
+
+    stage.ann.dafnet.upper_body_source = bob
+    both = stage.read().controls
+    assert both.upper_body.shape == (10, 14, 3)
+    assert np.array_equal(both.lower_body, controls.lower_body)
+    stage.ann.dafnet.lower_body_source = stage.ann.dafnet.upper_body_source = None
+    stage.cannot_be_read("no source")
+
+
 @pytest.mark.parametrize(
     "values",
     [((1, 0.0), (10, 1.0)), ((1, 0.0), (3, 1.0), (5, 0.0)), ((1, 0.0), (9, 1.0), (10, 0.0))],
