@@ -20,6 +20,8 @@ _FIRST_READING = 0.6
 """Seconds of work before the window is drawn for the first time, and where that reads the scene,
 since Blender draws it for each of its frames that is set.
 """
+_SOON = 0.001
+"""Seconds from one tick to the next where nothing happens in between."""
 _VIEW_EVENTS = {
     "MOUSEMOVE",
     "INBETWEEN_MOUSEMOVE",
@@ -140,7 +142,7 @@ class LongOperator(DafnetOperator):
     def _listen(self, context: bpy.types.Context) -> None:
         """Let ``modal`` have the user's events from now on, and a tick whenever there are none."""
         manager = context.window_manager
-        self._timer = manager.event_timer_add(0.01, window=context.window)
+        self._timer = manager.event_timer_add(_SOON, window=context.window)
         manager.progress_begin(0, 100)
         manager.modal_handler_add(self)
         self._view.enter_context(drawn_once(context.preferences))

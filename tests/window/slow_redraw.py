@@ -104,7 +104,9 @@ def slow_redraw(pictures: Path) -> Waits:
         print(
             f"slow redraw: {call:.2f} s as one call, {spent:.2f} s in the window, "
             f"{worked:.2f} of them at work, {len(drawn)} redraws, {len(work.ticks)} "
-            f"ticks, the longest of {longest:.3f} s",
+            f"ticks, the longest of {longest:.3f} s; drawn after "
+            f"{[round(each - started, 1) for each in drawn]} s, ticks until "
+            f"{[round(end - started, 1) for _, end, _ in work.ticks[:4]]} s",
             flush=True,
         )
 
