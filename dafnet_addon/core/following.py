@@ -39,6 +39,7 @@ _CLIMB = 4.0  # a second; how soon another floor's height is taken up
 _CATCHES = 0.30  # metres around a seat, in which a root is meant to be on it
 _LETS_GO = 0.38  # metres from it, from which on it is not
 _ALIGNED = 0.16  # metres beside the way to a seat
+_BEFORE = (0.3, BEFORE_SEAT + 0.15)  # metres before a seat, between which one begins to sit down
 _FACES = np.radians(35.0)  # from the way that one sits
 _TURNS_AWAY = 0.20  # metres before a seat, where the heading lets go
 _SEATED_WAY = 0.25  # metres before a seat, in which one sits down or gets up
@@ -188,10 +189,11 @@ class RootFollower:
         away = self.position[:2] - meant.position
         along, beside = float(away @ ahead), float(away @ right)
         turned = abs(_wrapped(self.yaw - meant.yaw)) < _FACES
-        if turned and abs(beside) < _ALIGNED and -0.1 < along < BEFORE_SEAT + 0.15:
+        if turned and abs(beside) < _ALIGNED and _BEFORE[0] < along < _BEFORE[1]:
             self.seat = meant
             return meant.position, meant.yaw
-        if along < 0.2 and abs(beside) < _AROUND - 0.1:
+        over_it = abs(beside) < _ALIGNED and along > -_ALIGNED  # it was put there, or found late
+        if along < 0.2 and abs(beside) < _AROUND - 0.1 and not over_it:
             side = 1.0 if beside >= 0.0 else -1.0
             return meant.position + side * _AROUND * right + 0.3 * ahead, meant.yaw
         return meant.position + BEFORE_SEAT * ahead, meant.yaw

@@ -153,6 +153,16 @@ def test_a_seat_is_come_to_from_in_front_and_left_ahead(start: tuple[float, floa
     assert follower.seat is None
 
 
+def test_a_seat_that_is_found_late_is_come_to_from_in_front_as_well() -> None:
+    follower = RootFollower(np.append(SEAT.position, 0.0), SEAT.yaw)
+    ahead = []
+    for _ in range(300):
+        follower.step(np.array([2.0, 2.98, 0.0]), 0.0, [SEAT])
+        ahead.append(SEAT.position[1] - follower.position[1])
+    assert max(ahead) > 0.3, "nobody sits down inside of a seat"
+    assert np.linalg.norm(follower.position[:2] - SEAT.position) < 0.03
+
+
 def test_what_leads_along_a_way_waits_for_the_body() -> None:
     way = Way()
     for x in np.linspace(0.0, 3.0, 61):

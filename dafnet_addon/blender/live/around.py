@@ -2,7 +2,7 @@
 the seats in it.
 """
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from time import perf_counter
 
 import bpy
@@ -27,7 +27,9 @@ _AROUND = 0.9
 _UNDER = 0.05
 """Canonical metres around it, within which it is what is to be sat on."""
 
-_LOOKS = 0.008
+_ONE_SEAT = 0.25
+"""Metres between two seats, under which they are one that can be sat on in several ways."""
+_LOOKS = 0.012
 """Seconds of a tick that are spent on looking for seats."""
 
 
@@ -118,11 +120,20 @@ class LiveFurniture:
             if found is None:
                 return None
             self._looking.clear()
-            self._seats[under] = tuple(
+            self._seats[under] = _apart(
                 Seat(each.position * self._scale, each.yaw, each.aside * self._scale)
                 for each in found
             )
         return self._seats[under]
+
+
+def _apart(found: Iterable[Seat]) -> tuple[Seat, ...]:
+    """The best seats, the first, of those that are in each other's place but face other ways."""
+    kept: list[Seat] = []
+    for seat in found:
+        if all(np.linalg.norm(seat.position - each.position) > _ONE_SEAT for each in kept):
+            kept.append(seat)
+    return tuple(kept)
 
 
 def _looked_on(
