@@ -60,8 +60,9 @@ def _own_room(user: Driver) -> Waits:
     stool.name = "Stool"
     bpy.ops.ed.undo_push(message="Room")
     user.clicks = 0
-    yield from user.menu("A", "Add Character")
+    yield from user.menu("A", "Character")
     character = bpy.context.object
+    assert character is not stool and character.type == "ARMATURE", "the character is added"
     yield from user.sidebar("DAFNet")
     user.select(stool)
     yield 0.3
