@@ -71,7 +71,7 @@ def uses_of_takes(pictures: Path) -> Waits:
     assert off < 0.02
 
     take = ann.animation_data.action
-    yield from user.click("dafnet.take_to_nla")
+    yield from user.click("dafnet.take_to_nla", 0.15)
     (track,) = ann.animation_data.nla_tracks
     assert track.strips[0].action == take and ann.animation_data.action is None
     yield from user.click("dafnet.mark_take", 0.5)
