@@ -18,7 +18,6 @@ from ..dafnet_addon.blender.character.takes import active_take, draw_of, frames_
 from ..dafnet_addon.blender.overlay import display
 from ..dafnet_addon.blender.pipeline import job
 from ..dafnet_addon.blender.pipeline.running import running_job
-from ..dafnet_addon.blender.scene.unit_note import unit_note
 from ..dafnet_addon.blender.translations import translated_tip
 from ..dafnet_addon.core.errors import InputError
 from ..dafnet_addon.core.progress import run_to_end
@@ -150,9 +149,6 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
         unit = metres_per_unit(context.scene)
         for each in characters:
             bring_root_along(context.scene, each, each.dafnet.root, unit)
-        for note in {unit_note(context.scene, each) for each in characters}:
-            if note is not None:
-                self.report({"WARNING"}, note)
         if self.task != "NEW" or len(characters) == 1:
             return [self._settings(context)]
         return job.distinct_seeds([job.settings_of(o, context.scene) for o in characters])

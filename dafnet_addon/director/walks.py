@@ -327,7 +327,7 @@ def unit_doubt(
     all of them lie within a metre.
     """
     boxes = yield from boxes_of.steps(solids)
-    boxes = boxes[~np.isnan(boxes[:, 0, 0])]
+    boxes = boxes[(boxes[:, 1] > boxes[:, 0]).any(axis=1)]  # what has no size is in no unit
     if not len(boxes):
         return None
 

@@ -239,6 +239,8 @@ def test_a_worker_that_fails_is_told(tmp_path: Path, scheduler: str) -> None:
     stop = threading.Event()
 
     def kill() -> None:
+        # What waits for a worker counts as lost with it.
+        wait_until(lambda: stop.is_set() or (of.output / "b").exists(), 60.0)
         while not stop.is_set():
             for each in alive("a.json"):
                 parent = int(Path(f"/proc/{each}/stat").read_text(encoding="ascii").split()[3])

@@ -219,17 +219,23 @@ def test_no_root(shot: Shot, capsys: pytest.CaptureFixture[str]) -> None:
     assert code == 1 and "has no root; choose" in err
 
 
-@pytest.mark.parametrize("active", ["nothing", "the chair", "edit mode"])
-def test_where_the_button_is_grey_the_command_still_works(
-    shot: Shot,
-    capsys: pytest.CaptureFixture[str],
-    active: str,
+@pytest.mark.parametrize("active", ["nothing", "the chair"])
+def test_whatever_is_active_both_doors_work(
+    shot: Shot, capsys: pytest.CaptureFixture[str], active: str
 ) -> None:
-    objects = bpy.context.view_layer.objects
-    objects.active = {"nothing": None, "the chair": shot.chair, "edit mode": shot.chair}[active]
-    if active == "edit mode":
-        bpy.ops.object.mode_set(mode="EDIT")
-    assert "Select a character" in shot.refused_by_poll()
+    """The button is the character's until another one is chosen."""
+    bpy.context.view_layer.objects.active = {"nothing": None, "the chair": shot.chair}[active]
+    assert bpy.ops.dafnet.generate.poll()
+    code, out, _ = shot.command(capsys)
+    assert code == 0 and json.loads(out)["warnings"] == []
+
+
+def test_where_the_button_is_grey_the_command_still_works(
+    shot: Shot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bpy.context.view_layer.objects.active = shot.chair
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert "Switch to object or pose mode first" in shot.refused_by_poll()
     code, out, _ = shot.command(capsys)
     assert code == 0 and json.loads(out)["warnings"] == []
 
@@ -382,6 +388,10 @@ WARNINGS: dict[str, tuple[Change, str]] = {
     "furniture scaled to zero": (
         lambda s: setattr(s.chair, "scale", (0, 0, 0)),
         "'Chair' is scaled to zero",
+    ),
+    "furniture in centimetres": (
+        lambda s: setattr(s.chair, "scale", (0.01, 0.01, 0.01)),
+        "across: is its unit right",
     ),
     "furniture that grows from nothing": (
         lambda s: key(s.chair, "scale", (1, (0, 0, 0)), (9, (1, 1, 1))),

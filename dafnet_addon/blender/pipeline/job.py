@@ -25,6 +25,7 @@ from ..character.takes import add_take, draw_of, play_take, stored_take
 from ..preferences import weights_path
 from ..scene.lookup import find_action, find_object, find_scene, names_in_use
 from ..scene.scene_reader import read_scene
+from ..scene.unit_note import unit_note
 from .baker import bake
 from .rollback import state_restorer, undone_on_failure
 from .running import note_change
@@ -136,6 +137,7 @@ def run(
     started = perf_counter()
     used = names_in_use(settings)
     kept = _kept_take(settings)
+    note = unit_note(find_scene(settings), _character(settings))
 
     try:
         read = yield from within(read_scene.steps(context, settings), 0.0, _READ)
@@ -181,7 +183,7 @@ def run(
         actions=tuple(actions),
         takes=tuple(takes),
         draws=tuple(draws),
-        warnings=read.warnings + takes[0].warnings,
+        warnings=(*([note] if note else []), *read.warnings, *takes[0].warnings),
         seconds=seconds,
     )
 
