@@ -86,9 +86,9 @@ class Known:
 
 def _thinned(parts: Sequence[np.ndarray]) -> np.ndarray:
     """Points (N, k) float32, of those closer together than a centimetre only one."""
-    parts = [part for part in parts if len(part)]
+    every, parts = parts, [part for part in parts if len(part)]
     if not parts:
-        return np.zeros((0, 3), np.float32)
+        return np.zeros((0, every[0].shape[1] if every else 3), np.float32)
     low = np.min([part.min(axis=0) for part in parts], axis=0)
     high = np.max([part.max(axis=0) for part in parts], axis=0)
     counts = np.rint((high - low) * 100.0).astype(np.int64) + 1
