@@ -73,10 +73,13 @@ class DAFNET_OT_walk_along_curve(WalkOperator, bpy.types.Operator):
     gets_up: FloatProperty(options={"SKIP_SAVE"}, **MANNER["gets_up"])
     keep_facing: BoolProperty(
         name="Keep Facing",
+        options={"SKIP_SAVE"},
         description="Keep looking where it looks now, instead of along the curve",
     )
     backwards: BoolProperty(
-        name="Backwards", description="Walk from the curve's end to its beginning"
+        name="Backwards",
+        options={"SKIP_SAVE"},
+        description="Walk from the curve's end to its beginning",
     )
 
     @classmethod
@@ -118,7 +121,9 @@ class DAFNET_OT_walk_through_points(WalkOperator, bpy.types.Operator):
     seconds: FloatProperty(options={"SKIP_SAVE"}, **MANNER["seconds"])
     gets_up: FloatProperty(options={"SKIP_SAVE"}, **MANNER["gets_up"])
     to_cursor: BoolProperty(
-        name="On to Cursor", description="Walk on from the last empty to the 3D cursor"
+        name="On to Cursor",
+        options={"SKIP_SAVE"},
+        description="Walk on from the last empty to the 3D cursor",
     )
 
     @classmethod

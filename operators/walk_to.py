@@ -42,11 +42,14 @@ class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
     sits_down: FloatProperty(options={"SKIP_SAVE"}, **MANNER["sits_down"])
     gets_up: FloatProperty(options={"SKIP_SAVE"}, **MANNER["gets_up"])
     tables: BoolProperty(
-        name="On Tables", description="Sit on a table or a desk as well, if that is selected"
+        name="On Tables",
+        options={"SKIP_SAVE"},
+        description="Sit on a table or a desk as well, if that is selected",
     )
     pull_out: EnumProperty(
         name="Pull Out",
         default="NO",
+        options={"SKIP_SAVE"},
         description="A seat that is tucked under a table, so that the character fits",
         items=[
             ("NO", "Leave", "Say by how far it has to come out, and do nothing"),
@@ -60,6 +63,7 @@ class DAFNET_OT_walk_to(WalkOperator, bpy.types.Operator):
     )
     mark_seat: BoolProperty(
         name="Mark Seat",
+        options={"SKIP_SAVE"},
         description="Keep where one sits on the piece, as the custom property OMI_seat, which glTF "
         "files take along; it counts the next time",
     )

@@ -83,6 +83,25 @@ def test_walks_go_on_from_the_last_key_and_leave_the_earlier_ones(room: Room) ->
     )
 
 
+def test_what_was_asked_for_once_is_not_done_to_the_next_piece(room: Room) -> None:
+    """Buttons fill what they leave open from the last run, but for what is not saved."""
+    for operator, goals in (
+        (bpy.ops.dafnet.walk_to, {"goal"}),
+        (bpy.ops.dafnet.walk_along_curve, set()),
+        (bpy.ops.dafnet.walk_through_points, set()),
+    ):
+        properties = operator.get_rna_type().properties
+        saved = {p.identifier for p in properties if not p.is_skip_save} - {"rna_type"}
+        assert saved == goals, operator
+
+
+def test_who_stands_close_before_the_seat_sits_down_on_it(room: Room) -> None:
+    room.ann.location = room.root.location = (0.0, 2.64, 0.0)
+    room.select(room.chair)
+    assert bpy.ops.dafnet.walk_to(goal="SEAT", seconds=1.0) == {"FINISHED"}
+    assert 3.1 < room.place(room.scene.frame_end)[1] < 3.35
+
+
 def test_what_cannot_be_walked_to_changes_nothing(room: Room) -> None:
     def refused(words: str, goal: str = "SEAT") -> None:
         with pytest.raises(RuntimeError, match=words):

@@ -446,7 +446,8 @@ def _route_to_seat(start: Start, here: Stop, asked: _Request) -> Generator[float
     passages = yield from within(met, 0.6, 1.0)
 
     gap = np.linalg.norm(route.path.position[:, :2] - spot.position, axis=1)
-    sits_down_after = int(np.flatnonzero(gap > _SITTING_DOWN)[-1])
+    far = np.flatnonzero(gap > _SITTING_DOWN)
+    sits_down_after = int(far[-1]) if len(far) else 0
     for each in passages:
         if each.stop - 1 > sits_down_after and each.name not in asked.names:
             raise InputError(
