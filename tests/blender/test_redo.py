@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.walk_rows import title_of_walk
 from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
-from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import redo
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import made_walks, redo
 from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.plan_keys import plan_edited
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.panels.setup import DAFNET_PT_setup, DAFNET_PT_walks
@@ -263,6 +263,17 @@ def test_a_plan_of_tasks_takes_the_place_of_walks(room: Room) -> None:
     row.verb, row.about = "SIT_ON", "Stool"
     assert bpy.ops.dafnet.plan_tasks() == {"FINISHED"}
     assert not room.own.walks and not bpy.ops.dafnet.redo_walk.poll()
+
+
+def test_the_chosen_walk_is_one_that_is_left(room: Room) -> None:
+    room.go(0.0, 2.0)
+    room.go(2.0, 2.0)
+    assert room.own.active_walk == 1
+    made_walks.forget_walks(room.ann, room.own.walks[1].first)
+    assert (len(room.own.walks), room.own.active_walk) == (1, 0)
+    assert not made_walks.edited_from(room.ann, 1), "of no walk"
+    assert bpy.ops.dafnet.redo_walk(replace_edited=True) == {"FINISHED"}
+    assert room.own.active_walk == 0
 
 
 def test_a_plan_knows_whether_it_would_replace_edited_keys(room: Room) -> None:

@@ -90,6 +90,7 @@ def forget_walks(character: bpy.types.Object, first: int) -> None:
     for k in reversed(range(len(own.walks))):
         if own.walks[k].first >= first:
             own.walks.remove(k)
+    own.active_walk = max(0, min(own.active_walk, len(own.walks) - 1))
 
 
 def intact_walks(character: bpy.types.Object) -> tuple[bool, ...]:
@@ -104,7 +105,9 @@ def edited_from(character: bpy.types.Object, index: int) -> bool:
     """
     own: Any = character.dafnet
     rows = list(own.walks)[index:]
-    if own.root is None or not any(keys_within(own.root, MOVES, rows[0].first + 1e-3)):
+    if not rows or own.root is None:
+        return False
+    if not any(keys_within(own.root, MOVES, rows[0].first + 1e-3)):
         return False
     return not all(_intact(own.root, row) for row in rows) or any(
         keys_within(own.root, MOVES, rows[-1].last + 1e-3)

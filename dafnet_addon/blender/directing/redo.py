@@ -72,7 +72,7 @@ def redo_walks(
             begins = Beginning(made[-1].last)
         _follow_range(scene, armature, last, made[-1].last)
 
-    own.active_walk = index
+    own.active_walk = min(index, len(own.walks) - 1)
     kept = [f"Your keys are kept in '{copied.name}'."] if copied is not None else []
     told = tuple(dict.fromkeys(warning for each in made for warning in each.warnings))
     return replace(made[-1], first=first, warnings=(*kept, *told))
