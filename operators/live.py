@@ -111,8 +111,10 @@ class DAFNET_OT_live(DafnetOperator, bpy.types.Operator):
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender ends it, as it closes: everything is put back."""
-        end_live()
-        self._stop_listening(context)
+        try:
+            end_live()
+        finally:
+            self._stop_listening(context)
 
     def _tick(self, context: bpy.types.Context) -> None:
         now = perf_counter()
@@ -124,8 +126,7 @@ class DAFNET_OT_live(DafnetOperator, bpy.types.Operator):
 
     def _finish(self, context: bpy.types.Context, why: str | None = None) -> set[str]:
         """Put everything back, and keep what was recorded."""
-        end_live()
-        self._stop_listening(context)
+        self.cancel(context)
         if why is not None:
             self.report({"WARNING"}, why)
         if self._state.gone:

@@ -246,6 +246,33 @@ def test_what_ends_it(shot: Stage, ended: object, tmp_path) -> None:
     assert live_state() is None and "opened" in str(state.why)
 
 
+def test_a_bone_that_is_renamed_ends_it_and_the_rest_is_put_back(
+    shot: Stage, ended: object
+) -> None:
+    undoes, place = bpy.context.preferences.edit.use_global_undo, tuple(shot.root.location)
+    played = Played(shot)
+    played.run(0.3, (1.0, 0.0))
+    shot.ann.data.bones["left_knee"].name = "Knee"
+    with pytest.raises(Over, match="'left_knee' was renamed or removed"):
+        played.run(0.1)
+    shot.scene.frame_set(9)
+    end_live()
+    assert tuple(shot.root.location) == place and shot.scene.frame_current == 5
+    assert tuple(shot.ann.pose.bones["left_hip"].rotation_quaternion) == (1, 0, 0, 0)
+    assert bpy.context.preferences.edit.use_global_undo == undoes
+
+
+def test_a_step_back_that_fails_keeps_no_other_from_being_taken(shot: Stage, ended: object) -> None:
+    undoes, place = bpy.context.preferences.edit.use_global_undo, tuple(shot.root.location)
+    played = Played(shot)
+    played.run(0.3, (1.0, 0.0))
+    played.session._undo.insert(0, {}.popitem)
+    with pytest.raises(KeyError):
+        end_live()
+    assert tuple(shot.root.location) == place
+    assert bpy.context.preferences.edit.use_global_undo == undoes
+
+
 def test_what_it_cannot_lead_is_said_and_nothing_changes(shot: Stage, ended: object) -> None:
     before = shot.state()
     with pytest.raises(RuntimeError, match="needs a window"):

@@ -74,17 +74,19 @@ def end_live() -> None:
             handlers.remove(function)
     if session.recording:
         session.stop_recording()
-    session.restore()
-    preferences = bpy.context.preferences
-    was_dirty = preferences.is_dirty
-    preferences.edit.use_global_undo = _undoes.pop()[0]
-    preferences.is_dirty = was_dirty
+    try:
+        session.restore()
+    finally:
+        preferences = bpy.context.preferences
+        was_dirty = preferences.is_dirty
+        preferences.edit.use_global_undo = _undoes.pop()[0]
+        preferences.is_dirty = was_dirty
 
 
 def _ended(why: str, gone: bool) -> None:
     if (state := live_state()) is not None:
-        end_live()
         state.why, state.gone = why, gone
+        end_live()
 
 
 @persistent

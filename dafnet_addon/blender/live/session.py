@@ -145,13 +145,18 @@ class LiveSession:
 
     def restore(self) -> None:
         """Put the armature, the root, the targets and the frame back as they were; what is gone
-        stays gone.
+        stays gone. The first other error is raised once all the rest is back.
         """
+        failed: Exception | None = None
         while self._undo:
             try:
                 self._undo.pop(0)()
             except ReferenceError:
                 continue
+            except Exception as error:
+                failed = failed or error
+        if failed is not None:
+            raise failed
 
     def tick(self, context: bpy.types.Context, now: float) -> int:
         """Make the frames that are due at ``now``, seconds, and show the last one; how many it
@@ -272,6 +277,8 @@ class LiveSession:
                 del self.targets[role]
         except ReferenceError:
             raise Over("Live ended, since something that leads it was deleted.") from None
+        if lost := [name for name in JOINTS if name not in self.armature.pose.bones]:
+            raise Over(f"Live ended, since the bone '{lost[0]}' was renamed or removed.")
         if context.mode not in {"OBJECT", "POSE"}:
             raise Over("Live ended, since it works in object and pose mode only.")
         if bpy.app.is_job_running("RENDER"):

@@ -60,7 +60,9 @@ def state_restorer(armature: bpy.types.Object) -> Callable[[bpy.types.Object], N
         restore_playback(found)
         _set(found, own)
         for name, (channels, numbers) in bones.items():
-            bone = found.pose.bones[name]
+            bone = found.pose.bones.get(name)
+            if bone is None:  # renamed or removed since
+                continue
             _set(bone, channels)
             for key, value in numbers.items():
                 bone[key] = value
