@@ -2,6 +2,7 @@
 by the body.
 """
 
+from contextlib import ExitStack
 from types import ModuleType
 from typing import Any
 
@@ -10,7 +11,12 @@ import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.walk_rows import title_of_walk
 from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
-from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import made_walks, redo
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import (
+    made_walks,
+    redo,
+    root_keys,
+    walking,
+)
 from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.plan_keys import plan_edited
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.panels.setup import DAFNET_PT_setup, DAFNET_PT_walks
@@ -221,6 +227,56 @@ def test_what_cannot_be_made_again_changes_nothing(
         bpy.ops.dafnet.redo_walk()
     with pytest.raises(InputError, match="no walk"):
         redo.redo_walks(bpy.context, room.ann, 7)
+
+
+@pytest.mark.parametrize("edited", [False, True])
+def test_what_fails_while_a_later_walk_is_keyed_changes_nothing(
+    room: Room, monkeypatch: pytest.MonkeyPatch, edited: bool
+) -> None:
+    """Each walk is guarded by itself, and all of them together."""
+    room.sit(seconds=1.0)
+    room.go(3.0, 0.0)
+    room.own.active_walk = 0
+    if edited:
+        curve = next(c for c in action_curves(room.root) if c.data_path == "location")
+        curve.keyframe_points[4].co[1] += 0.3
+    keys, name = keys_of(room.root), room.root.animation_data.action.name
+    actions = {action.name for action in bpy.data.actions}
+    made, key_route = [], walking.key_route
+
+    def fails_at_the_second(*given: Any, **named: Any) -> None:
+        made.append(key_route(*given, **named))
+        if len(made) == 2:
+            raise InputError("no more keys")
+
+    monkeypatch.setattr(walking, "key_route", fails_at_the_second)
+    room.own.walks[0].seconds = 5.0
+    with pytest.raises(RuntimeError, match="no more keys"):
+        bpy.ops.dafnet.redo_walk(replace_edited=edited)
+    now = keys_of(room.root)
+    assert now.keys() == keys.keys()
+    assert all(np.array_equal(now[each], keys[each]) for each in keys)
+    assert room.root.animation_data.action.name == name
+    assert {action.name for action in bpy.data.actions} == actions
+    monkeypatch.undo()
+    assert bpy.ops.dafnet.redo_walk(replace_edited=edited) == {"FINISHED"}
+
+
+def test_owners_of_one_action_are_guarded_one_by_one(room: Room) -> None:
+    room.go(0.0, 2.0)
+    action, other = room.root.animation_data.action, room.empty("Other")
+    other.animation_data_create().action = action
+    keys, actions = keys_of(room.root), {action.name for action in bpy.data.actions}
+    with pytest.raises(InputError), ExitStack() as undo:
+        for owner in (room.root, other):
+            undo.enter_context(root_keys.unchanged_on_failure(owner))
+        root_keys.remove_keys_from(room.root, 1)
+        raise InputError("no keys")
+    now = keys_of(room.root)
+    assert now.keys() == keys.keys()
+    assert all(np.array_equal(now[each], keys[each]) for each in keys)
+    assert room.root.animation_data.action == other.animation_data.action
+    assert {action.name for action in bpy.data.actions} == actions
 
 
 def test_a_walk_that_takes_the_place_of_another_s_end_leaves_its_beginning(room: Room) -> None:

@@ -212,22 +212,26 @@ def keys_within(
 
 @contextmanager
 def unchanged_on_failure(root: bpy.types.Object) -> Iterator[None]:
-    """A block that writes keys: if it fails, the root's keys and place are as they were."""
+    """A block that writes keys: if it fails, the root's keys and place are as they were.
+
+    Such blocks may be within each other, and their roots may share an action.
+    """
     data = root.animation_data
     action = data.action if data else None
     kept = action.copy() if action else None
+    name, fake_user = (action.name, action.use_fake_user) if action else ("", False)
     place, turn = root.location.copy(), root.rotation_euler.copy()
     try:
         yield
     except BaseException:
-        added = root.animation_data.action if root.animation_data else None
-        if action and kept:
-            name, kept.use_fake_user = action.name, action.use_fake_user
-            action.user_remap(kept)
-            bpy.data.actions.remove(action)
-            kept.name = name
-        elif added:
-            bpy.data.actions.remove(added)
+        # A block within this one that failed has put its own copy in the action's place.
+        now = root.animation_data.action if root.animation_data else None
+        if now and kept:
+            now.user_remap(kept)
+        if now:
+            bpy.data.actions.remove(now)
+        if kept:
+            kept.name, kept.use_fake_user = name, fake_user
         if data is None:
             root.animation_data_clear()
         root.location, root.rotation_euler = place, turn
