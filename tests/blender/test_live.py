@@ -273,6 +273,21 @@ def test_a_step_back_that_fails_keeps_no_other_from_being_taken(shot: Stage, end
     assert bpy.context.preferences.edit.use_global_undo == undoes
 
 
+def test_what_is_renamed_is_still_led_and_recorded(shot: Stage, ended: object) -> None:
+    played = Played(shot)
+    played.session.record()
+    played.run(0.3)
+    for named in (shot.ann, shot.root, shot.scene, shot.furniture, shot.own.hand_right):
+        named.name += " renamed"
+    bpy.data.objects["Chair"].location.x = 3.0
+    played.run(1.0, (0.5, 0.0))
+    (seat, _) = played.session.furniture.scene.solids
+    assert abs(np.asarray(seat.matrix)[0, 3] - 3.0) < 1e-6
+    end_live()
+    (result,) = run_to_end(keep_clips(played.session))
+    assert shot.ann.animation_data.action == result.action
+
+
 def test_what_it_cannot_lead_is_said_and_nothing_changes(shot: Stage, ended: object) -> None:
     before = shot.state()
     with pytest.raises(RuntimeError, match="needs a window"):

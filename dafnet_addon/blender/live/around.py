@@ -48,14 +48,13 @@ class LiveFurniture:
         scale: float,
         floor: float,
     ) -> None:
-        self._settings = settings
         self._unit, self._scale = unit, scale
         self._moved, self._read_at = False, -np.inf
-        self._read(context, floor)
+        self._read(context, settings, floor)
 
-    def _read(self, context: bpy.types.Context, floor: float) -> None:
-        furniture = furniture_of(self._settings, Dependencies(context.scene))
-        self._count, self._floor = self._objects(), floor
+    def _read(self, context: bpy.types.Context, settings: Settings, floor: float) -> None:
+        furniture = furniture_of(settings, Dependencies(context.scene))
+        self._count, self._floor = _objects_of(settings), floor
         self.members: set[bpy.types.Object] = set()
         self.scene = Scene()
         if furniture is not None:
@@ -66,11 +65,6 @@ class LiveFurniture:
         self._seats: dict[frozenset[int], tuple[Seat, ...]] = {}
         self._looking: dict[frozenset[int], Generator[float, None, list[SeatPlace]]] = {}
 
-    def _objects(self) -> int:
-        """How many objects the collection of furniture holds."""
-        name = self._settings.furniture
-        return len(find_collection(name).all_objects) if name else 0
-
     def note(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Blender has evaluated something anew: it may have been furniture."""
         if not self._moved:
@@ -80,19 +74,22 @@ class LiveFurniture:
                 for update in depsgraph.updates
             )
 
-    def read_again(self, context: bpy.types.Context, floor: float, now: float) -> bool:
+    def read_again(
+        self, context: bpy.types.Context, settings: Settings, floor: float, now: float
+    ) -> bool:
         """Read what was moved, added or removed, or all of it where the root is on another floor,
-        twice a second while that goes on; ``now``: seconds. Whether it did.
+        twice a second while that goes on; ``settings``: with the present names; ``now``: seconds.
+        Whether it did.
 
         ``InputError``: there is none any more.
         """
         if now - self._read_at < _REREAD:
             return False
         same_floor = abs(floor - self._floor) < FLOOR
-        if not self._moved and same_floor and self._objects() == self._count:
+        if not self._moved and same_floor and _objects_of(settings) == self._count:
             return False
         self._moved, self._read_at = False, now
-        self._read(context, floor)
+        self._read(context, settings, floor)
         return True
 
     def seats(
@@ -125,6 +122,12 @@ class LiveFurniture:
                 for each in found
             )
         return self._seats[under]
+
+
+def _objects_of(settings: Settings) -> int:
+    """How many objects the collection of furniture holds."""
+    name = settings.furniture
+    return len(find_collection(name).all_objects) if name else 0
 
 
 def _apart(found: Iterable[Seat]) -> tuple[Seat, ...]:

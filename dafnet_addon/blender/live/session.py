@@ -7,8 +7,10 @@ objects of the file, so it ends before the file is undone, closed or saved (``li
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from time import perf_counter
+from typing import Any
 
 import bpy
 import numpy as np
@@ -26,7 +28,7 @@ from ...core.series import MODEL_FPS
 from ...core.skeleton import JOINTS, TARGETS
 from ...core.weights import Weights
 from ..character.armature import metres_per_unit
-from ..character.settings import HELD, settings_of
+from ..character.settings import HELD, Settings, settings_of
 from ..directing.root_keys import require_keyable
 from ..pipeline.baker import channels_of, ready_to_pose, require_bakeable
 from ..pipeline.job import clean_up_of
@@ -77,7 +79,10 @@ class LiveSession:
     ) -> None:
         """Without ``weights`` those of the preferences, else the shipped ones, are loaded."""
         self.scene, self.armature = context.scene, armature
-        self.settings = settings_of(armature, self.scene)
+        self._settings = settings_of(armature, self.scene)
+        self._named = {"armature": armature, "scene": self.scene} | {
+            name: getattr(armature.dafnet, name) for name in ("root", "furniture", *TARGETS)
+        }
         self.unit = metres_per_unit(self.scene)
         self.scale = require_bakeable(armature, self.unit)
         if self.settings.root is None:
@@ -121,6 +126,18 @@ class LiveSession:
         self.durations: deque[float] = deque(maxlen=_TIMED)
         self._started, self._made = 0.0, -1
         self._undo: list[Callable[[], None]] = []
+
+    @property
+    def settings(self) -> Settings:
+        """The character's settings when the session was made, with what they name as it is called
+        now; what is gone keeps the name that it had.
+        """
+        names: dict[str, Any] = {}
+        for field_name, held in self._named.items():
+            with suppress(ReferenceError):
+                names[field_name] = held.name_full if held else None
+        self._settings = replace(self._settings, **names)
+        return self._settings
 
     def begin(self) -> None:
         """Take hold of the armature: from now on it shows the body."""
@@ -179,7 +196,7 @@ class LiveSession:
         due -= late
 
         try:
-            if self.furniture.read_again(context, self.floor, now):
+            if self.furniture.read_again(context, self.settings, self.floor, now):
                 self.body.surroundings = self.furniture.surroundings
         except InputError as error:
             raise Over(f"Live ended. {error}") from error
