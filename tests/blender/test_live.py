@@ -288,6 +288,31 @@ def test_what_is_renamed_is_still_led_and_recorded(shot: Stage, ended: object) -
     assert shot.ann.animation_data.action == result.action
 
 
+def test_a_free_recording_takes_nothing_over_from_one_that_reached(
+    shot: Stage, ended: object
+) -> None:
+    hand, at_first = shot.own.hand_right, tuple(shot.own.hand_right.location)
+    played = Played(shot)
+    played.session.record()
+    played.run(0.3)
+    hand.location = 0.3, 0.35, 1.45
+    played.run(0.5)
+    played.session.stop_recording()
+    hand.location = at_first
+    played.run(2.0)
+    played.session.record()
+    played.run(0.5)
+    end_live()
+    reached, free = run_to_end(keep_clips(played.session))
+    assert [stored_take(each.action)[1].mode for each in (reached, free)] == ["EE", "FREE"]
+    assert shot.ann.animation_data.action == free.action
+    paths = {path for path, _ in keys_of(shot.ann)}
+    assert not [path for path in paths if path.endswith("_influence")]
+    assert keys_of(shot.ann)["dafnet.mode", 0].shape == (1, 2)
+    shot.scene.frame_set(7)
+    assert shot.own.mode == "FREE"
+
+
 def test_what_it_cannot_lead_is_said_and_nothing_changes(shot: Stage, ended: object) -> None:
     before = shot.state()
     with pytest.raises(RuntimeError, match="needs a window"):

@@ -79,20 +79,22 @@ def _key_what_led(
     angles = np.stack([0 * heading, 0 * heading, heading], axis=1)
     places = root[:, :3, 3] / session.unit
     _key(session.root, frames, {"location": places, "rotation_euler": angles})
+
+    # What an earlier action keyed counted for that one.
+    armature = session.armature
+    for path in ("dafnet.mode", *(f"dafnet.{role}_influence" for role in TARGETS)):
+        remove_curves(armature, path)
+    armature.dafnet.mode = controls.mode
+    armature.keyframe_insert("dafnet.mode", frame=start)
     if controls.mode == "FREE":
         return
 
-    armature = session.armature
-    remove_curves(armature, "dafnet.mode")
-    armature.dafnet.mode = "EE"
-    armature.keyframe_insert("dafnet.mode", frame=start)
     for role in TARGETS:
         path = f"dafnet.{role}_influence"
         if not getattr(armature.dafnet, role):
             continue
         share = getattr(controls, f"{role}_influence")
         share = np.zeros(len(frames)) if share is None else share
-        remove_curves(armature, path)
         turns = np.diff(share, n=2, prepend=share[0], append=share[-1]) != 0.0
         turns[[0, -1]] = True
         for k in np.flatnonzero(turns):
