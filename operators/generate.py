@@ -13,7 +13,7 @@ from ..dafnet_addon.blender.character.armature import (
     selected_characters,
 )
 from ..dafnet_addon.blender.character.settings import COMES_AND_GOES, HELD
-from ..dafnet_addon.blender.character.standing import bring_root_along
+from ..dafnet_addon.blender.character.standing import roots_brought_along
 from ..dafnet_addon.blender.character.takes import active_take, draw_of, frames_of
 from ..dafnet_addon.blender.overlay import display
 from ..dafnet_addon.blender.pipeline import job
@@ -146,9 +146,6 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
     def _people(self, context: bpy.types.Context) -> list[job.Settings]:
         """The settings of all selected characters; further ones only for new takes."""
         characters = selected_characters(context)
-        unit = metres_per_unit(context.scene)
-        for each in characters:
-            bring_root_along(context.scene, each, each.dafnet.root, unit)
         if self.task != "NEW" or len(characters) == 1:
             return [self._settings(context)]
         return job.distinct_seeds([job.settings_of(o, context.scene) for o in characters])
@@ -164,10 +161,12 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
     def _job(
         self, context: bpy.types.Context, watch: Callable[[int, np.ndarray], None] | None = None
     ) -> Generator[float, None, tuple[job.Result, ...]]:
-        people = self._people(context)
-        if len(people) > 1:
-            return job.run_all.steps(context, people, watch)
-        return _alone(job.run.steps(context, people[0], watch=watch))
+        unit = metres_per_unit(context.scene)
+        with roots_brought_along(context.scene, selected_characters(context), unit):
+            people = self._people(context)
+            if len(people) > 1:
+                return (yield from job.run_all.steps(context, people, watch))
+            return ((yield from job.run.steps(context, people[0], watch=watch)),)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Start the job and show the frames as they are made."""
@@ -194,13 +193,6 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
 
     def _watch(self, _frame: int, joints: np.ndarray) -> None:
         self._running.joints = joints
-
-
-def _alone(
-    steps: Generator[float, None, job.Result],
-) -> Generator[float, None, tuple[job.Result, ...]]:
-    result = yield from steps
-    return (result,)
 
 
 class DAFNET_OT_cancel(DafnetOperator, bpy.types.Operator):

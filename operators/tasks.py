@@ -11,7 +11,6 @@ from ..dafnet_addon.blender.character.armature import (
     metres_per_unit,
     selected_characters,
 )
-from ..dafnet_addon.blender.character.standing import bring_root_along
 from ..dafnet_addon.blender.character.task_rows import TaskRow, add_row, tasks_of
 from ..dafnet_addon.blender.directing.plan_keys import plan_edited
 from ..dafnet_addon.blender.directing.tasks import Assignment, Directed, direct
@@ -118,8 +117,6 @@ class DAFNET_OT_plan_tasks(LongOperator, bpy.types.Operator):
         """Plan and key them, in the order of their names."""
         unit = metres_per_unit(context.scene)
         chosen = [o for o in selected_characters(context) if len(o.dafnet.tasks)]
-        for each in chosen:
-            bring_root_along(context.scene, each, each.dafnet.root, unit)
         people = [
             Assignment(o, tasks_of(o, unit), o.dafnet.already_there)
             for o in sorted(chosen, key=lambda o: o.name)

@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.task_rows import tasks_of
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.walk_rows import title_of_walk
 from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
 from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import (
@@ -18,6 +19,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import (
     walking,
 )
 from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.plan_keys import plan_edited
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.tasks import Assignment, direct
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.panels.setup import DAFNET_PT_setup, DAFNET_PT_walks
 
@@ -150,6 +152,35 @@ def test_a_character_taken_by_its_body_is_generated_where_it_stands(room: Room) 
     assert bpy.ops.dafnet.generate() == {"FINISHED"}
     assert room.ann.location.x == pytest.approx(-3.0, abs=1e-3)
     assert room.root.location.x == pytest.approx(-3.0, abs=1e-3)
+
+
+def test_a_character_taken_by_its_body_lies_down_from_where_it_stands(room: Room) -> None:
+    bed = room.box("Bed", (2.0, 3.0, 0.0), (3.6, 5.0, 0.45))
+    room.ann.location.x = -2.0
+    room.select(bed, room.ann)
+    assert bpy.ops.dafnet.lie_on(seconds=1.0) == {"FINISHED"}
+    assert np.allclose(room.place(1)[:2], (-2.0, 0.0), atol=1e-3)
+
+
+def test_a_root_is_brought_along_only_by_what_is_done(room: Room) -> None:
+    room.ann.location.x = -2.0
+    row = room.own.tasks.add()
+    row.verb, row.about = "SIT_ON", "Stool"
+    bpy.context.view_layer.update()
+    job = direct.steps(bpy.context, [Assignment(room.ann, tasks_of(room.ann, 1.0))])
+    for _ in range(5):
+        next(job)
+    assert room.root.location.x == pytest.approx(-2.0)
+    job.close()
+    assert room.root.location.x == 0.0, "Esc"
+    row.about = "Nothing"
+    with pytest.raises(RuntimeError, match="Nothing"):
+        bpy.ops.dafnet.plan_tasks()
+    assert room.root.location.x == 0.0
+    with pytest.raises(RuntimeError, match="Choose a take"):
+        bpy.ops.dafnet.generate(task="ONWARD")
+    assert room.root.location.x == 0.0
+    assert not room.root.animation_data
 
 
 def test_a_root_that_was_moved_counts_more_than_the_body(room: Room) -> None:

@@ -1,5 +1,7 @@
 """Where a character stands: its root says so, but users take hold of the body as well."""
 
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
@@ -9,10 +11,10 @@ from ..compat import action_curves
 
 __all__ = [
     "Displacement",
-    "bring_root_along",
     "moved_by_hand",
     "note_standing",
     "pose_by_keys",
+    "roots_brought_along",
     "standing",
 ]
 
@@ -59,15 +61,30 @@ def standing(
     return here
 
 
-def bring_root_along(
-    scene: bpy.types.Scene, armature: bpy.types.Object, root: bpy.types.Object | None, unit: float
-) -> None:
-    """Move a root that nothing moves to where the character stands (``standing``)."""
-    if root is None or root.parent or len(root.constraints) or root.animation_data:
-        return
-    pose = standing(scene, armature, root, unit)
-    if _differ(pose, _pose(root, "root"), unit):
-        root.location, root.rotation_euler[2] = pose[:3], pose[3]
+@contextmanager
+def roots_brought_along(
+    scene: bpy.types.Scene, armatures: Iterable[bpy.types.Object], unit: float
+) -> Iterator[None]:
+    """A block before which roots that nothing moves are moved to where their characters stand
+    (``standing``); if it fails, or its job is closed, they are where they were.
+    """
+    before: dict[str, np.ndarray] = {}
+    for armature in armatures:
+        root = armature.dafnet.root
+        if root is None or root.parent or len(root.constraints) or root.animation_data:
+            continue
+        here, pose = _pose(root, "root"), standing(scene, armature, root, unit)
+        if _differ(pose, here, unit):
+            before[root.name_full] = here
+            root.location, root.rotation_euler[2] = pose[:3], pose[3]
+    try:
+        yield
+    except BaseException:
+        for root in [each for each in scene.objects if each.name_full in before]:
+            if not root.animation_data:
+                pose = before[root.name_full]
+                root.location, root.rotation_euler[2] = pose[:3], pose[3]
+        raise
 
 
 def moved_by_hand(

@@ -19,6 +19,7 @@ from ...director.tasks import Task
 from ...director.track import Targets
 from ..character.armature import character_scale, is_character, metres_per_unit
 from ..character.settings import Settings, settings_of
+from ..character.standing import roots_brought_along
 from ..character.targets import add_root, lacks_root
 from ..populating.surroundings import room_of
 from ..scene.lookup import find_object
@@ -72,10 +73,19 @@ def direct(
     """Plan the tasks of some characters of the active scene, one after another, from the start of
     their ranges on, and key them. All others in the scene are walked round and waited for.
 
-    A root is added where a character has none. Who has no furniture gets what is near her path. A
+    They begin where their bodies stand, if those alone were moved by hand (``standing``). A root is
+    added where a character has none. Who has no furniture gets what is near her path. A
     job that yields its progress. ``InputError``, with the character's name: something cannot be
     done or keyed; what was keyed for those before stays only if all of them could be planned.
     """
+    armatures = [assigned.armature for assigned in people]
+    with roots_brought_along(context.scene, armatures, metres_per_unit(context.scene)):
+        return (yield from _direct(context, people))
+
+
+def _direct(
+    context: bpy.types.Context, people: Sequence[Assignment]
+) -> Generator[float, None, tuple[Directed, ...]]:
     scene = context.scene
     unit, fps = metres_per_unit(scene), scene.render.fps / scene.render.fps_base
     for assigned in people:
