@@ -77,21 +77,25 @@ def add_strip(track: bpy.types.NlaTrack, action: bpy.types.Action) -> bpy.types.
 def playback_restorer(owner: bpy.types.Object) -> Callable[[bpy.types.Object], None]:
     """A function that makes ``owner`` play again what it plays now, mixed as it is now.
 
-    It takes the object, which may have to be found again after an undo.
+    It takes the object, which may have to be found again after an undo, as may the action.
     """
     data = owner.animation_data
     if data is None:
         return lambda found: found.animation_data_clear()
 
-    action = data.action
-    name, kept = (action.name_full, action.use_fake_user) if action else (None, False)
+    played = data.action
+    name, kept = (played.name_full, played.use_fake_user) if played else (None, False)
     mixed = data.action_blend_type, data.action_influence
     slot = data.action_slot.handle if _SLOTS and data.action_slot else None
     last_slot = data.last_slot_identifier if _SLOTS else ""
 
     def restore(found: bpy.types.Object) -> None:
         data = found.animation_data_create()
-        action = next((each for each in bpy.data.actions if each.name_full == name), None)
+        try:
+            now = played.name_full if played else None
+        except ReferenceError:
+            now = name
+        action = next((each for each in bpy.data.actions if each.name_full == now), None)
         data.action = action
         data.action_blend_type, data.action_influence = mixed
         if _SLOTS:

@@ -313,6 +313,19 @@ def test_a_free_recording_takes_nothing_over_from_one_that_reached(
     assert shot.own.mode == "FREE"
 
 
+def test_the_action_that_waits_is_not_purged_and_may_be_renamed(shot: Stage, ended: object) -> None:
+    key(shot.ann, "location", (1, (0.0, 0.0, 0.0)), (20, (0.5, 0.0, 0.0)))
+    own = shot.ann.animation_data.action
+    own.use_fake_user = False
+    played = Played(shot)
+    played.run(0.1)
+    bpy.data.orphans_purge()
+    own.name = "Walks"
+    end_live()
+    assert shot.ann.animation_data.action == own == bpy.data.actions["Walks"]
+    assert not own.use_fake_user
+
+
 def test_what_it_cannot_lead_is_said_and_nothing_changes(shot: Stage, ended: object) -> None:
     before = shot.state()
     with pytest.raises(RuntimeError, match="needs a window"):

@@ -156,6 +156,8 @@ class LiveSession:
         if data is not None:
             mixes = data.use_nla
             self._undo.insert(1, lambda: setattr(self.armature.animation_data, "use_nla", mixes))
+            if data.action:  # nobody else may use it meanwhile
+                data.action.use_fake_user = True
             data.action, data.use_nla = None, False
         ready_to_pose(self.armature)
         self._show(self.body.frame)
