@@ -73,6 +73,16 @@ def test_a_take_becomes_an_asset_with_tags_and_a_picture(stage: Stage) -> None:
     assert takes_of(stage.ann)[0].asset_data is None
 
 
+def test_a_linked_take_is_not_marked(stage: Stage, tmp_path: Path) -> None:
+    path = str(tmp_path / "takes.blend")
+    bpy.data.libraries.write(path, {takes_of(stage.ann)[1]}, fake_user=True)
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.actions = ["Ann take.001"]
+    stage.own.takes[1].action = wanted.actions[0]
+    with pytest.raises(RuntimeError, match=r"The take .* is linked; make it local to mark it"):
+        bpy.ops.dafnet.mark_take()
+
+
 @pytest.mark.parametrize("kind", ["fbx", "gltf"])
 def test_export_writes_the_chosen_take_alone(stage: Stage, tmp_path: Path, kind: str) -> None:
     assert len(bpy.data.actions) > 2, "the root's and another take's"

@@ -3,6 +3,7 @@
 import bpy
 import numpy as np
 
+from ...core.errors import InputError
 from ...core.skeleton import PARENTS, PELVIS
 from ...core.take import Take
 from ..character.takes import stored_take
@@ -18,9 +19,12 @@ _COLORS = ((0.33, 0.42, 0.55), (0.95, 0.72, 0.35))  # of the first pose and of t
 
 def mark_as_asset(action: bpy.types.Action) -> None:
     """Mark a take as an asset, with tags that say how it was made and what is to be seen of it,
-    and a picture. In which catalog it is stays as it is. ``InputError`` where it is not a take.
+    and a picture. In which catalog it is stays as it is. ``InputError`` where it is not a take, or
+    is linked.
     """
     take, controls = stored_take(action)
+    if action.library:
+        raise InputError(f"The take '{action.name}' is linked; make it local to mark it.")
     if action.asset_data is None:
         action.asset_mark()
     asset = action.asset_data
