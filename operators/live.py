@@ -133,7 +133,9 @@ class DAFNET_OT_live(DafnetOperator, bpy.types.Operator):
             return {"CANCELLED"}  # undone, or another file: nothing may be added now
 
         with reported(self), _waiting(context):
-            results = run_to_end(keep_clips(self._session))
+            results = self._state.kept
+            if results is None:
+                results = run_to_end(keep_clips(self._session))
             for warning in dict.fromkeys(each for one in results for each in one.warnings):
                 self.report({"WARNING"}, warning)
             if results:

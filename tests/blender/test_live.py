@@ -326,6 +326,33 @@ def test_the_action_that_waits_is_not_purged_and_may_be_renamed(shot: Stage, end
     assert not own.use_fake_user
 
 
+def test_what_was_recorded_is_in_the_file_that_is_saved(
+    shot: Stage, ended: object, tmp_path
+) -> None:
+    played = Played(shot)
+    played.session.record()
+    played.run(0.5, (0.5, 0.0))
+    path = str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    (result,) = played.state.kept
+    name = result.action.name
+    bpy.ops.wm.open_mainfile(filepath=path)
+    ann = bpy.data.objects["Ann"]
+    assert ann.animation_data.action == ann.dafnet.takes[0].action == bpy.data.actions[name]
+    assert len(ann.dafnet.takes) == 1
+
+
+def test_a_recording_that_cannot_be_kept_stops_no_saving(
+    shot: Stage, ended: object, tmp_path
+) -> None:
+    played = Played(shot)
+    played.session.record()
+    played.run(0.2)
+    bpy.data.objects.remove(shot.root)
+    assert bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend")) == {"FINISHED"}
+    assert "its character is gone" in str(played.state.why) and played.state.kept == ()
+
+
 def test_what_it_cannot_lead_is_said_and_nothing_changes(shot: Stage, ended: object) -> None:
     before = shot.state()
     with pytest.raises(RuntimeError, match="needs a window"):

@@ -1,7 +1,8 @@
 """The session that is running, at most one, and what ends it from outside.
 
 Undoing, opening or saving a file would keep, or lose, what is only shown for the time being: before
-any of them the session puts everything back. While it runs, Blender's own undo takes no steps, so
+any of them the session puts everything back. What was recorded is saved as takes: nothing comes
+after a file that is saved as Blender quits. While it runs, Blender's own undo takes no steps, so
 that all of it is one.
 """
 
@@ -11,7 +12,11 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
+from ...core.errors import DafnetError
+from ...core.progress import run_to_end
 from ..overlay import display
+from ..pipeline.job import Result
+from .keeping import keep_clips
 from .session import LiveSession
 
 __all__ = ["LiveState", "begin_live", "end_live", "live_session", "live_state"]
@@ -19,7 +24,8 @@ __all__ = ["LiveState", "begin_live", "end_live", "live_session", "live_state"]
 
 class LiveState:
     """The running ``session``; ``why`` it ended by itself, and whether its objects are ``gone``
-    with that; whether it was asked to end (``ending``); ``draws``: whether the mouse draws a way.
+    with that; whether it was asked to end (``ending``); ``draws``: whether the mouse draws a way;
+    ``kept``: the takes of what was recorded, where they are made already.
     """
 
     def __init__(self, session: LiveSession) -> None:
@@ -28,6 +34,7 @@ class LiveState:
         self.gone = False
         self.ending = False
         self.draws = False
+        self.kept: tuple[Result, ...] | None = None
 
 
 _running: list[LiveState] = []  # at most one
@@ -101,7 +108,15 @@ def _before_undoing(*_: Any) -> None:
 
 @persistent
 def _before_saving(*_: Any) -> None:
+    state = live_state()
+    if state is None:
+        return
     _ended("Live ended, so that the file is saved as it was.", gone=False)
+    state.kept = ()  # tried once, whatever comes of it
+    try:
+        state.kept = run_to_end(keep_clips(state.session))
+    except DafnetError as error:
+        state.why = f"{state.why} {error}"
 
 
 @persistent
