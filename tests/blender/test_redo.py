@@ -70,6 +70,26 @@ def test_a_walk_is_made_again_to_where_the_seat_is_now(room: Room) -> None:
     assert np.allclose(room.place(1), 0.0, atol=1e-5)
 
 
+def test_the_range_stays_as_long_as_another_s_walk(room: Room) -> None:
+    room.sit(seconds=8.0)
+    end = room.scene.frame_end
+    bpy.ops.dafnet.add_character(name="Bob")
+    bob = bpy.data.objects["Bob"]
+    bob.location = bob.dafnet.root.location = (-3.0, -3.0, 0.0)
+    room.select(bob)
+    room.scene.cursor.location = (-3.0, -1.0, 0.0)
+    assert bpy.ops.dafnet.walk_to(goal="CURSOR", seconds=3.0) == {"FINISHED"}
+    others = bob.dafnet.walks[0].last
+    assert room.scene.frame_end == end > others
+    room.select(room.ann)
+    room.own.walks[0].seconds, room.own.walks[0].speed = 0.1, 1.6
+    room.stool.location.y = 1.5
+    bpy.context.view_layer.update()
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+    assert room.own.walks[0].last < others
+    assert room.scene.frame_end == others
+
+
 def test_the_manner_is_one_place_s_and_is_kept_with_the_walk(room: Room) -> None:
     room.own.speed, room.own.seconds, room.own.sits_down = 0.8, 2.0, 2.6
     room.sit()

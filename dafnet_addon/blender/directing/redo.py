@@ -13,13 +13,13 @@ import bpy
 
 from ...core.errors import InputError
 from ...core.progress import stepwise, within
-from ..character.armature import metres_per_unit
+from ..character.armature import is_character, metres_per_unit
 from ..character.settings import settings_of
 from ..character.standing import moved_by_hand, pose_by_keys
 from ..character.walk_rows import CURVE, OBJECT, POINTS, SEAT, Asked, asked_in
 from .made_walks import edited_from, walks_kept_on_failure
 from .path_sources import along_curve, along_object, through_points
-from .root_keys import first_key, keep_copy, keyable_root, unchanged_on_failure
+from .root_keys import first_key, keep_copy, keyable_root, last_key, unchanged_on_failure
 from .seat_pieces import top_of
 from .walking import Beginning, Walk, walk
 
@@ -150,11 +150,19 @@ def _beginning(
 def _follow_range(
     scene: bpy.types.Scene, armature: bpy.types.Object, before: int, after: int
 ) -> None:
-    """Let a range that ended with the last walk end with it again."""
+    """Let a range that ended with the last walk end with it again, or where another character's
+    keys end that has the same range.
+    """
     own = armature.dafnet
     owner = scene if own.use_scene_range else own
-    if owner.frame_end == before and after > owner.frame_start:
-        owner.frame_end = after
+    if owner.frame_end != before or after <= owner.frame_start:
+        return
+    if own.use_scene_range:
+        for other in scene.objects:
+            if other != armature and is_character(other) and other.dafnet.use_scene_range:
+                ends = last_key(other.dafnet.root) if other.dafnet.root is not None else None
+                after = max(after, min(before, ends or after))
+    owner.frame_end = after
 
 
 @contextmanager
