@@ -24,10 +24,12 @@ from ..dafnet_addon.core.progress import run_to_end
 from ..dafnet_addon.core.series import MODEL_FPS
 from .base import DafnetOperator, idle, reported
 
-__all__ = ["DAFNET_OT_live", "DAFNET_OT_live_draw", "DAFNET_OT_live_record"]
+__all__ = ["DAFNET_OT_live", "DAFNET_OT_live_draw", "DAFNET_OT_live_record", "met_floor"]
 
 _TOLD = 0.5
 """Seconds between two redraws of the sidebar, which tells how long a step takes."""
+_LEVEL = 1e-3
+"""How far a ray of length 1 has to fall to meet a floor at all."""
 
 
 class DAFNET_OT_live(DafnetOperator, bpy.types.Operator):
@@ -247,13 +249,25 @@ def _on_the_floor(
         over = [r for r in area.regions if _is_over(r, event)]
         if len(over) != 1 or over[0].type != "WINDOW":
             continue
-        region, view = over[0], area.spaces.active.region_3d
+        region, view = over[0], over[0].data  # of a quad view, the one that it is
         at = (event.mouse_x - region.x, event.mouse_y - region.y)
         eye = np.array(view3d_utils.region_2d_to_origin_3d(region, view, at)) * session.unit
         ray = np.array(view3d_utils.region_2d_to_vector_3d(region, view, at))
-        down = (session.floor - eye[2]) / ray[2] if abs(ray[2]) > 1e-3 else -1.0
-        return (eye + down * ray)[:2] if down > 0.0 else None
+        return met_floor(eye, ray, session.floor, in_perspective=view.is_perspective)
     return None
+
+
+def met_floor(
+    eye: np.ndarray, ray: np.ndarray, floor: float, *, in_perspective: bool
+) -> np.ndarray | None:
+    """Where the ``ray`` (3,) from an ``eye`` (3,) meets a floor of this height: (2,); None where it
+    does not. Without perspective what is behind the eye counts as well: it has no place along its
+    rays there.
+    """
+    if abs(ray[2]) < _LEVEL:
+        return None
+    down = (floor - eye[2]) / ray[2]
+    return (eye + down * ray)[:2] if down > 0.0 or not in_perspective else None
 
 
 def _is_over(region: bpy.types.Region, event: bpy.types.Event) -> bool:

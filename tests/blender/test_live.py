@@ -20,6 +20,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.live.trial import Trial
 from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay import contents
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end
+from bl_ext.user_default.dafnet.operators.live import met_floor
 from bl_ext.user_default.dafnet.panels.main import DAFNET_PT_character, DAFNET_PT_shot
 
 from kit.panels import drawn_by
@@ -351,6 +352,18 @@ def test_a_recording_that_cannot_be_kept_stops_no_saving(
     bpy.data.objects.remove(shot.root)
     assert bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend")) == {"FINISHED"}
     assert "its character is gone" in str(played.state.why) and played.state.kept == ()
+
+
+def test_a_way_is_drawn_where_the_mouse_meets_the_floor(blender: ModuleType) -> None:
+    eye, down = np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.6, -0.8])
+    for in_perspective in (True, False):
+        place = met_floor(eye, down, 1.0, in_perspective=in_perspective)
+        assert np.abs(place - (1.0, 3.5)).max() < 1e-9
+        level = np.array([0.0, 1.0, 0.0])
+        assert met_floor(eye, level, 1.0, in_perspective=in_perspective) is None
+    assert met_floor(eye, -down, 1.0, in_perspective=True) is None, "it looks at the sky"
+    behind = met_floor(eye - (0.0, 0.0, 4.0), down, 1.0, in_perspective=False)
+    assert np.abs(behind - (1.0, 0.5)).max() < 1e-9, "an orthographic eye may be below"
 
 
 def test_what_it_cannot_lead_is_said_and_nothing_changes(shot: Stage, ended: object) -> None:
