@@ -6,6 +6,7 @@ says, in the node's own frame, y up, metres: ``back``, ``foot``, ``knee`` (3 num
 perhaps ``angle`` (radians).
 """
 
+from contextlib import suppress
 from typing import Any
 
 __all__ = ["NAME", "glTF2ExportUserExtension", "glTF2ImportUserExtension"]
@@ -20,8 +21,9 @@ class glTF2ImportUserExtension:
     def gather_import_node_after_hook(self, _vnode: Any, node: Any, made: Any, _gltf: Any) -> None:
         """Called when a node has become an object."""
         seat = (getattr(node, "extensions", None) or {}).get(NAME)
-        if seat is not None and made is not None:
-            made[NAME] = seat
+        if isinstance(seat, dict) and made is not None:
+            with suppress(TypeError, OverflowError, ValueError):  # what no property can hold
+                made[NAME] = seat
 
 
 class glTF2ExportUserExtension:

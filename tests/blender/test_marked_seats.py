@@ -143,3 +143,25 @@ def test_what_is_no_seat_is_told_in_one_sentence(stage) -> None:
     with pytest.raises(RuntimeError, match="'Chair': its OMI_seat needs back, foot and knee"):
         bpy.ops.dafnet.walk_to(goal="SEAT")
     assert not stage.root.animation_data
+
+
+def test_what_is_no_seat_is_in_nobody_else_s_way(stage) -> None:
+    stage.seat("Stool", location=(0.0, 2.0, 0.0))
+    broken = stage.box("Broken", (2.8, 1.8, 0.0), (3.2, 2.2, 0.44))
+    broken["OMI_seat"] = {"back": "here"}
+    bpy.context.view_layer.update()
+    assert not room_of(bpy.context).marked
+    row = stage.own.tasks.add()
+    row.verb, row.about = "SIT_ON", "Stool"
+    assert bpy.ops.dafnet.plan_tasks() == {"FINISHED"}
+    stage.select(broken)
+    with pytest.raises(RuntimeError, match="'Broken': its OMI_seat needs back"):
+        bpy.ops.dafnet.walk_to(goal="SEAT")
+
+
+@pytest.mark.parametrize("wrong", [{"id": 2**80}, {"back": [0.0, None, 1.0]}])
+def test_what_no_property_can_hold_is_left_out_of_an_import(stage, tmp_path, wrong) -> None:
+    file = _file(tmp_path, wrong)
+    assert bpy.ops.import_scene.gltf(filepath=str(file)) == {"FINISHED"}
+    assert bpy.data.objects["Block"].get("OMI_seat") is None
+    assert "Block Mesh" in bpy.data.objects

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import bpy
 import numpy as np
 
+from ...core.errors import InputError
 from ...core.solids import Mesh
 from ...director.room import Room
 from ...director.seats import MarkedSeat
 from ..character.armature import is_character, metres_per_unit
-from ..gltf_seats import NAME
 from ..scene.furniture import meshes_in
 from ..scene.marked_seats import marked_on
 
@@ -85,17 +85,22 @@ def _marked(
     members: set[bpy.types.Object], named: set[str], unit: float
 ) -> dict[str, tuple[MarkedSeat, ...]]:
     """The seats that pieces say themselves, by their names: marked on a mesh, or on what carries it
-    or hangs on it.
+    or hangs on it. What does not say it as seats are marked says nothing.
     """
-    found: dict[str, list[bpy.types.Object]] = {}
+    found: dict[str, tuple[MarkedSeat, ...]] = {}
     for each in sorted(members, key=lambda each: each.name):
-        if each.get(NAME) is None:
+        try:
+            seats = marked_on([each], unit)
+        except InputError:
+            continue
+        if not seats:
             continue
         family = [each, *_carriers(each), *each.children_recursive]
         mesh = next((other for other in family if other.name in named), None)
         if mesh is not None:
-            found.setdefault(_whole(mesh, named), []).append(each)
-    return {name: marked_on(carriers, unit) for name, carriers in found.items()}
+            name = _whole(mesh, named)
+            found[name] = (*found.get(name, ()), *seats)
+    return found
 
 
 def _carriers(part: bpy.types.Object) -> list[bpy.types.Object]:
