@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.populating.surroundings import room_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.marked_seats import marked_on
 
 from kit.stage import Stage
 
@@ -165,3 +166,31 @@ def test_what_no_property_can_hold_is_left_out_of_an_import(stage, tmp_path, wro
     assert bpy.ops.import_scene.gltf(filepath=str(file)) == {"FINISHED"}
     assert bpy.data.objects["Block"].get("OMI_seat") is None
     assert "Block Mesh" in bpy.data.objects
+
+
+@pytest.mark.parametrize("pull_out", ["MOVED", "KEYED"])
+@pytest.mark.parametrize("carried", [False, True])
+def test_a_seat_that_is_pulled_out_is_marked_where_one_sits_then(stage, pull_out, carried) -> None:
+    chair = stage.box("Chair", (-0.22, 3.0, 0.0), (0.22, 3.44, 0.45))
+    stage.box("Back", (-0.22, 3.44, 0.0), (0.22, 3.48, 0.95), parent=chair)
+    stage.box("Table", (-0.7, 2.6, 0.70), (0.7, 3.3, 0.73))
+    if carried:
+        chair.parent = stage.empty("Chair Set")
+    stage.ann.location = stage.root.location = (2.5, 2.0, 0.0)
+    bpy.context.view_layer.update()
+    place = _sent(stage, chair, pull_out=pull_out, mark_seat=True)
+    stage.scene.frame_set(stage.scene.frame_end)
+    (marked,) = marked_on([chair], 1.0)
+    np.testing.assert_allclose(marked.place().position, place[:2], atol=0.02)
+    assert place[1] > 3.3, "it was pulled out"
+
+
+def test_a_seat_that_is_flat_by_its_scale_is_refused_before_it_is_marked(stage) -> None:
+    chair = stage.box("Chair", (-0.22, 1.8, 0.0), (0.22, 2.24, 0.45), location=(0.0, 0.0, 0.45))
+    chair.scale.z = 0.0
+    bpy.context.view_layer.update()
+    stage.select(chair)
+    with pytest.raises(RuntimeError, match="'Chair' has a scale of 0"):
+        bpy.ops.dafnet.walk_to(goal="SEAT", mark_seat=True)
+    assert not stage.root.animation_data and stage.own.furniture is None
+    assert _sent(stage, chair)[1] > 1.5, "it can be sat on"

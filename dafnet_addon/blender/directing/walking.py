@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 from ...core.distance import scaled
 from ...core.errors import InputError
@@ -25,7 +25,7 @@ from ..character.standing import standing
 from ..character.walk_rows import PLACE, SEAT, Asked, Manner
 from ..scene.furniture import furniture_at
 from ..scene.lookup import find_collection, find_object, find_scene
-from ..scene.marked_seats import mark, marked_on
+from ..scene.marked_seats import mark, marked_on, require_markable
 from .made_walks import intact_walks, note_walk
 from .root_keys import (
     key_route,
@@ -234,16 +234,13 @@ def walk(
         pull_out=pull_out,
     )
     try:
-        walked, found = yield from _walk(context, armature, asked, furniture, made, begins, by_keys)
+        job = _walk(context, armature, asked, furniture, made, begins, by_keys, mark_seat)
+        return (yield from job)
     except BaseException:
         added = next((c for c in bpy.data.collections if c.name_full == made), None)
         if added is not None:
             bpy.data.collections.remove(added)
         raise
-    if mark_seat and found is not None:
-        carrier = scene.objects[asked.goal]
-        mark(carrier, found, metres_per_unit(scene))
-    return walked
 
 
 def _asked_place(
@@ -264,8 +261,8 @@ def _walk(
     made: str | None,
     begins: Beginning | None,
     by_keys: bool,
-) -> Generator[float, None, tuple[Walk, MarkedSeat | None]]:
-    """The walk, and the seat that was found for it in metres of the scene."""
+    mark_seat: bool,
+) -> Generator[float, None, Walk]:
     scene = context.scene
     settings = settings_of(armature, scene, furniture=furniture.name_full if furniture else None)
     seat = scene.objects[asked.goal] if asked.goal else None
@@ -274,6 +271,8 @@ def _walk(
     goal = seat.matrix_world @ goal if seat is not None else goal
     if asked.pull_out and seat is not None:
         movable(top_of(seat))
+    if mark_seat and seat is not None:
+        require_markable(seat)
 
     start = yield from within(start_of(context, settings, begins), 0.0, _READ)
     place = np.array(goal[:2], float) * start.unit
@@ -292,6 +291,15 @@ def _walk(
         key_route(context, root, route, first=start.first, scale=1.0 / start.unit, fps=start.fps)
         restore_between(root, kept)
 
+    if mark_seat and found.seat is not None:
+        # Before the move, after which Blender does not know yet where parts of the piece are.
+        carrier = scene.objects[names[0]]
+        offset = Vector((0.0, 0.0, 0.0))
+        if found.pulled is not None:
+            offset.xy = (found.pulled / start.unit).tolist()
+        sat_on = mark_of(found.seat, start.floor).resized(start.size)
+        frame = Matrix.Translation(offset) @ carrier.matrix_world
+        mark(carrier, sat_on, metres_per_unit(scene), frame)
     if found.pulled is not None:
         top = top_of(next(each for each in scene.objects if each.name == names[0]))
         move(top, found.pulled / start.unit, _free_to_move(start, found) if by_keys else None)
@@ -304,10 +312,7 @@ def _walk(
     note_walk(scene, character, asked, first=start.first, last=last, intact=intact)
     extended = extend_range(scene, character, last)
     warnings = (*passage_warnings(found.met, start.first), *warnings)
-    seat_found = None
-    if found.seat is not None:
-        seat_found = mark_of(found.seat, start.floor).resized(start.size)
-    return Walk(start.first, last, extended, warnings), seat_found
+    return Walk(start.first, last, extended, warnings)
 
 
 def _free_to_move(start: Start, found: _Found) -> tuple[int, int]:

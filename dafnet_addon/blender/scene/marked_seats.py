@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 from ...core.errors import InputError
 from ...director.seats import MarkedSeat
 from ..gltf_seats import NAME
 
-__all__ = ["mark", "marked_on"]
+__all__ = ["mark", "marked_on", "require_markable"]
 
 _POINTS = ("back", "foot", "knee")
 
@@ -42,9 +42,20 @@ def _read(carrier: bpy.types.Object, unit: float) -> MarkedSeat:
     return MarkedSeat(back, foot, knee, angle)
 
 
-def mark(carrier: bpy.types.Object, seat: MarkedSeat, unit: float) -> None:
-    """Write down a seat on an object, in its own frame."""
-    inverse = carrier.matrix_world.inverted()
+def require_markable(carrier: bpy.types.Object) -> None:
+    """Raises InputError where an object has no frame of its own to mark a seat in."""
+    if carrier.matrix_world.inverted(None) is None:
+        raise InputError(
+            f"'{carrier.name}' has a scale of 0, so no seat can be marked on it; apply its scale "
+            "first."
+        )
+
+
+def mark(carrier: bpy.types.Object, seat: MarkedSeat, unit: float, frame: Matrix) -> None:
+    """Write down a seat, metres of the world, on an object whose own frame is there; ``unit``:
+    metres of a Blender unit.
+    """
+    inverse = frame.inverted()
     made = {}
     for name in _POINTS:
         x, y, z = inverse @ Vector(getattr(seat, name) / unit)
