@@ -238,6 +238,22 @@ def test_edited_keys_are_asked_about_and_kept(room: Room) -> None:
     assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}, "nothing is edited now"
 
 
+@pytest.mark.parametrize("setting", [{"interpolation": "CONSTANT"}, {"handle_left_type": "FREE"}])
+def test_ways_between_keys_are_edits_as_well(room: Room, setting: dict[str, str]) -> None:
+    room.sit(seconds=1.0)
+    room.go(3.0, 0.0)
+    for _ in range(2):
+        assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+        assert made_walks.intact_walks(room.ann) == (True, True), "nobody has edited the first"
+    curve = next(c for c in action_curves(room.root) if c.data_path == "location")
+    for name, value in setting.items():
+        setattr(curve.keyframe_points[4], name, value)
+    assert made_walks.intact_walks(room.ann) == (False, True)
+    room.own.active_walk = 0
+    with pytest.raises(RuntimeError, match="were edited since"):
+        bpy.ops.dafnet.redo_walk()
+
+
 def test_keys_after_it_are_asked_about_and_the_one_it_begins_with_is_not(room: Room) -> None:
     room.sit(seconds=1.0)
     last = room.own.walks[0].last

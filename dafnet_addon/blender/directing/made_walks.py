@@ -39,7 +39,8 @@ def note_walk(
     """
     own: Any = character.dafnet
     for row, was in zip(own.walks, intact, strict=True):
-        if row.first < first < row.last:
+        # The keys before one that takes another's place are joined to it otherwise.
+        if row.first < first <= row.last:
             row.last = first
             row.digest = _digest(own.root, row.first, first) if was else _EDITED
     forget_walks(character, first)

@@ -33,6 +33,8 @@ __all__ = [
 
 MOVES = ("location", "rotation_euler")
 """The channels of a root that are keyed."""
+_JOINED_BY = ("interpolation", "handle_left_type", "handle_right_type")
+"""What says how keys are joined."""
 _KEYS_A_SECOND = 10
 """How many keys a route gets for each second."""
 _CHECKED_FRAMES = 12
@@ -199,15 +201,21 @@ def keep_copy(owner: bpy.types.Object, tail: str) -> bpy.types.Action:
 def keys_within(
     owner: bpy.types.Object, paths: Sequence[str], first: float, last: float = np.inf
 ) -> Iterator[bytes]:
-    """The keys of these data paths from frame ``first`` to ``last``, as bytes, curve by curve."""
+    """The keys of these data paths from frame ``first`` to ``last``, as bytes, curve by curve:
+    frames and values, and by which kinds of handles and interpolation they are joined.
+    """
     for curve in action_curves(owner):
-        if curve.data_path in paths and len(curve.keyframe_points):
-            values = np.empty(2 * len(curve.keyframe_points), np.float32)
-            curve.keyframe_points.foreach_get("co", values)
+        if curve.data_path in paths and len(points := curve.keyframe_points):
+            values = np.empty(2 * len(points), np.float32)
+            points.foreach_get("co", values)
             found = values.reshape(-1, 2)
-            found = found[(found[:, 0] >= first) & (found[:, 0] <= last)]
-            if len(found):
-                yield f"{curve.data_path}[{curve.array_index}]".encode() + found.tobytes()
+            within = (found[:, 0] >= first) & (found[:, 0] <= last)
+            if within.any():
+                joints = np.empty((len(_JOINED_BY), len(points)), np.int32)
+                for kind, each in zip(_JOINED_BY, joints, strict=True):
+                    points.foreach_get(kind, each)
+                name = f"{curve.data_path}[{curve.array_index}]".encode()
+                yield name + found[within].tobytes() + joints[:, within].tobytes()
 
 
 @contextmanager
