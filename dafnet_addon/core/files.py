@@ -242,7 +242,7 @@ def remove_abandoned(folder: Path) -> None:
 
 
 def _runs(process: int) -> bool:
-    """Whether there is a process of this number."""
+    """Whether a process of this number runs."""
     if sys.platform == "win32":  # where os.kill would end it
         import _winapi
 
@@ -262,4 +262,8 @@ def _runs(process: int) -> bool:
     except (PermissionError, OverflowError):
         return True
 
-    return True
+    try:  # Linux: one that has ended is there until its parent has heard of it
+        stat = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return True
+    return stat.rpartition(")")[2].split()[0] not in {"Z", "X"}

@@ -253,5 +253,6 @@ def test_a_worker_that_fails_is_told(tmp_path: Path, scheduler: str) -> None:
         found = {each.name: each for each in make_batch(of, cluster_workers(scheduler, of.output))}
         stop.set()
         killer.join()
-    assert found["b"].state == "made"
+    # Asked for anew where the worker that made it was killed before it had told.
+    assert found["b"].state in {"made", "unchanged"} and contents(of.output).keys() == {"b"}
     assert found["a"].state == "failed" and "was killed" in found["a"].sentence

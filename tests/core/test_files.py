@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,6 +16,7 @@ from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.files import (
     is_device,
     portable_name,
+    remove_abandoned,
     require_replaceable,
     require_writable,
     save_text,
@@ -186,6 +188,19 @@ def test_signals_that_are_ignored_stay_ignored() -> None:
             stop.now()
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
+def test_what_a_killed_process_left_goes_before_its_parent_has_heard_of_it(tmp_path: Path) -> None:
+    ended = subprocess.Popen([sys.executable, "-c", "pass"])
+    stat = Path(f"/proc/{ended.pid}/stat")
+    while stat.read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z":
+        time.sleep(0.01)
+    left = tmp_path / f".dafnet-{files._HOST}-{ended.pid}-0123456789abcdef.part"
+    left.touch()
+    remove_abandoned(tmp_path)
+    assert not left.exists()
+    ended.wait()
 
 
 def test_the_hosts_name_is_part_of_what_is_left() -> None:
