@@ -73,6 +73,9 @@ def first_shot(pictures: Path, builders: Any) -> Waits:
     only(ann, stool)
     yield 0.2
     yield from user.click("dafnet.walk_to(goal='SEAT')")
+    yield from user.until(
+        lambda: ann.dafnet.root.animation_data is not None, "the way to the stool"
+    )
     keys = ann.dafnet.root.animation_data.action
     assert keys is not None and ann.dafnet.furniture.name == "Studio"
     assert scene.frame_end > 100, (
