@@ -9,7 +9,6 @@ of. On another processor sums round otherwise, and a take at temperature 1 may g
 """
 
 import argparse
-import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -86,8 +85,7 @@ def main(arguments: Sequence[str]) -> str:
     parser.add_argument("--seed", type=int, required=True)
     options = parser.parse_args(arguments)
 
-    said = load_weights(None).says("held_out")
-    rows = json.loads(said) if isinstance(said, str) else said
+    rows = load_weights(None).says("held_out")
     chosen = drawn(rows, options.count, options.seed)
     compared = list(_compared(options.folder, rows, chosen))
     table = markdown_table(

@@ -17,6 +17,7 @@ __all__ = [
     "RigOperator",
     "asked_to_replace",
     "idle",
+    "may_be_led",
     "remember_character",
     "reported",
 ]
@@ -74,6 +75,26 @@ def idle(operator: Any) -> bool:
     if running_job() is None:
         return True
     operator.poll_message_set("Wait for the job that is running, or cancel it with Esc")
+    return False
+
+
+def may_be_led(operator: Any, context: bpy.types.Context) -> bool:
+    """Whether there is a character with a root, and no job; else the operator's button says what is
+    missing.
+    """
+    if not idle(operator):
+        return False
+
+    character = character_of(context)
+    if character is None:
+        operator.poll_message_set("Select a character, or add one")
+    elif character.dafnet.root is None:
+        operator.poll_message_set("Choose the character's root")
+    elif context.mode not in {"OBJECT", "POSE"}:
+        operator.poll_message_set("Switch to object or pose mode first")
+    else:
+        return True
+
     return False
 
 

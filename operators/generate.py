@@ -21,7 +21,7 @@ from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.blender.translations import translated_tip
 from ..dafnet_addon.core.errors import InputError
 from ..dafnet_addon.core.progress import run_to_end
-from .base import DafnetOperator, idle
+from .base import DafnetOperator, may_be_led
 from .long import LongOperator
 
 __all__ = ["DAFNET_OT_cancel", "DAFNET_OT_generate"]
@@ -67,20 +67,7 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """A character with a root, and no other job."""
-        character = character_of(context)
-        if not idle(cls):
-            return False
-
-        if character is None:
-            cls.poll_message_set("Select a character, or add one")
-        elif character.dafnet.root is None:
-            cls.poll_message_set("Choose the character's root")
-        elif context.mode not in {"OBJECT", "POSE"}:
-            cls.poll_message_set("Switch to object or pose mode first")
-        else:
-            return True
-
-        return False
+        return may_be_led(cls, context)
 
     @classmethod
     def description(cls, _context: bpy.types.Context, properties: Any) -> str:

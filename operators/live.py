@@ -22,7 +22,7 @@ from ..dafnet_addon.blender.live.session import LiveSession, Over
 from ..dafnet_addon.core.errors import DafnetError, InputError
 from ..dafnet_addon.core.progress import run_to_end
 from ..dafnet_addon.core.series import MODEL_FPS
-from .base import DafnetOperator, idle, reported
+from .base import DafnetOperator, may_be_led, reported
 
 __all__ = ["DAFNET_OT_live", "DAFNET_OT_live_draw", "DAFNET_OT_live_record", "met_floor"]
 
@@ -50,20 +50,7 @@ class DAFNET_OT_live(DafnetOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Live runs, or there is a character with a root, and no job."""
-        if live_state() is not None:
-            return True
-        if not idle(cls):
-            return False
-        character = character_of(context)
-        if character is None:
-            cls.poll_message_set("Select a character, or add one")
-        elif character.dafnet.root is None:
-            cls.poll_message_set("Choose the character's root")
-        elif context.mode not in {"OBJECT", "POSE"}:
-            cls.poll_message_set("Switch to object or pose mode first")
-        else:
-            return True
-        return False
+        return live_state() is not None or may_be_led(cls, context)
 
     def run(self, _context: bpy.types.Context) -> None:
         """Nothing can be dragged without a window."""

@@ -11,7 +11,6 @@ another than its report's.
 """
 
 import argparse
-import json
 import re
 import sys
 from collections.abc import Iterator
@@ -80,8 +79,7 @@ _COLUMNS = {
 
 def held_out_rows() -> dict[str, dict[str, Any]]:
     """The rows that ``dafnet evaluate --save`` wrote into the weights that ship."""
-    said = load_weights(None).says("held_out")
-    rows: dict[str, dict[str, Any]] = json.loads(said) if isinstance(said, str) else said
+    rows: dict[str, dict[str, Any]] = load_weights(None).says("held_out")
     return rows
 
 

@@ -1,7 +1,5 @@
 """Figures of the weights' report come out again where they are measured again."""
 
-import json
-
 import pytest
 
 from benchmarks.rerun import drawn, made_again
@@ -24,8 +22,7 @@ def test_drawn_by_seed() -> None:
 @pytest.mark.mocap
 @pytest.mark.slow
 def test_a_row_made_again() -> None:
-    said = load_weights(None).says("held_out")
-    rows = json.loads(said) if isinstance(said, str) else said
+    rows = load_weights(None).says("held_out")
     row = "ee_t0_bodies_in_training"
     again = made_again(MOCAP, row)
     figures = [name for name in COLUMNS if isinstance(rows[row].get(name), float)]
