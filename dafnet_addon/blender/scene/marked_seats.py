@@ -44,11 +44,13 @@ def _read(carrier: bpy.types.Object, unit: float) -> MarkedSeat:
 
 def require_markable(carrier: bpy.types.Object) -> None:
     """Raises InputError where an object has no frame of its own to mark a seat in."""
-    if carrier.matrix_world.inverted(None) is None:
+    try:
+        carrier.matrix_world.inverted()
+    except ValueError as error:
         raise InputError(
             f"'{carrier.name}' has a scale of 0, so no seat can be marked on it; apply its scale "
             "first."
-        )
+        ) from error
 
 
 def mark(carrier: bpy.types.Object, seat: MarkedSeat, unit: float, frame: Matrix) -> None:
