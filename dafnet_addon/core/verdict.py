@@ -5,6 +5,7 @@ Joints are (T, 22, 3), world, canonical metres, at ``fps``.
 """
 
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from .metrics import body_points, seat_episodes
 from .occupancy import distance
 from .root import RootPath
 from .series import runs
-from .skeleton import FEET, JOINTS, PELVIS
+from .skeleton import FEET, JOINTS, PARENTS, PELVIS
 from .softness import Support, guessed
 from .solids import Scene
 from .take import Finding
@@ -24,6 +25,12 @@ _OFF_SEAT = 0.04  # metres from where a seat carries a pelvis, from where on it 
 _STANDS = 0.80  # metres of a pelvis over the floor, of one who did not sit down
 _SEATS = 0.22  # metres of a top over the floor, from where on one is to sit on it
 _DEEP = 0.05  # metres of a body's bones in something hard: its flesh is past it
+_CLOSE = 0.06  # metres from a bone's points, within which it may be across something thin
+_TOUCHES = 0.005  # metres of a bone in what it only touches
+_FINELY = 12  # points of a bone that is looked at closely
+# Directions (14, 3) to move out of something: along the axes, and between them.
+_MOVES = np.array([w for w in product((0, 1, -1), repeat=3) if np.abs(w).sum() in (1, 3)], float)
+_MOVES /= np.linalg.norm(_MOVES, axis=1, keepdims=True)
 _BRIEF = 0.2  # seconds of what is hardly seen
 _SLIDES = 0.06  # metres that a standing foot moves; of captured walkers, as they roll off, 5 cm
 _ROLLS = 0.2  # metres a second of a foot that comes down or rolls off
@@ -97,23 +104,69 @@ def _seats(
 
 def _inside(joints: np.ndarray, fps: float, path: RootPath, scene: Scene) -> Iterator[Finding]:
     points, floor = body_points(joints, _PER_BONE), path.position[:, 2]
-    if not scene.solids or not (distance(scene, points, floor) < -_DEEP).any():
+    if not scene.solids or not (distance(scene, points, floor) < _CLOSE).any():
         return
 
+    at_least = max(1, round(_BRIEF * fps))
     for solid in scene.solids:
-        depth = -distance(Scene((solid,)), points, floor)
+        own = Scene((solid,))
+        depth = -distance(own, points, floor)
         gives = guessed(solid, _USUAL_TOP) if solid.softness is None else solid.softness
         allowed = _DEEP + gives
-        for start, stop in runs((depth > allowed).any(1), at_least=max(1, round(_BRIEF * fps))):
+        name = solid.name or _UNNAMED
+        what_to_do = "lead the root farther around it, or move it"
+        deep = runs((depth > allowed).any(1), at_least)
+        for start, stop in deep:
             part = depth[start:stop]
             frame, point = np.unravel_index(np.argmax(part), part.shape)
-            name, what = solid.name or _UNNAMED, _part_of(int(point))
             yield Finding(
                 f"in {name}",
-                f"The {what} is {100 * part.max():.0f} cm inside '{name}' at "
-                f"{(start + frame) / fps:.1f} s; lead the root farther around it, or move it",
+                f"The {_part_of(int(point))} is {100 * part.max():.0f} cm inside '{name}' at "
+                f"{(start + frame) / fps:.1f} s; {what_to_do}",
                 good=False,
             )
+
+        across = (
+            np.zeros(depth.shape, bool) if deep else _across(own, joints, floor, depth, allowed)
+        )
+        for start, stop in runs(across.any(1), at_least):
+            bone = int(np.argmax(across[start:stop].sum(axis=0)))
+            yield Finding(
+                f"through {name}",
+                f"The {_part_of(1 + _PER_BONE * bone)} goes through '{name}' at "
+                f"{(start + stop) / (2 * fps):.1f} s; {what_to_do}",
+                good=False,
+            )
+
+
+def _across(
+    own: Scene, joints: np.ndarray, floor: np.ndarray, depth: np.ndarray, allowed: float
+) -> np.ndarray:
+    """Which bones (T, 21) are across a solid, by themselves or with the bone that they hang on, so
+    that no move by as much as is ``allowed`` frees both: as in a board that is too thin for
+    anything to be deep in it. ``depth`` (T, 1 + 21 * _PER_BONE): of the body's points.
+    """
+    out = np.zeros((len(joints), len(JOINTS) - 1), bool)
+    near = (depth[:, 1:].reshape(*out.shape, _PER_BONE) > -_CLOSE).any(axis=(0, 2))
+    ends = 1 + np.flatnonzero(near)
+    begins = np.array(PARENTS)[ends]
+    start, way = joints[:, begins, None], np.linspace(0.0, 1.0, _FINELY)[:, None]
+    points = (start + way * (joints[:, ends, None] - start)).reshape(len(joints), -1, 3)
+    place = {int(end): k for k, end in enumerate(ends)}
+    hangs_on = [place.get(int(begin), k) for k, begin in enumerate(begins)]
+
+    def met(moved: np.ndarray) -> np.ndarray:
+        inside = distance(own, points + moved, floor) < -_TOUCHES
+        inside = inside.reshape(len(joints), -1, _FINELY).any(axis=2)
+        return np.asarray(inside | inside[:, hangs_on])
+
+    across = met(np.zeros(3))
+    for move in _MOVES:
+        if not across.any():
+            break
+        across &= met(allowed * move)
+    out[:, ends - 1] = across
+    return out
 
 
 def _part_of(point: int) -> str:

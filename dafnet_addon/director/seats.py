@@ -56,6 +56,10 @@ _TABLE_HIGH = 0.60
 _TABLE_LONG = 0.60
 _BED = (1.7, 0.75)
 """Length and width of what is a bed, however high it is."""
+_ARMS = (0.15, 0.45)
+"""Metres before a chair's back, where its arms are."""
+_ARMS_APART = 0.75
+"""Metres between a chair's arms, at most; a sofa's and a bed's are farther apart."""
 _TABLES = ("table", "desk")
 """Kinds by name, see ``core.softness``."""
 
@@ -235,19 +239,23 @@ class _Part:
         return np.asarray(self.places.mean(axis=0))
 
     @cached_property
-    def away(self) -> np.ndarray:
-        """The direction (2,) away from what stands up beside it; nothing where that is all
-        around.
-        """
+    def beside(self) -> tuple[np.ndarray, np.ndarray]:
+        """What stands up beside it: places (N, 2), and in how many layers (N,) each does."""
         low, high = self.places.min(axis=0) - _AROUND, self.places.max(axis=0) + _AROUND
         over = Columns.between(self.height + _RISES, self.height + _BACK_HIGH)
         cells = np.argwhere((self.columns.layers & over) != 0)
         up = self.columns.field.middles(cells)
         near = ((up >= low) & (up <= high)).all(axis=1)
-        tall = np.array(
-            [bin(int(bits)).count("1") for bits in self.columns.layers[tuple(cells[near].T)] & over]
-        )
-        beside = (tall @ up[near]) / tall.sum() - self.middle if near.any() else np.zeros(2)
+        layers = self.columns.layers[tuple(cells[near].T)] & over
+        return up[near], np.array([int(bits).bit_count() for bits in layers])
+
+    @cached_property
+    def away(self) -> np.ndarray:
+        """The direction (2,) away from what stands up beside it; nothing where that is all
+        around.
+        """
+        up, tall = self.beside
+        beside = (tall @ up) / tall.sum() - self.middle if len(up) else np.zeros(2)
         apart = float(np.linalg.norm(beside))
         return -beside / apart if apart > _BESIDE else np.zeros(2)
 
@@ -266,6 +274,25 @@ class _Part:
             under = Columns.between(0.15, self.height - _RISES)
             is_bed = ((self.columns.layers[self.mask] & under) != 0).mean() > 0.5
         return self.height > _TABLE_HIGH and self.length > _TABLE_LONG and not is_bed
+
+    @property
+    def has_footrest(self) -> bool:
+        """Whether it is a chair's seat, with its back and arms, and a footrest that goes on from
+        it: legs cannot hang before the one, and nobody sits on the other.
+        """
+        deep = _LEANS + _THIGH < self.length < _BED[0]
+        if not deep or abs(self.away @ self.longer) < _SNAP:
+            return False
+        ahead = self.longer * np.sign(self.away @ self.longer)
+        across = np.array([ahead[1], -ahead[0]])
+        up = self.beside[0]
+        along = up @ ahead - (self.places @ ahead).min()
+        aside = up @ across - 0.5 * ((self.places @ across).min() + (self.places @ across).max())
+        arms = aside[(along > _ARMS[0]) & (along < _ARMS[1])]
+        left, right = arms[arms < -_HIPS], arms[arms > _HIPS]
+        if not (len(left) and len(right)) or (along > _LEANS + _THIGH).any():
+            return False
+        return bool(right.min() - left.max() < _ARMS_APART)
 
 
 @dataclass(frozen=True)
@@ -333,7 +360,8 @@ def seats_of(
     the nearest to there, each in the middle of where one may sit; or by ``near`` (2,) where it is
     given. Raises NoSeat where there is nothing to sit on, which is an even part between 22 and
     85 cm over ``floor`` that a body fits on, or where there are only ``tables`` and these do not
-    count. ``size``: of the character, over 1.75 m, by which messages give lengths.
+    count, or armchairs with their footrest before them. ``size``: of the character, over 1.75 m, by
+    which messages give lengths.
     """
     own = solids
     if not tables:
@@ -348,8 +376,11 @@ def seats_of(
     yield 0.7
 
     found: list[tuple[float, SeatPlace]] = []
-    only_tables = False
+    only_tables = footrests = False
     for k, part in enumerate(parts):
+        if part.has_footrest:
+            footrests = True
+            continue
         is_table = part.is_table
         for way in _ways(part, towards):
             fits = [(good, each) for good, each in _fits(part, way, near, floor)]
@@ -359,6 +390,11 @@ def seats_of(
             found += fits
             yield 0.7 + 0.3 * k / len(parts)
 
+    if not found and footrests:
+        raise NoSeat(
+            f"The footrest of '{name}' is where one comes to sit; take it away, or choose another "
+            "seat."
+        )
     if not found:
         raise NoSeat(_a_table(name) if only_tables else _why_not_a_seat(solids, name, size))
     return _ordered(found, towards, near)

@@ -1,5 +1,6 @@
 """What an eye sees of a take is said, and what it does not see is not."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from dafnet_addon import Box, CleanUp, Controls, Scene, Take, generate, load_weights
 from dafnet_addon.core.paths import Stop, route
 from dafnet_addon.core.root import RootPath, root_from_matrices
-from dafnet_addon.core.skeleton import FEET, REST
+from dafnet_addon.core.skeleton import FEET, JOINTS, REST
 from dafnet_addon.core.softness import support_under
 from dafnet_addon.core.storage import packed, unpacked
 from dafnet_addon.core.take import Finding
@@ -52,6 +53,27 @@ def test_what_is_gone_through_is_named_with_the_part_of_the_body() -> None:
     assert found[0].word == "in Box" and "shin is" in found[0].text
     away = replace(block, center=[3.0, 0.0, 0.25])
     assert all(each.good for each in _said(joints, Scene((*STOOL.solids, away))))
+
+
+def test_a_board_too_thin_to_be_deep_in_is_gone_through_all_the_same() -> None:
+    joints = _take().joints
+    neck = joints[-1, JOINTS.index("neck")] - (0.0, 0.0, 0.04)
+
+    def said(thick: float, *, aside: float = 0.0, over: float = 0.0) -> list[str]:
+        center = [neck[0] + aside, neck[1], neck[2] + over]
+        board = Box(center, [0.4, 0.4, thick / 2], name="Board")
+        found = _said(joints, Scene((*STOOL.solids, board)))
+        return [each.text for each in found if "Board" in each.text]
+
+    for thick in (0.02, 0.04):
+        (told,) = said(thick)
+        assert re.match("The (trunk|head) goes through 'Board' at .* move it", told), told
+    assert not said(0.04, aside=0.9), "beside it"
+    assert not said(0.04, over=0.5), "over the head"
+    knee = joints[-1, JOINTS.index("left_knee")]
+    table = Box([knee[0], knee[1], knee[2] + 0.12], [0.5, 0.15, 0.01], name="Board")
+    found = _said(joints, Scene((*STOOL.solids, table)))
+    assert not [each for each in found if "Board" in each.text], "legs are under it"
 
 
 def test_a_foot_that_slides_is_named() -> None:

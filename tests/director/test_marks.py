@@ -5,6 +5,7 @@ import pytest
 
 from benchmarks.marks import MARKS, measured, others, piece
 from dafnet_addon import InputError, Mesh
+from dafnet_addon.core.rotations import rotate, yaw_matrix
 from dafnet_addon.director.beds import bed_of
 from dafnet_addon.director.room import Piece
 from dafnet_addon.director.seats import NoSeat, seat_of
@@ -47,6 +48,14 @@ def test_tables_are_not_sat_on_unless_they_are_asked_for(name: str) -> None:
     asked = seat_of([table], np.array([0.0, -3.0]), name=table.name, tables=True)
     top = float(np.percentile(table.vertices[:, 2], 99))
     assert abs(asked.height - top) < 0.05 and not asked.back
+
+
+@pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, 180.0])
+def test_nobody_sits_across_the_footstool_of_an_armchair(degrees: float) -> None:
+    chair = piece(LIBRARY, "armchair_015", "Piece")
+    turned = rotate(yaw_matrix(np.array(np.radians(degrees))), chair.vertices)
+    with pytest.raises(NoSeat, match="The footrest of 'Piece' is where one comes to sit; take it"):
+        seat_of([Mesh(turned, chair.triangles)], np.array([0.8, -3.2]), name="Piece")
 
 
 @pytest.mark.slow
