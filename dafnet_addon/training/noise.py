@@ -1,15 +1,16 @@
 """How real takes differ from one another in the flow's noise: what takes are drawn from.
 
 The flow's noise is standard normal frame by frame, but not from frame to frame: along captured
-motion a part of it lasts, and the rest comes and goes within a second. A vector of unit deviation
-that is held is a body that nobody moves like, and one that holds only what lasts is a statue. So
-takes draw both (``core.noise.TakeNoise``), as they are found along captured windows: temperature 1
-is then how far, and how, real takes differ.
+motion a part of it lasts, and the rest comes and goes within a second or two. A vector of unit
+deviation that is held is a body that nobody moves like, and one that holds only what lasts is a
+statue. So takes draw both (``core.noise.TakeNoise``), with the autocorrelation found along captured
+windows: temperature 1 is then how far, and how, real takes differ. What lasts is what is still
+alike over the longest times that a window shows.
 
 What comes and goes has the spectrum that was found, but for this: noise along captured motion is
 tied to that motion, and noise that is drawn is not. Where it comes and goes fast, what is made of
-it trembles more than people do. So each frequency is damped until poses move as fast in it as
-captured ones.
+it trembles more than people do. So each frequency is damped until poses of people who stay where
+they are, which is where one sees it, move as fast in it as captured ones.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,16 +21,28 @@ import torch
 from torch import Tensor
 
 from ..core.noise import TAPS
+from ..core.series import MODEL_FPS
 from ..model.flow import BodyFlow
 from ..model.predictor import ActionPredictor
 from .batches import Batch, Pool, Statistics
 
-__all__ = ["PartNoise", "kept_of_noise", "noise_along", "part_noise", "take_noise"]
+__all__ = [
+    "PartNoise",
+    "kept_of_noise",
+    "noise_along",
+    "part_noise",
+    "process_of",
+    "take_noise",
+]
 
 _SETTLED = 20
 """Frames in which the flow's memory fills."""
 _AT_ONCE = 50
 """Windows."""
+_LASTS = 40
+"""Frames after which what is still alike is taken to last."""
+_RESTS = 0.25
+"""Metres a second: a window whose root is slower all along shows somebody who stays there."""
 _DAMPED_OVER = 400
 """Windows whose speed is compared with what the noise makes."""
 _SMOOTH = np.array([0.25, 0.5, 0.25])
@@ -113,16 +126,12 @@ def take_noise(
 
     tensors: dict[str, np.ndarray] = {}
     for part, noises in found.items():
-        noise = np.concatenate(noises)
-        mean = noise.mean(axis=1)
-        passing = noise - mean[:, None]
-        tensors[f"{part}.spread"] = _cholesky(mean)
-        tensors[f"{part}.passing"] = _cholesky(passing.reshape(-1, passing.shape[-1]))
-        tensors[f"{part}.taps"] = _filters(passing)
+        for name, tensor in process_of(np.concatenate(noises)).items():
+            tensors[f"{part}.{name}"] = tensor
 
+    rests = _resting(pool, rows)[:_DAMPED_OVER]
     batches = (
-        pool.batch(some, statistics, flow.config, noise=0.0)
-        for some in rows[:_DAMPED_OVER].split(_AT_ONCE)
+        pool.batch(some, statistics, flow.config, noise=0.0) for some in rests.split(_AT_ONCE)
     )
     drawn = {part: _part_noise(tensors, part, pool.device) for part in found}
     for part, kept in kept_of_noise(flow, predictor, batches, statistics, drawn).items():
@@ -250,23 +259,69 @@ def _damped(taps: np.ndarray, kept: np.ndarray) -> np.ndarray:
     return np.fft.irfft(np.fft.rfft(taps, axis=1) * kept, TAPS, axis=1)
 
 
-def _cholesky(values: np.ndarray) -> np.ndarray:
-    """Lower triangular L (n, n), of which L e, with e from N(0, I), varies as values (N, n) do."""
-    moment = values.T @ values / len(values)
-    return np.linalg.cholesky(moment + _JITTER * np.eye(len(moment)))
-
-
-def _filters(passing: np.ndarray) -> np.ndarray:
-    """Filters (n, 49) of unit length, of zero phase, under which white noise has the spectrum of
-    series (N, T, n), each without its mean.
+def process_of(noise: np.ndarray) -> dict[str, np.ndarray]:
+    """The tensors of ``PartNoise`` with the autocorrelation of noise (N, T, n), of 49 frames or
+    more, undamped.
     """
-    tapered = passing * np.hanning(passing.shape[1])[:, None]
-    power = (np.abs(np.fft.rfft(tapered, axis=1)) ** 2).mean(axis=0)
-    power[0] = 0.0  # is what lasts, which the taper lets through
-    impulse = np.fft.irfft(np.sqrt(power), axis=0)
-    middle = TAPS // 2
-    # Filters that end abruptly tremble. What lasts, which the taper lets through, is taken off.
-    taper = np.hanning(TAPS + 2)[1:-1]
-    taps = np.roll(impulse, middle, axis=0)[:TAPS].T * taper
-    taps -= taper * taps.sum(axis=1, keepdims=True) / taper.sum()
-    return taps / np.linalg.norm(taps, axis=1, keepdims=True)
+    lasting = _lasting(noise)
+    return {
+        "spread": _root(lasting),
+        "passing": _root(_moment(noise, 0) - lasting),
+        "taps": _filters(noise, np.diag(lasting)),
+    }
+
+
+def _resting(pool: Pool, rows: Tensor) -> Tensor:
+    """Those of some windows in which the root stays where it is; all, where it does in none."""
+    steps = pool.windows(rows, ["velocity"])["velocity"][..., :2]
+    rests = np.linalg.norm(steps, axis=-1).max(axis=1) * MODEL_FPS < _RESTS
+    return rows[torch.from_numpy(rests)] if rests.any() else rows
+
+
+def _moment(noise: np.ndarray, apart: int) -> np.ndarray:
+    """How noise (N, T, n) of one frame varies with that of so many frames later: (n, n)."""
+    early, late = noise[:, : noise.shape[1] - apart], noise[:, apart:]
+    found = np.einsum("ntd,nte->de", early, late) / (early.shape[0] * early.shape[1])
+    return (found + found.T) / 2.0
+
+
+def _lasting(noise: np.ndarray) -> np.ndarray:
+    """How what lasts of noise (N, T, n) varies (n, n): as what is still alike after ``_LASTS``
+    frames and more.
+    """
+    frames = noise.shape[1]
+    # Weighed by how often a window shows them: the longest time but once.
+    shown = {apart: frames - apart for apart in range(_LASTS, frames)}
+    moments = [often * _moment(noise, apart) for apart, often in shown.items()]
+    return _positive(np.sum(moments, axis=0) / sum(shown.values()))
+
+
+def _positive(moment: np.ndarray) -> np.ndarray:
+    """The nearest symmetric matrix to ``moment`` by which something can vary."""
+    values, vectors = np.linalg.eigh(moment)
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T
+
+
+def _root(moment: np.ndarray) -> np.ndarray:
+    """Lower triangular L (n, n), of which L e, with e from N(0, I), varies as ``moment`` says."""
+    return np.linalg.cholesky(_positive(moment) + _JITTER * np.eye(len(moment)))
+
+
+def _filters(noise: np.ndarray, lasting: np.ndarray) -> np.ndarray:
+    """Filters (n, 49) of unit length, of zero phase, under which white noise follows upon itself as
+    series (N, T, n) do beside what lasts of them, a variance of ``lasting`` (n,).
+    """
+    frames = noise.shape[1]
+    alike = [(noise[:, : frames - k] * noise[:, k:]).mean((0, 1)) for k in range(TAPS)]
+    # The longest times are seen least, and filters that end abruptly tremble: both ends fade out.
+    one_way = (np.stack(alike) - lasting) * _faded(2 * TAPS - 1)[TAPS - 1 :, None]
+    spectrum = np.fft.rfft(np.concatenate([one_way, one_way[:0:-1]]), axis=0).real
+
+    impulse = np.fft.irfft(np.sqrt(np.maximum(spectrum, 0.0)), 2 * TAPS - 1, axis=0)
+    taps = np.roll(impulse, TAPS // 2, axis=0)[:TAPS].T * _faded(TAPS)
+    return taps / np.maximum(np.linalg.norm(taps, axis=1, keepdims=True), 1e-12)
+
+
+def _faded(frames: int) -> np.ndarray:
+    """One in the middle half of so many frames, falling to nothing at the ends."""
+    return np.minimum(1.0, 2.0 * np.hanning(frames + 2)[1:-1])

@@ -60,6 +60,7 @@ from dafnet_addon.training.noise import (  # noqa: E402
     PartNoise,
     kept_of_noise,
     noise_along,
+    process_of,
     take_noise,
 )
 from dafnet_addon.training.parts import load_run, new_run, trained_networks  # noqa: E402
@@ -744,7 +745,7 @@ def test_free_runs_see_the_noise_that_takes_are_drawn_from(
     assert abs(lively.float().mean() - 0.6) < 0.03 and not (lively & calm).any()
 
     # What is drawn varies, lasts, and follows upon itself as takes' noise does.
-    found = take_noise(run.flow, run.predictor, pool, run.statistics)
+    found = take_noise(run.flow, run.predictor, pool, run.statistics, parts=[part])
     lasting, passing, taps = (found[f"{part}.{name}"] for name in ("spread", "passing", "taps"))
     drawn = z[lively].double().numpy()
     for apart in (0, 1, 5):
@@ -860,16 +861,35 @@ def test_takes_are_drawn_from_the_noise_along_captured_motion(dataset: Path, tmp
     tensors = take_noise(run.flow, predictor, pool, run.statistics)
     batch = pool.batch(torch.arange(12), run.statistics, TINY, noise=0.0)
     for part, noise in noise_along(run.flow, predictor, batch).items():
-        noise = noise[:, 20:].numpy().astype(float)
-        mean = noise.mean(1)
-        rest = (noise - mean[:, None]).reshape(-1, mean.shape[1])
-        for name, found in (("spread", mean), ("passing", rest)):
-            root = tensors[f"{part}.{name}"].astype(float)
-            assert np.abs(root @ root.T - found.T @ found / len(found)).max() < 1e-4
-            assert (np.triu(root, 1) == 0).all()
-        taps = tensors[f"{part}.taps"]
-        assert (taps**2).sum(1).max() < 1.0 + 1e-6, "a filter adds no variance"
-        assert np.abs(taps.sum(1)).max() < 1.0, "what lasts is not in it"
+        found = process_of(noise[:, 20:].numpy().astype(float))
+        for name in ("spread", "passing"):
+            assert np.abs(tensors[f"{part}.{name}"] - found[name]).max() < 1e-4
+            assert (np.triu(found[name], 1) == 0).all()
+        damped = np.linalg.norm(tensors[f"{part}.taps"], axis=1)
+        assert damped.max() < 1.0 + 1e-6, "a filter adds no variance"
+
+
+def test_drawn_noise_follows_upon_itself_as_what_it_was_found_in():
+    """A body's own way, a drift within a second, and a tremble, each of its own size."""
+    rng = np.random.default_rng(0)
+    windows, frames = 3000, 50
+    drift = [rng.standard_normal((windows, 2))]
+    for _ in range(frames - 1):
+        drift.append(0.9 * drift[-1] + np.sqrt(1.0 - 0.9**2) * rng.standard_normal((windows, 2)))
+
+    own = np.array([0.6, 0.2]) * rng.standard_normal((windows, 1, 2))
+    tremble = np.array([0.2, 0.4]) * rng.standard_normal((windows, frames, 2))
+    noise = own + np.array([0.8, 1.0]) * np.stack(drift, axis=1) + tremble
+
+    torch.manual_seed(0)
+    found = {name: torch.from_numpy(t).float() for name, t in process_of(noise).items()}
+    drawn = PartNoise(**found).draw(windows, frames).numpy()
+    for apart in (0, 1, 3, 10, 20, 40):
+        alike, wanted = (
+            (values[:, : frames - apart] * values[:, apart:]).mean((0, 1))
+            for values in (drawn, noise)
+        )
+        assert np.abs(alike - wanted).max() < 0.1, apart
 
 
 def test_noise_is_damped_where_poses_would_move_faster_than_captured(dataset: Path, tmp_path: Path):
