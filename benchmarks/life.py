@@ -146,15 +146,16 @@ def _seen(clip: HeldClip) -> dict[str, list[slice]]:
 def _lives(
     weights: Weights, clips: Sequence[HeldClip], noise: Noise, progress: Callable[[float], None]
 ) -> dict[str, dict[str, dict[str, float]]]:
-    """By state, temperature and band: root mean square speed of wrists and head over the captured
-    one.
+    """By state, temperature and band: how fast wrists and head move over how fast captured ones do,
+    root mean square of all that is seen; under the band's name with "median", in the median
+    stretch, which one who claps does not decide.
     """
     ends = LIVELY["wrists"] + LIVELY["head"]
-    squares: dict[tuple[str, str, str], list[float]] = defaultdict(list)
+    speeds: dict[tuple[str, str, str], list[tuple[int, float]]] = defaultdict(list)
 
     def add(run: str, state: str, joints: np.ndarray) -> None:
         for band, speed in band_speeds(joints, MODEL_FPS, ends, periods=1.0).items():
-            squares[state, run, band].append(len(joints) * speed**2)
+            speeds[state, run, band].append((len(joints), speed))
 
     chosen = [(clip, seen) for clip in clips if any((seen := _seen(clip)).values())]
     for done, (clip, seen) in enumerate(chosen):
@@ -171,11 +172,22 @@ def _lives(
                         add(run, state, joints[stretch])
 
     found: dict[str, dict[str, dict[str, float]]] = defaultdict(lambda: defaultdict(dict))
-    for (state, run, band), values in squares.items():
+    for (state, run, band), own in speeds.items():
         if run != "captured":
-            real = np.mean(squares[state, "captured", band])
-            found[state][run][band] = round(float(np.sqrt(np.mean(values) / real)), 3)
+            (all_made, one_made), (all_real, one_real) = (
+                _pooled(values) for values in (own, speeds[state, "captured", band])
+            )
+            found[state][run][band] = round(all_made / all_real, 3)
+            found[state][run][f"{band}, median"] = round(one_made / one_real, 3)
     return {state: dict(rows) for state, rows in found.items()}
+
+
+def _pooled(speeds: Sequence[tuple[int, float]]) -> tuple[float, float]:
+    """Root mean square over all frames, and in the median stretch, of stretches' frames and
+    speeds.
+    """
+    frames, found = np.array(speeds).T
+    return float(np.sqrt(np.average(found**2, weights=frames))), float(np.median(found))
 
 
 def feet(
@@ -259,8 +271,9 @@ def _summary(report: dict[str, Any]) -> Iterator[str]:
         yield f"  descents asked at {', '.join(words)}"
         for state, rows in report.get("life", {}).items():
             shares = rows[f"temperature {heat:g}"]
-            cells = ", ".join(f"{band} {shares[band]:.2f}" for band in BANDS)
-            yield f"  life over the captured one, {state}: {cells}"
+            for which, ending in (("", ""), (", in the median stretch", ", median")):
+                cells = ", ".join(f"{band} {shares[band + ending]:.2f}" for band in BANDS)
+                yield f"  life over the captured one, {state}{which}: {cells}"
 
     if led := report.get("feet"):
         asked, free = (np.mean([each[run] for each in led]) for run in ("asked", "not asked"))
