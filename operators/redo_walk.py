@@ -18,7 +18,7 @@ __all__ = ["DAFNET_OT_redo_walk"]
 
 class DAFNET_OT_redo_walk(WalkOperator, bpy.types.Operator):
     """Make the chosen walk anew, and those after it: to where its seat is now, from where you have
-    moved the character to, with the speed and seconds below. Keys that you have edited are asked
+    moved the character to, with the speed and seconds above. Keys that you have edited are asked
     about
     """
 

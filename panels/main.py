@@ -2,7 +2,6 @@
 character's mode and targets, and Generate.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import bpy
@@ -104,6 +103,13 @@ class DAFNET_PT_shot(CharacterPanel, bpy.types.Panel):
         layout.row(align=True).prop(settings, "mode", expand=True)
         does = settings.bl_rna.properties["mode"].enum_items[settings.mode].description
         draw_sentence(layout.column(align=True), context, translated_tip(does), "NONE")
+
+        # Here, where it always is: what stands below differs from mode to mode.
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator(DAFNET_OT_generate.bl_idname, icon="PLAY").task = "NEW"
+        layout.operator(DAFNET_OT_live.bl_idname, icon="RESTRICT_SELECT_OFF")
+
         layout.use_property_split = True
         layout.use_property_decorate = False
         animated = any(curve.data_path == "dafnet.mode" for curve in action_curves(character))
@@ -111,8 +117,7 @@ class DAFNET_PT_shot(CharacterPanel, bpy.types.Panel):
         column = layout.column()
         row = column.row(align=True)
         row.prop(settings, "furniture")
-        if settings.furniture is None:
-            row.operator(DAFNET_OT_find_furniture.bl_idname, text="", icon="VIEWZOOM")
+        row.operator(DAFNET_OT_find_furniture.bl_idname, text="", icon="VIEWZOOM")
 
         row = column.row(align=True)
         row.prop(settings, "root", icon="EMPTY_ARROWS")
@@ -120,20 +125,17 @@ class DAFNET_PT_shot(CharacterPanel, bpy.types.Panel):
             row.operator(DAFNET_OT_add_root.bl_idname, text="", icon="ADD")
 
         if settings.mode == "EE" or animated:
-            _draw_targets(layout.column(), settings, HEAD_AND_HANDS)
+            for role in HEAD_AND_HANDS:
+                _draw_target(layout, settings, role, "OBJECT_DATA")
             if missing_targets(context, character, HEAD_AND_HANDS):
                 layout.operator(DAFNET_OT_add_targets.bl_idname, icon="EMPTY_ARROWS")
         if settings.mode != "FREE" or animated:
-            _draw_targets(layout.column(), settings, FEET)
+            for role in FEET:
+                _draw_target(layout, settings, role, "OBJECT_DATA")
             if missing_targets(context, character, FEET):
                 layout.operator(DAFNET_OT_add_foot_targets.bl_idname, icon="EMPTY_ARROWS")
 
-        column = layout.column()
-        column.prop(settings, "look_at", icon="HIDE_OFF")
-        if settings.look_at is not None:
-            row = column.row()
-            row.use_property_decorate = True
-            row.prop(settings, "look_at_influence", text="Influence", slider=True)
+        _draw_target(layout, settings, "look_at", "HIDE_OFF")
 
         if settings.mode == "FULL" or animated:
             layout.prop(settings, "upper_body_source", icon="ARMATURE_DATA")
@@ -162,23 +164,24 @@ class DAFNET_PT_shot(CharacterPanel, bpy.types.Panel):
         column.prop(settings, "seed")
         column.prop(settings, "take_count")
 
-        row = layout.row()
-        row.scale_y = 1.5
-        row.operator(DAFNET_OT_generate.bl_idname, icon="PLAY").task = "NEW"
-        layout.operator(DAFNET_OT_live.bl_idname, icon="RESTRICT_SELECT_OFF")
 
-
-def _draw_targets(
-    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, roles: Sequence[str]
+def _draw_target(
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, role: str, icon: str
 ) -> None:
-    """Draw each target and how far it counts."""
-    for role in roles:
-        layout.prop(settings, role)
-        row = layout.row()
+    """Draw what a target is for and how far it counts, and below, over the whole width, which it
+    is.
+    """
+    column = layout.column(align=True)
+    row = column.row(align=True)
+    row.use_property_decorate = True
+    row.active = getattr(settings, role) is not None
+    name = settings.bl_rna.properties[role].name
+    row.prop(settings, f"{role}_influence", text=name, slider=True)
+
+    row = column.row(align=True)
+    row.use_property_split = False
+    row.prop(settings, role, text="", icon=icon)
+    if role == "head" and settings.head is not None:
+        row = column.row(align=True)
         row.use_property_decorate = True
-        row.active = getattr(settings, role) is not None
-        row.prop(settings, f"{role}_influence", text="Influence", slider=True)
-        if role == "head" and settings.head is not None:
-            row = layout.row()
-            row.use_property_decorate = True
-            row.prop(settings, "head_follows")
+        row.prop(settings, "head_follows", text="Follows")

@@ -8,6 +8,8 @@ __all__ = ["draw_sentence"]
 
 _LETTER = 6.5
 """Pixels of a letter, more or less."""
+_BESIDE = 60
+"""Pixels of the sidebar beside it, with its icon."""
 _SHORTEST = 20
 """Letters of the shortest line."""
 
@@ -20,8 +22,9 @@ def draw_sentence(
     alert: bool = False,
 ) -> None:
     """Draw a sentence over as many lines as it needs, the icon before the first."""
-    width = context.region.width if context.region else 0
-    letter = _LETTER * (context.preferences.system.ui_scale or 1.0)
+    scale = context.preferences.system.ui_scale or 1.0
+    width = context.region.width - _BESIDE * scale if context.region else 0
+    letter = _LETTER * scale
     for k, line in enumerate(wrap(sentence, max(_SHORTEST, round(width / letter)))):
         row = layout.row()
         row.alert = alert

@@ -12,12 +12,9 @@ from ..dafnet_addon.blender.directing.path_sources import (
     is_curve,
     may_move,
 )
-from ..dafnet_addon.blender.pipeline.running import running_job
 from ..dafnet_addon.blender.showcase.examples import EXAMPLES
 from ..operators.add_character import DAFNET_OT_add_character
 from ..operators.add_example import DAFNET_OT_add_example
-from ..operators.add_targets import DAFNET_OT_add_foot_targets, DAFNET_OT_add_targets
-from ..operators.find_furniture import DAFNET_OT_find_furniture
 from ..operators.follow_path import (
     DAFNET_OT_root_from_object,
     DAFNET_OT_walk_along_curve,
@@ -31,7 +28,9 @@ from .sitting import DAFNET_MT_sit
 
 __all__ = [
     "DAFNET_MT_add",
+    "DAFNET_MT_walk",
     "DAFNET_PT_setup",
+    "DAFNET_PT_softness",
     "DAFNET_PT_walks",
     "DAFNET_UL_walks",
     "add_menu",
@@ -62,22 +61,22 @@ class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
         text = f"Lie on {seat.name}" if seat else DAFNET_OT_lie_on.bl_label
         row.operator(DAFNET_OT_lie_on.bl_idname, text=text, icon="TRACKING_FORWARDS")
 
-        column.operator(
+        row = column.row(align=True)
+        row.operator(
             DAFNET_OT_walk_to.bl_idname, text="Walk to Cursor", icon="PIVOT_CURSOR"
         ).goal = "CURSOR"
+        row.menu(DAFNET_MT_walk.bl_idname, text="", icon="DOWNARROW_HLT")
 
-        text = f"Walk along {curve.name}" if curve else DAFNET_OT_walk_along_curve.bl_label
-        column.operator(DAFNET_OT_walk_along_curve.bl_idname, text=text, icon="CURVE_DATA")
-
-        text = (
-            f"Walk through {len(points)} Points"
-            if len(points) > 1
-            else DAFNET_OT_walk_through_points.bl_label
-        )
-        column.operator(DAFNET_OT_walk_through_points.bl_idname, text=text, icon="EMPTY_AXIS")
-
-        text = f"Root from {source.name}" if source else DAFNET_OT_root_from_object.bl_label
-        column.operator(DAFNET_OT_root_from_object.bl_idname, text=text, icon="CON_FOLLOWPATH")
+        # These need something that is selected, and are in the menu until it is.
+        if curve:
+            text = f"Walk along {curve.name}"
+            column.operator(DAFNET_OT_walk_along_curve.bl_idname, text=text, icon="CURVE_DATA")
+        if len(points) > 1:
+            text = f"Walk through {len(points)} Points"
+            column.operator(DAFNET_OT_walk_through_points.bl_idname, text=text, icon="EMPTY_AXIS")
+        if source:
+            text = f"Root from {source.name}"
+            column.operator(DAFNET_OT_root_from_object.bl_idname, text=text, icon="CON_FOLLOWPATH")
 
         own: Any = character_of(context)
         column = self.layout.column()
@@ -85,17 +84,46 @@ class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
         column.use_property_decorate = False
         for name in MANNER:
             column.prop(own.dafnet, name)
+        if len(own.dafnet.walks):
+            self.layout.operator(DAFNET_OT_redo_walk.bl_idname, icon="FILE_REFRESH")
 
+
+class DAFNET_MT_walk(bpy.types.Menu):
+    """Walk along a curve, through points, or as something else moves"""
+
+    bl_idname = "DAFNET_MT_walk"
+    bl_label = "Walk, and …"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Draw them."""
+        layout = self.layout
+        layout.operator(DAFNET_OT_walk_along_curve.bl_idname, icon="CURVE_DATA")
+        layout.operator(DAFNET_OT_walk_through_points.bl_idname, icon="EMPTY_AXIS")
+        layout.operator(DAFNET_OT_root_from_object.bl_idname, icon="CON_FOLLOWPATH")
+
+
+class DAFNET_PT_softness(CharacterPanel, bpy.types.Panel):
+    """How soft the selected piece of furniture is"""
+
+    bl_label = "Softness"
+    bl_idname = "DAFNET_PT_softness"
+    bl_parent_id = "DAFNET_PT_setup"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """A piece is selected."""
+        return super().poll(context) and character_and_goal(context)[1] is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw whether it is guessed, and how soft it is."""
+        _, seat = character_and_goal(context)
+        assert seat is not None
         column = self.layout.column(align=True)
-        column.operator(DAFNET_OT_find_furniture.bl_idname, icon="VIEWZOOM")
-        column.operator(DAFNET_OT_add_targets.bl_idname, icon="EMPTY_ARROWS")
-        column.operator(DAFNET_OT_add_foot_targets.bl_idname, icon="EMPTY_ARROWS")
-        if seat is not None:
-            column = self.layout.column(align=True)
-            column.prop(seat.dafnet, "guess_softness", text=f"Guess How Soft {seat.name} Is")
-            row = column.row(align=True)
-            row.enabled = not seat.dafnet.guess_softness
-            row.prop(seat.dafnet, "softness", text="Softness, cm")
+        column.prop(seat.dafnet, "guess_softness", text=f"Guess for {seat.name}")
+        row = column.row(align=True)
+        row.enabled = not seat.dafnet.guess_softness
+        row.prop(seat.dafnet, "softness", text="Softness, cm")
 
 
 class DAFNET_UL_walks(bpy.types.UIList):
@@ -122,20 +150,21 @@ class DAFNET_UL_walks(bpy.types.UIList):
 
 
 class DAFNET_PT_walks(CharacterPanel, bpy.types.Panel):
-    """What the root's keys were made for, to be made anew"""
+    """What the root's keys were made for: choose the one that is made anew, and where to"""
 
     bl_label = "Walks"
     bl_idname = "DAFNET_PT_walks"
     bl_parent_id = "DAFNET_PT_setup"
+    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """The character was sent somewhere."""
-        character = character_of(context)
-        return running_job() is None and character is not None and len(character.dafnet.walks) > 0
+        own = character_of(context)
+        return super().poll(context) and own is not None and len(own.dafnet.walks) > 0
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the list, the chosen walk's fields, and the button."""
+        """Draw the list, and where the chosen walk leads."""
         layout = self.layout
         own = character_of(context).dafnet  # type: ignore[union-attr]
         if len(own.walks) > 1:
@@ -149,7 +178,6 @@ class DAFNET_PT_walks(CharacterPanel, bpy.types.Panel):
             column.use_property_decorate = False
             for name in fields_of_walk(walk):
                 column.prop(walk, name)
-        layout.operator(DAFNET_OT_redo_walk.bl_idname, icon="FILE_REFRESH")
 
 
 class DAFNET_MT_add(bpy.types.Menu):

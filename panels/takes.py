@@ -87,8 +87,9 @@ class DAFNET_UL_takes(bpy.types.UIList):
         ).index = index
 
         own = action.dafnet
-        split = row.split(factor=0.55, align=True)
-        split.prop(action, "name", text="", emboss=False)
+        split = row.split(factor=0.42, align=True)
+        name = action.name.removeprefix(data.id_data.name).strip() or action.name
+        split.label(text=name, translate=False)
         said = split.row(align=True)
         if len(own.verdict):
             worst = own.verdict[0]
@@ -130,6 +131,7 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
         if take is None:
             return
 
+        layout.prop(take, "name", text="", icon="ACTION")
         figures = take.dafnet
         column = layout.column(align=True)
         for finding in figures.verdict:
@@ -166,10 +168,11 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
             icon="PREVIEW_RANGE",
         ).task = "BETWEEN"
 
-        row = layout.row(align=True)
+        column = layout.column(align=True)
+        row = column.row(align=True)
         row.operator(DAFNET_OT_take_to_nla.bl_idname, icon="NLA_PUSHDOWN")
-        row.operator(DAFNET_OT_mark_take.bl_idname, icon="ASSET_MANAGER")
         row.operator(DAFNET_OT_export_take.bl_idname, icon="EXPORT")
+        column.operator(DAFNET_OT_mark_take.bl_idname, icon="ASSET_MANAGER")
 
 
 class DAFNET_PT_clean_up(CharacterPanel, bpy.types.Panel):

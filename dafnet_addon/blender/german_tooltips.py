@@ -453,7 +453,7 @@ TOOLTIPS = {
     ),
     (
         "Make the chosen walk anew, and those after it: to where its seat is now, from where "
-        "you have moved the character to, with the speed and seconds below. Keys that you "
+        "you have moved the character to, with the speed and seconds above. Keys that you "
         "have edited are asked about"
     ): (
         "Den gewählten Gang neu machen, und die danach: dorthin, wo sein Sitz jetzt ist, von "

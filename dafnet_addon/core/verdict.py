@@ -196,7 +196,7 @@ def _feet(joints: np.ndarray, fps: float, path: RootPath) -> Iterator[Finding]:
         if slides and max(slides)[0] > _SLIDES:
             far, when = max(slides)
             yield Finding(
-                f"{side} foot slides",
+                f"slides {100 * far:.0f} cm",
                 f"The {side} foot slides {100 * far:.0f} cm while it stands, at {when / fps:.1f} "
                 "s; raise Plant Feet, or lower the temperature",
                 good=False,

@@ -82,7 +82,7 @@ def test_the_range_stays_as_long_as_another_s_walk(room: Room) -> None:
     others = bob.dafnet.walks[0].last
     assert room.scene.frame_end == end > others
     room.select(room.ann)
-    room.own.walks[0].seconds, room.own.walks[0].speed = 0.1, 1.6
+    room.own.seconds, room.own.speed = 0.1, 1.6
     room.stool.location.y = 1.5
     bpy.context.view_layer.update()
     assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
@@ -96,11 +96,28 @@ def test_the_manner_is_one_place_s_and_is_kept_with_the_walk(room: Room) -> None
     row = room.own.walks[0]
     assert (row.speed, row.seconds, row.sits_down) == pytest.approx((0.8, 2.0, 2.6))
     slow = row.last
-    row.speed, row.sits_down = 1.6, 0.8
+    room.own.speed, room.own.sits_down = 1.6, 0.8
     assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
     assert room.own.walks[0].last < slow - 30
     assert room.own.walks[0].speed == pytest.approx(1.6), "it stays with the walk"
-    assert room.own.speed == pytest.approx(0.8), "and the next one is as the panel says"
+    room.go(2.0, 0.0, speed=1.2)
+    assert room.own.speed == pytest.approx(1.2), "the place shows how the chosen walk is gone"
+    room.own.active_walk = 0
+    assert room.own.speed == pytest.approx(1.6)
+    room.own.speed = 1.4
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+    assert [each.speed for each in room.own.walks] == pytest.approx([1.4, 1.2]), "others keep it"
+
+
+def test_what_is_asked_of_the_chosen_walk_outlasts_a_failure(room: Room) -> None:
+    room.sit(seconds=1.0)
+    room.own.speed = 1.7
+    room.stool.location.z = 3.0
+    bpy.context.view_layer.update()
+    with pytest.raises(RuntimeError):
+        bpy.ops.dafnet.redo_walk()
+    assert room.own.speed == pytest.approx(1.7)
+    assert room.own.walks[0].speed == pytest.approx(1.1), "as its keys were made"
 
 
 def test_seconds_of_sitting_down_and_getting_up_are_those_of_the_path(room: Room) -> None:
@@ -130,7 +147,7 @@ def test_those_after_it_are_made_again_as_well(room: Room) -> None:
     room.go(3.0, 0.0, seconds=1.0)
     first = room.own.walks[0].last
     room.own.active_walk = 0
-    room.own.walks[0].seconds = 4.0
+    room.own.seconds = 4.0
     assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
     assert [title for title, _ in room.rows()] == ["Sit on Stool", "Walk to 3.0, 0.0"]
     assert room.own.walks[0].last == room.own.walks[1].first == first + 90
@@ -418,8 +435,9 @@ def test_the_panel_shows_the_walk_s_fields_and_the_button(room: Room) -> None:
     )
     room.sit(seconds=0.5)
     assert DAFNET_PT_walks.poll(bpy.context)
-    words = drawn_by(DAFNET_PT_walks, bpy.context).words()
-    assert words == ["goal", "speed", "seconds", "sits_down", "gets_up", "dafnet.redo_walk"]
+    assert drawn_by(DAFNET_PT_walks, bpy.context).words() == ["goal"]
+    words = drawn_by(DAFNET_PT_setup, bpy.context).words()
+    assert "dafnet.redo_walk" in words and words.count("speed") == 1
     room.go(2.0, 0.0)
     words = drawn_by(DAFNET_PT_walks, bpy.context).words()
-    assert words[0] == "DAFNET_UL_walks" and "place" in words and "sits_down" not in words
+    assert words[0] == "DAFNET_UL_walks" and "place" in words and "speed" not in words

@@ -495,7 +495,8 @@ def test_the_menu_and_the_panel_are_there(stage: Set) -> None:
     drawn = bpy.types.VIEW3D_MT_add._dyn_ui_initialize()
     assert drawn.count(panels.add_menu) == 1
     children = [cls.bl_idname for cls in CLASSES if getattr(cls, "bl_parent_id", "")]
-    assert children[:3] == ["DAFNET_PT_setup", "DAFNET_PT_walks", "DAFNET_PT_tasks"]
+    below = ["DAFNET_PT_setup", "DAFNET_PT_walks", "DAFNET_PT_softness", "DAFNET_PT_tasks"]
+    assert children[:4] == below
     stage.select(stage.empty("Other", (0, 0, 0)))
     assert panels.DAFNET_PT_setup.poll(bpy.context), "the only character is meant"
 
@@ -505,8 +506,16 @@ def test_the_menu_and_the_panel_are_there(stage: Set) -> None:
         "Walk along Path",
         "Walk through 2 Points",
         "Sit on Selected",
-        "dafnet.find_furniture",
+        "DAFNET_MT_walk",
     } <= set(drawn_by(panels.DAFNET_PT_setup, bpy.context).words())
+    stage.select(stage.ann)
+    words = drawn_by(panels.DAFNET_PT_setup, bpy.context).words()
+    assert "dafnet.walk_along_curve" not in words, "it is in the menu while no curve is selected"
+    assert drawn_by(panels.DAFNET_MT_walk, bpy.context).words() == [
+        "dafnet.walk_along_curve",
+        "dafnet.walk_through_points",
+        "dafnet.root_from_object",
+    ]
     added = drawn_by(panels.DAFNET_MT_add, bpy.context).words()
     assert added.count("dafnet.add_example") == 4
     assert {"Character", "Chair and Desk", "Bed"} <= set(added)

@@ -22,7 +22,7 @@ from .settings import AS_IT_IS, COMES_AND_GOES, HELD, MAX_TAKES, STANDING
 from .takes import PACKED
 from .task_rows import TaskRow
 from .walk_rows import GROUPS as WALK_GROUPS
-from .walk_rows import MANNER, WalkRow
+from .walk_rows import MANNER, WalkRow, manner_of, set_manner
 
 __all__ = ["CharacterSettings", "TakeSettings", "ensure_registered", "register", "unregister"]
 
@@ -41,6 +41,12 @@ def _is_take(_settings: "CharacterSettings", candidate: bpy.types.Action) -> boo
 
 def _is_not_the_character(settings: "CharacterSettings", candidate: bpy.types.Object) -> bool:
     return candidate != settings.id_data
+
+
+def _walk_chosen(settings: "CharacterSettings", _context: bpy.types.Context) -> None:
+    """Show how the chosen walk is gone, where it can be changed."""
+    if 0 <= settings.active_walk < len(settings.walks):
+        set_manner(settings, manner_of(settings.walks[settings.active_walk]))
 
 
 class TakeFinding(bpy.types.PropertyGroup):
@@ -458,6 +464,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         override=_LOCALLY,
         name="Walk",
         options=set(),
+        update=_walk_chosen,
         description="The walk that is made again, with those after it",
     )
     planned: StringProperty(

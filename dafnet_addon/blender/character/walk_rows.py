@@ -34,6 +34,7 @@ __all__ = [
     "asked_in",
     "fields_of_walk",
     "manner_of",
+    "set_manner",
     "title_of_walk",
 ]
 
@@ -164,13 +165,15 @@ def manner_of(owner: Any) -> Manner:
     return Manner(**{name: float(getattr(owner, name)) for name in MANNER})
 
 
+def set_manner(owner: Any, manner: Manner) -> None:
+    """Let a row, or a character's settings, say this."""
+    for name in MANNER:
+        setattr(owner, name, getattr(manner, name))
+
+
 def fields_of_walk(row: WalkRow) -> tuple[str, ...]:
-    """The properties that count for a row's kind, in the order in which they are shown."""
-    if row.kind == OBJECT:
-        return ("goal",)
-    about = {SEAT: ("goal",), CURVE: ("goal",), PLACE: ("place",), POINTS: ()}[row.kind]
-    down = ("sits_down",) if row.kind == SEAT else ()
-    return (*about, "speed", "seconds", *down, "gets_up")
+    """The properties that say where a row's walk leads, in the order in which they are shown."""
+    return {PLACE: ("place",), POINTS: ()}.get(row.kind, ("goal",))
 
 
 def title_of_walk(row: WalkRow) -> str:

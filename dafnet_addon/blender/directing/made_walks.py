@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ..character.standing import note_standing
-from ..character.walk_rows import MANNER, Asked, WalkRow, asked_in
+from ..character.walk_rows import Asked, WalkRow, asked_in, manner_of, set_manner
 from .root_keys import MOVES, keys_within
 
 __all__ = [
@@ -61,8 +61,7 @@ def _add_row(scene: bpy.types.Scene, character: bpy.types.Object, asked: Asked) 
         row.points.add().point = scene.objects.get(name)
     row.placed = asked.place is not None
     row.place = asked.place or (0.0, 0.0, 0.0)
-    for name in MANNER:
-        setattr(row, name, getattr(asked.manner, name))
+    set_manner(row, asked.manner)
     for name in ("tables", "pull_out", "keep_facing", "backwards"):
         setattr(row, name, getattr(asked, name))
     return row
@@ -70,10 +69,12 @@ def _add_row(scene: bpy.types.Scene, character: bpy.types.Object, asked: Asked) 
 
 @contextmanager
 def walks_kept_on_failure(scene: bpy.types.Scene, character: bpy.types.Object) -> Iterator[None]:
-    """A block that keys walks: if it fails, the rows are as they were."""
+    """A block that keys walks: if it fails, the rows are as they were, and so is what is asked of
+    the next one.
+    """
     own: Any = character.dafnet
     rows = [(asked_in(row), row.first, row.last, row.digest) for row in own.walks]
-    chosen = own.active_walk
+    chosen, manner = own.active_walk, manner_of(own)
     try:
         yield
     except BaseException:
@@ -82,6 +83,7 @@ def walks_kept_on_failure(scene: bpy.types.Scene, character: bpy.types.Object) -
             row = _add_row(scene, character, asked)
             row.first, row.last, row.digest = first, last, digest
         own.active_walk = chosen
+        set_manner(own, manner)
         raise
 
 

@@ -16,7 +16,7 @@ from ...core.progress import stepwise, within
 from ..character.armature import is_character, metres_per_unit
 from ..character.settings import settings_of
 from ..character.standing import moved_by_hand, pose_by_keys
-from ..character.walk_rows import CURVE, OBJECT, POINTS, SEAT, Asked, asked_in
+from ..character.walk_rows import CURVE, OBJECT, POINTS, SEAT, Asked, asked_in, manner_of
 from .made_walks import edited_from, walks_kept_on_failure
 from .path_sources import along_curve, along_object, through_points
 from .root_keys import first_key, keep_copy, keyable_root, last_key, unchanged_on_failure
@@ -36,7 +36,8 @@ def redo_walks(
     index: int = 0,
     replace_edited: bool = False,
 ) -> Generator[float, None, Walk]:
-    """Make the walk of a row (``Object.dafnet.walks``) anew, and then those after it.
+    """Make the walk of a row (``Object.dafnet.walks``) anew, and then those after it: the chosen
+    one in the manner that the character's settings say, others as they were made.
 
     The first walk begins where the character has been moved by hand, if it was; any other where the
     one before it ends. ``replace_edited``: also where keys were edited since, of which a copy is
@@ -56,6 +57,8 @@ def redo_walks(
 
     rows = list(own.walks)[index:]
     asked, first, last = [asked_in(row) for row in rows], rows[0].first, rows[-1].last
+    if index == own.active_walk:
+        asked[0] = replace(asked[0], manner=manner_of(own))
     for each in asked:
         _require_goals(scene, each)
     begins = _beginning(scene, armature, root, index)
