@@ -115,9 +115,12 @@ class DAFNET_PT_shot(CharacterPanel, bpy.types.Panel):
         animated = any(curve.data_path == "dafnet.mode" for curve in action_curves(character))
 
         column = layout.column()
+        above = column.row(align=True)
+        above.label(text="Furniture")
+        above.operator(DAFNET_OT_find_furniture.bl_idname, text="", icon="VIEWZOOM")
         row = column.row(align=True)
-        row.prop(settings, "furniture")
-        row.operator(DAFNET_OT_find_furniture.bl_idname, text="", icon="VIEWZOOM")
+        row.use_property_split = False
+        row.prop(settings, "furniture", text="")
 
         row = column.row(align=True)
         row.prop(settings, "root", icon="EMPTY_ARROWS")

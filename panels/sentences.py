@@ -6,10 +6,10 @@ import bpy
 
 __all__ = ["draw_sentence"]
 
-_LETTER = 6.5
+_LETTER = 6.3
 """Pixels of a letter, more or less."""
-_BESIDE = 60
-"""Pixels of the sidebar beside it, with its icon."""
+_BESIDE, _ICON = 14, 24
+"""Pixels of the sidebar beside it, and of its icon."""
 _SHORTEST = 20
 """Letters of the shortest line."""
 
@@ -23,7 +23,8 @@ def draw_sentence(
 ) -> None:
     """Draw a sentence over as many lines as it needs, the icon before the first."""
     scale = context.preferences.system.ui_scale or 1.0
-    width = context.region.width - _BESIDE * scale if context.region else 0
+    beside = scale * (_BESIDE + (_ICON if icon != "NONE" else 0))
+    width = context.region.width - beside if context.region else 0
     letter = _LETTER * scale
     for k, line in enumerate(wrap(sentence, max(_SHORTEST, round(width / letter)))):
         row = layout.row()

@@ -84,6 +84,9 @@ class DAFNET_PT_setup(CharacterPanel, bpy.types.Panel):
         column.use_property_decorate = False
         for name in MANNER:
             column.prop(own.dafnet, name)
+        row = column.row()
+        row.use_property_decorate = True
+        row.prop(own.dafnet, "lean")
         if len(own.dafnet.walks):
             self.layout.operator(DAFNET_OT_redo_walk.bl_idname, icon="FILE_REFRESH")
 

@@ -452,6 +452,13 @@ TOOLTIPS = {
         "hast, bleiben in einer eigenen Aktion"
     ),
     (
+        "How far the trunk leans back while the character sits, more than by itself; forward below "
+        "0. Hands that hold on to something stay there, and a chair's back is where it ends"
+    ): (
+        "Wie weit sich der Rumpf im Sitzen zurücklehnt, mehr als von selbst; nach vorn unter 0. "
+        "Hände, die sich an etwas halten, bleiben dort, und an der Lehne eines Stuhls endet es"
+    ),
+    (
         "Make the chosen walk anew, and those after it: to where its seat is now, from where "
         "you have moved the character to, with the speed and seconds above. Keys that you "
         "have edited are asked about"

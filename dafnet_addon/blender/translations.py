@@ -76,6 +76,7 @@ _GERMAN = {
     "Keep Facing": "Blickrichtung halten",
     "Key": "Mit Keys",
     "Later": "Später",
+    "Lean": "Lehnen",
     "Left": "Links",
     "Left Foot": "Linker Fuß",
     "Left Foot Influence": "Einfluss linker Fuß",

@@ -14,6 +14,7 @@ from .cleanup import CleanUp, cleaned, reach_targets
 from .conditions import PREROLL, Change, Shot, rolled, shot_steps, targets_of, turns_of
 from .errors import InputError
 from .kinematics import Bent, Turn, come_over, global_from_local, local_from_global, turned
+from .leaning import lean_findings, lean_of, with_lean
 from .live import LiveFrame
 from .looking import counting, head_turn, with_chest_turned
 from .meeting import TRIES, bent, led_to, met, nearest, on_joints, require_same_root
@@ -277,8 +278,10 @@ def _finished_steps(
     metrics = raw = judged(on_joints(own))
     yield 0.4
     looked_at, counts = _looked_at(controls)
-    if clean_up.asked or counts.any():
-        joints = on_joints(own)
+    leans = np.radians(0.0 if controls.lean is None else np.asarray(controls.lean, float))
+    before, lean = on_joints(own), None
+    if clean_up.asked or counts.any() or leans.any():
+        joints = before
         if clean_up.asked:
             joints = yield from within(
                 cleaned_up.steps(
@@ -290,8 +293,13 @@ def _finished_steps(
             if not same:
                 joints = on_joints(at_own_rate(bent(joints)))
         yield 0.6
-        if counts.any():
+        before = joints
+        if leans.any() or counts.any():
             holds = touches(joints, controls.fps, floor, reach, targets)[:, : len(WRISTS)]
+        if leans.any():
+            lean = lean_of(joints, leans, support, reach, targets, controls.fps)
+            joints = with_lean(joints, lean.done, holds, controls.fps)
+        if counts.any():
             frames = _frames(bent(joints, controls.fps))
             joints = with_chest_turned(
                 joints, frames, looked_at, counts, holds=holds, fps=controls.fps
@@ -313,6 +321,7 @@ def _finished_steps(
         own = _turned(own, turns)
 
     joints = on_joints(own)
+    found = lean_findings(before, joints, lean, shot.own_scene, controls.fps, floor)
     root = RootPath(shot.own_path.position * controls.scale, shot.own_path.yaw)
     return Take(
         fps=controls.fps,
@@ -328,7 +337,7 @@ def _finished_steps(
         log_likelihood=log_likelihood,
         raw_metrics=raw,
         metrics=metrics,
-        verdict=verdict(joints, controls.fps, shot.own_path, shot.own_scene, support),
+        verdict=verdict(joints, controls.fps, shot.own_path, shot.own_scene, support, found),
         seconds={"fitting": perf_counter() - started},
         warnings=shot.warnings,
     )

@@ -41,6 +41,7 @@ __all__ = [
     "global_from_local",
     "local_from_global",
     "two_bone",
+    "with_wrists_at",
     "fit",
     "on_bones",
     "turned",
@@ -153,6 +154,20 @@ def two_bone(
     )
     middle = root + length1 * (cosine * along + np.sqrt(1.0 - cosine**2) * bend)
     return middle, root + distance * along
+
+
+def with_wrists_at(joints: np.ndarray, wrists: np.ndarray, elbows: np.ndarray) -> np.ndarray:
+    """Joints (T, 22, 3) of the canonical body whose arms reach ``wrists`` (T, 2, 3), bent towards
+    ``elbows`` (T, 2, 3).
+    """
+    out = joints.copy()
+    for k, side in enumerate(("left", "right")):
+        shoulder, elbow, wrist = LIMBS[f"{side}_arm"]
+        upper, lower = (float(np.linalg.norm(OFFSETS[j])) for j in (elbow, wrist))
+        out[:, elbow], out[:, wrist] = two_bone(
+            out[:, shoulder], wrists[:, k], elbows[:, k], upper, lower
+        )
+    return out
 
 
 def _across(v: np.ndarray, axis: np.ndarray) -> np.ndarray:

@@ -6,10 +6,10 @@ Angles are of the chest: yaw to the left, pitch up, radians.
 
 import numpy as np
 
-from .kinematics import Turn, two_bone
+from .kinematics import Turn, with_wrists_at
 from .root import gaussian, yaw_of
 from .rotations import matrix_from_vector, rotate, transpose
-from .skeleton import HEAD, LIMBS, OFFSETS, PARENTS, SPINE, joint
+from .skeleton import ELBOWS, HEAD, PARENTS, SPINE, WRISTS, joint
 
 __all__ = ["counting", "head_turn", "look_away", "with_chest_turned"]
 
@@ -29,7 +29,6 @@ _FADE = 0.12  # seconds; deviation of the Gaussian over how far a target counts
 _SOFT = 0.2  # share of a limit in which a turn comes to it
 
 _CHEST = joint("spine3")
-_ARMS = [LIMBS[f"{side}_arm"] for side in ("left", "right")]
 
 
 def counting(target: np.ndarray, share: np.ndarray, fps: float) -> np.ndarray:
@@ -103,12 +102,10 @@ def with_chest_turned(
         turn = matrix_from_vector(up * (angle / len(SPINE))[:, None])
         above = [j for j in range(len(PARENTS)) if _hangs(j, at)]
         out[:, above] = out[:, [at]] + np.einsum("tij,tbj->tbi", turn, out[:, above] - out[:, [at]])
-    for k, (shoulder, elbow, wrist) in enumerate(_ARMS):
-        goal = out[:, wrist] + holds[:, [k]] * (joints[:, wrist] - out[:, wrist])
-        upper, lower = (float(np.linalg.norm(OFFSETS[j])) for j in (elbow, wrist))
-        pole = out[:, elbow] + holds[:, [k]] * (joints[:, elbow] - out[:, elbow])
-        out[:, elbow], out[:, wrist] = two_bone(out[:, shoulder], goal, pole, upper, lower)
-    return out
+    wrists, elbows = (
+        out[:, at] + holds[..., None] * (joints[:, at] - out[:, at]) for at in (WRISTS, ELBOWS)
+    )
+    return with_wrists_at(out, wrists, elbows)
 
 
 def _hangs(j: int, above: int) -> bool:

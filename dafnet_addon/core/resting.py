@@ -1,7 +1,7 @@
 """Who rests on furniture is as high over it as it carries a body: lifted where sunk in, lowered
 where hovering, thighs and back against it and not in it.
 
-Joints are (T, 22, 3), world, canonical metres, 30 frames a second.
+Joints are (T, 22, 3), world, canonical metres, 30 frames a second unless another rate is given.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,7 +31,9 @@ __all__ = [
     "Distance",
     "across_of",
     "lifted",
+    "lying",
     "on_legs",
+    "reclined",
     "rested",
     "resting",
     "sitting",
@@ -90,8 +92,8 @@ def rested(
     A rest is what is slow, and neither as deep in the furniture as what is under it nor as high
     over it as what stands. The way to it and from it is moved softly, less and less.
     """
-    lying = smoothstep(_between(_tilt(joints), *_LIES))
-    carried = support.carried - LIES_LOWER * lying
+    lies = lying(joints)
+    carried = support.carried - LIES_LOWER * lies
     rests = resting(joints, carried)
     if not rests:
         return joints
@@ -101,7 +103,7 @@ def rested(
         joints = lifted(joints, lift, support.top)
     if distance is not None:
         rest = strength * _during(rests, len(joints))
-        sits = rest * (1.0 - lying)
+        sits = rest * (1.0 - lies)
         upright = rest * (1.0 - smoothstep(_between(_tilt(joints), *_RECLINES)))
         joints = _off_the_back(joints, distance, support.softness, upright)
         joints = _on_the_seat(joints, distance, support.softness, sits)
@@ -114,20 +116,28 @@ def _tilt(joints: np.ndarray) -> np.ndarray:
     return np.arctan2(np.linalg.norm(trunk[:, :2], axis=-1), trunk[:, 2])
 
 
+def lying(joints: np.ndarray) -> np.ndarray:
+    """How far (T,) somebody lies, from 0, sitting up, to 1."""
+    return smoothstep(_between(_tilt(joints), *_LIES))
+
+
 def _between(values: np.ndarray, low: float, high: float) -> np.ndarray:
     """Which part of the way from ``low`` to ``high`` values are on."""
     return (values - low) / (high - low)
 
 
-def resting(joints: np.ndarray, carried: np.ndarray) -> list[tuple[int, int]]:
+def resting(
+    joints: np.ndarray, carried: np.ndarray, fps: float = MODEL_FPS
+) -> list[tuple[int, int]]:
     """The (start, stop) of rests of a pelvis that furniture has to carry at these heights (T,)."""
-    pelvis = joints[:, PELVIS]
+    pelvis, rate = joints[:, PELVIS], fps / MODEL_FPS
     speed = np.zeros(len(joints))
     if len(joints) > 1:
-        speed = np.linalg.norm(np.gradient(gaussian(pelvis, _SETTLED), axis=0), axis=-1) * MODEL_FPS
+        settled = gaussian(pelvis, _SETTLED * rate)
+        speed = np.linalg.norm(np.gradient(settled, axis=0), axis=-1) * fps
     over = pelvis[:, 2] - carried
     there = (over > -_SINKS) & (over < _HOVERS) & (speed < _STILL)
-    return runs(there, at_least=min(_RESTS, len(joints)), gap=_STIRS)
+    return runs(there, at_least=min(round(_RESTS * rate), len(joints)), gap=round(_STIRS * rate))
 
 
 def sitting(joints: np.ndarray, support: Support) -> np.ndarray:
@@ -244,15 +254,19 @@ def _off_the_back(
     """Joints whose trunk leans forward as far as the back of a seat asks for, by ``counts``
     (T,)."""
     trunk = joints[:, _TRUNK]
-    across = across_of(joints)
-    forward = np.cross((0.0, 0.0, 1.0), across)
+    forward = np.cross((0.0, 0.0, 1.0), across_of(joints))
     ahead = until_free(trunk, forward, distance, _BACK_SKIN - _GIVES_WAY * softness)
     over = np.maximum((trunk - joints[:, PELVIS, None])[..., 2], _LEAST_LEVER)
     lean = gaussian(counts * np.clip(ahead / over, 0.0, _LEANS).max(axis=1), _STEADY)
     if not lean.any():
         return joints
 
-    turn = matrix_from_vector(-lean[:, None] * across)
+    return reclined(joints, -lean)
+
+
+def reclined(joints: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Joints with all over the pelvis turned back about it by an ``angle`` (T,), radians."""
+    turn = matrix_from_vector(angle[:, None] * across_of(joints))
     pelvis = joints[:, PELVIS, None]
     out = joints.copy()
     out[:, _OVER_PELVIS] = pelvis + np.einsum(

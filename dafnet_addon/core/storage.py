@@ -42,6 +42,7 @@ _ROWS: dict[str, tuple[int, ...]] = {
     **{f"controls.{name}_influence": () for name in TARGETS},
     "controls.look_at": (3,),
     "controls.look_at_influence": (),
+    "controls.lean": (),
     "take.joints": (22, 3),
     "take.rotations": (22, 4),
     "take.root": (4, 4),

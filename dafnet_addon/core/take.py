@@ -15,15 +15,18 @@ from .root import RootPath
 from .skeleton import JOINTS, LOWER, TARGETS, UPPER
 from .text import printable
 
-__all__ = ["MODES", "Controls", "Finding", "Take"]
+__all__ = ["LEANS", "MODES", "Controls", "Finding", "Take"]
 
 MODES = ("FREE", "EE", "FULL")
+LEANS = (-20.0, 35.0)
+"""Degrees that a trunk leans forward and back at most, more than by itself."""
 
 _SLOWEST = 1.0  # frames a second
 _FASTEST = 1000.0  # frames a second
 _SMALLEST = 1e-3  # size over the canonical body
 _LARGEST = 1e3  # size over the canonical body
 _LONGEST_BLEND = 600.0  # seconds
+_ROUNDED = 1e-3  # degrees, by which single precision is off
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,8 @@ class Controls:
     where the mode changes. ``scale``: the character's size over the canonical body of 1.75 m.
     ``look_at`` (T, 3): what is looked at, in any mode, NaN where nothing is: the head turns to it,
     and the chest where that is not enough; the network is not told.
+    ``lean`` (T,), or one number: degrees that the trunk leans back, more than by itself, while one
+    sits; forward below 0; within ``LEANS``. The network is not told.
     ``before`` (K, 22, 3), ``before_root`` (K, 4, 4): the joints and the root in the frames before
     the first one and, last of all, in it: the take begins with that motion, else from standing.
     Of more than 70 / 30 seconds the last count; before the first of them it is taken to be still.
@@ -77,6 +82,7 @@ class Controls:
     scale: float = 1.0
     look_at: np.ndarray | None = None
     look_at_influence: np.ndarray | None = None
+    lean: np.ndarray | float | None = None
     before: np.ndarray | None = None
     before_root: np.ndarray | None = None
 
@@ -126,6 +132,9 @@ class Controls:
                 )
                 hold(name, rotations(found, what) if name.endswith("_rotation") else found)
 
+        if self.lean is not None:
+            hold("lean", _checked_lean(self.lean, frames))
+
         if (self.before is None) != (self.before_root is None):
             raise InputError("'before' and 'before_root' belong together; give both, or neither.")
         if self.before is not None:
@@ -156,6 +165,16 @@ def _checked_root(root: object) -> np.ndarray:
         )
 
     return inside(found, "The root", FARTHEST)
+
+
+def _checked_lean(lean: object, frames: int) -> np.ndarray:
+    found = np.full(frames, lean) if isinstance(lean, int | float) else lean
+    found = shaped(found, "'lean'", (frames,), like=", like the root's frames")
+    inside(found, "'lean'", FARTHEST)
+    low, high = LEANS
+    if not ((found >= low - _ROUNDED) & (found <= high + _ROUNDED)).all():
+        raise InputError(f"'lean' leaves {low:g} to {high:g} degrees; keep within.")
+    return found
 
 
 def _checked_mode(mode: object, frames: int) -> str | tuple[str, ...]:

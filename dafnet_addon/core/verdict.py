@@ -4,7 +4,7 @@ through and whether its feet slide.
 Joints are (T, 22, 3), world, canonical metres, at ``fps``.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import product
 
 import numpy as np
@@ -45,13 +45,20 @@ _PARTS = {  # what is between a joint and the one it hangs on
 
 
 def verdict(
-    joints: np.ndarray, fps: float, path: RootPath, scene: Scene, support: Support
+    joints: np.ndarray,
+    fps: float,
+    path: RootPath,
+    scene: Scene,
+    support: Support,
+    also: Iterable[Finding] = (),
 ) -> tuple[Finding, ...]:
     """What there is to say of a take: seats first, then what it goes through, then its feet.
 
-    ``path`` (T): its root's; ``support``: of ``softness.support_under``, where the root is.
+    ``path`` (T): its root's; ``support``: of ``softness.support_under``, where the root is;
+    ``also``: what was found before.
     """
     found = [
+        *also,
         *_seats(joints, fps, path, scene, support),
         *_inside(joints, fps, path, scene),
         *_feet(joints, fps, path),

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core.root import RootPath
 from ..core.take import Controls
-from .tasks import Task
+from .tasks import SitOn, Task
 from .track import Targets
 
 __all__ = ["Entry", "Hold", "Plan"]
@@ -60,6 +60,17 @@ class Plan:
     def __len__(self) -> int:
         return len(self.path)
 
+    @property
+    def lean(self) -> np.ndarray | None:
+        """Degrees (T,) that the trunk leans back while one sits, as the last task to sit down says;
+        None where no task asks for any.
+        """
+        seats = [(e.task, e.start, e.there) for e in self.timeline if isinstance(e.task, SitOn)]
+        out = np.zeros(len(self))
+        for k, (task, start, there) in enumerate(seats):
+            out[max(start, there - round(self.fps)) if k else 0 :] = task.lean
+        return out if out.any() else None
+
     def controls(self) -> Controls:
         """What ``generate`` is given."""
         places, influences = self.targets.places, self.targets.influences
@@ -75,4 +86,5 @@ class Plan:
             hand_left_influence=influences.get("hand_left"),
             hand_right_influence=influences.get("hand_right"),
             scale=self.scale,
+            lean=self.lean,
         )

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..core.checks import FARTHEST, array, inside, number
 from ..core.errors import InputError
+from ..core.take import LEANS
 from ..core.text import nearest_known, printable
 
 __all__ = [
@@ -82,7 +83,8 @@ class WalkAlong(_Checked):
 class SitOn(_Checked):
     """Sit down ``on`` something for some ``seconds``.
 
-    On a wide seat ``near`` is the place to sit by; ``facing`` counts on what has no back.
+    On a wide seat ``near`` is the place to sit by; ``facing`` counts on what has no back. ``lean``:
+    degrees that the trunk leans back, more than by itself, until he sits down elsewhere.
     """
 
     on: str
@@ -90,6 +92,7 @@ class SitOn(_Checked):
     facing: float | str | None = None
     near: Point | None = None
     choose: str = "nearest"
+    lean: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -219,6 +222,8 @@ def _checked(task: _Checked, option: str, value: object) -> object:
         return number(value, what, 0.0, _LONGEST, "seconds")
     if option == "speed":
         return number(value, what, _SLOWEST, _FASTEST, "metres a second")
+    if option == "lean":
+        return number(value, what, *LEANS, "degrees")
     if option in _WORDS:
         if value is None and option == "hand" and isinstance(task, Reach):
             return None

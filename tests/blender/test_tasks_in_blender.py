@@ -63,6 +63,23 @@ def test_keys_say_what_was_planned(stage: Stage) -> None:
     assert np.degrees(np.arccos(np.clip((angle - 1) / 2, -1, 1))).max() < 3.0
 
 
+def test_a_lean_is_keyed_for_as_long_as_one_sits_so(stage: Stage) -> None:
+    stage.seat("Bench", location=(-1.5, 1.5, 0.0))
+    tasks = [SitOn("Stool", seconds=2, lean=15), SitOn("Bench", seconds=2)]
+    (done,) = direct(bpy.context, [Assignment(stage.ann, tasks)])
+    keys = keys_of(stage.ann)[("dafnet.lean", 0)]
+    assert 2 <= len(keys) <= 4
+    first, second = done.plan.timeline
+    read = stage.read().controls
+    assert np.allclose(read.lean, done.plan.controls().lean, atol=1e-3)
+    assert np.allclose(read.lean[first.start : second.start], 15.0, atol=1e-3)
+    assert not read.lean[second.there :].any()
+    direct(bpy.context, [Assignment(stage.ann, [SitOn("Stool")])])
+    assert ("dafnet.lean", 0) not in keys_of(stage.ann) or not len(
+        keys_of(stage.ann)[("dafnet.lean", 0)]
+    ), "planned anew without one"
+
+
 def test_keys_are_few_enough_to_edit(stage: Stage) -> None:
     (done,) = direct(bpy.context, [Assignment(stage.ann, TASKS)])
     seconds = len(done.plan) / 24

@@ -10,7 +10,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.character.takes import take
 from mathutils import Vector
 
 from kit.delivered import glb
-from kit.stage import Stage, bone_heads
+from kit.stage import Stage, bone_heads, key
 
 
 @pytest.fixture
@@ -129,3 +129,25 @@ def test_what_is_looked_at_turns_the_head_and_leaves_the_body(stage: Stage) -> N
     lamp.parent = stage.ann
     with pytest.raises(RuntimeError, match=r"The target of Look At 'Lamp' follows the character"):
         bpy.ops.dafnet.generate()
+
+
+def test_who_sits_leans_as_the_keys_say(blender: ModuleType) -> None:
+    stage = Stage(fps=30)
+    stool = stage.seat("Stool", location=(0.0, 1.6, 0.0))
+    stage.select(stool, stage.ann)
+    assert bpy.ops.dafnet.walk_to(goal="SEAT", seconds=4.0) == {"FINISHED"}
+    bpy.ops.dafnet.generate()
+    last = stage.own.walks[0].last
+    leant = []
+    for _ in range(2):
+        pelvis, neck = bone_heads(stage.ann, last - 15, ["pelvis", "neck"])
+        trunk = neck - pelvis
+        leant.append((pelvis, trunk, np.degrees(np.arctan2(trunk[1], trunk[2]))))
+        key(stage.own, "lean", (last - 70, 0.0), (last - 60, np.radians(15.0)))
+        bpy.ops.dafnet.generate()
+    (before, _, upright), (after, _, back) = leant
+    assert np.allclose(before, after, atol=1e-4), "the pelvis stays"
+    assert abs(abs(back - upright) - 15.0) < 3.0
+    words = [finding.word for finding in takes_of(stage.ann)[-1].dafnet.verdict]
+    assert "sits" in words
+    assert stage.read().controls.lean.max() == pytest.approx(15.0, abs=1e-3)

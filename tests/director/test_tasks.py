@@ -115,6 +115,7 @@ def test_tasks_are_told_in_words() -> None:
         ([{"walk_to": [1, float("nan")]}], "not a place"),
         ([{"walk_along": [[1, 2]]}], "not a line; give at least two places"),
         ([{"walk_to": "A", "facing": 400}], "from -360 to 360 degrees"),
+        ([{"sit_on": "A", "lean": 60}], "from -20 to 35 degrees"),
         ([{"walk_to": "A", "speed": 9}], "from 0.4 to 2.5 metres a second"),
     ],
 )

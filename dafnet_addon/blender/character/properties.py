@@ -20,7 +20,7 @@ from ...core.solids import SOFTEST
 from ..rig import properties as rig_properties
 from .settings import AS_IT_IS, COMES_AND_GOES, HELD, MAX_TAKES, STANDING
 from .takes import PACKED
-from .task_rows import TaskRow
+from .task_rows import LEAN, TaskRow
 from .walk_rows import GROUPS as WALK_GROUPS
 from .walk_rows import MANNER, WalkRow, manner_of, set_manner
 
@@ -454,6 +454,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
     seconds: FloatProperty(override=_LOCALLY, options=set(), **MANNER["seconds"])
     sits_down: FloatProperty(override=_LOCALLY, options=set(), **MANNER["sits_down"])
     gets_up: FloatProperty(override=_LOCALLY, options=set(), **MANNER["gets_up"])
+    lean: FloatProperty(override=_LOCALLY, **LEAN)
     walks: CollectionProperty(
         override={*_LOCALLY, "USE_INSERTION"},
         type=WalkRow,

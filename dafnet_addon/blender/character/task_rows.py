@@ -14,10 +14,24 @@ from bpy.props import (
 )
 
 from ...core.errors import InputError
+from ...core.take import LEANS
 from ...director.task_lists import tasks_from
 from ...director.tasks import VERBS, Task, options
 
-__all__ = ["TaskRow", "add_row", "fields_of", "tasks_of", "title_of"]
+__all__ = ["LEAN", "TaskRow", "add_row", "fields_of", "tasks_of", "title_of"]
+
+LEAN: dict[str, Any] = {
+    "name": "Lean",
+    "default": 0.0,
+    "min": float(np.radians(LEANS[0])),
+    "max": float(np.radians(LEANS[1])),
+    "subtype": "ANGLE",
+    "description": (
+        "How far the trunk leans back while the character sits, more than by itself; forward below "
+        "0. Hands that hold on to something stay there, and a chair's back is where it ends"
+    ),
+}
+"""How far one leans: what Blender is told."""
 
 _PLACES = ("where", "what")
 """What a verb may be about that may be a place as well as a thing."""
@@ -83,6 +97,7 @@ class TaskRow(bpy.types.PropertyGroup):
         max=2.5,
         description="Walking speed, in metres per second",
     )
+    lean: FloatProperty(options=set(), **LEAN)
     turned: BoolProperty(
         name="Facing", options=set(), description="Face something, or in a direction"
     )
@@ -151,7 +166,7 @@ def fields_of(row: TaskRow) -> tuple[str, ...]:
         found += ["turned"]
         if row.turned:
             found += ["faced", *([] if row.faced else ["facing"])]
-    shown = ("seconds", "speed", "choose", "how", "hand")
+    shown = ("seconds", "speed", "lean", "choose", "how", "hand")
     return (*found, *(name for name in shown if name in names))
 
 
@@ -190,6 +205,8 @@ def _said(row: TaskRow, unit: float) -> Iterator[tuple[str, Any]]:
             yield name, row.faced or round(float(np.degrees(row.facing)), 4)
         elif name == "hand" and row.hand != "EITHER":
             yield name, row.hand.lower()
+        elif name == "lean":
+            yield name, round(float(np.degrees(row.lean)), 4)
         elif name in ("choose", "how"):
             yield name, getattr(row, name).lower()
         elif name in ("seconds", "speed"):

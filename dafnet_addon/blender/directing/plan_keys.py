@@ -49,7 +49,7 @@ def key_plan(
     unit: float,
 ) -> tuple[str, ...]:
     """Key a plan from frame ``first`` on, in place of all keys there of the root, of the targets
-    that it uses, of the influences and of the mode. ``unit``: metres of a Blender unit.
+    that it uses, of the influences, the lean and the mode. ``unit``: metres of a Blender unit.
 
     Targets that are missing are added. Returns the names of the actions in which keys are kept that
     the user had made or edited. ``InputError``: something cannot be keyed; nothing is changed then.
@@ -117,6 +117,7 @@ def _settings(armature: bpy.types.Object) -> tuple[str, ...]:
     return (
         "dafnet.mode",
         "dafnet.head_follows",
+        "dafnet.lean",
         *(f"dafnet.{role}_influence" for role in roles),
     )
 
@@ -195,6 +196,11 @@ def _key_settings(armature: bpy.types.Object, plan: Plan, first: int) -> None:
     """Key the mode, how far targets count, and what of the head's does."""
     own, targets = armature.dafnet, plan.targets
     _key_words(armature, "mode", targets.mode, first)
+    if (lean := plan.lean) is not None:
+        for k in _frames(lean, plan.fps):
+            own.lean = float(np.radians(lean[k]))
+            _insert(armature, "dafnet.lean", first + k)
+        _straighten(armature, ("dafnet.lean",), "LINEAR", first)
     if "EE" not in targets.mode:
         return
 

@@ -253,12 +253,14 @@ class _Tracks:
         self.local: dict[str, list[np.ndarray]] = {role: [] for role in targets}
         self.looked_at: list[np.ndarray] = []
         self.looks: list[float] = []
+        self.leans: list[float] = []
 
     def add(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Note the frame that the scene shows now."""
         own = self.armature.dafnet
         self.modes.append(own.mode)
         self.head_follows.append(own.head_follows)
+        self.leans.append(own.lean)
         self.root.append(array(self._root.evaluated_get(depsgraph).matrix_world))
         for role, target in self._targets.items():
             evaluated = target.evaluated_get(depsgraph)
@@ -271,7 +273,7 @@ class _Tracks:
 
     def given(self, unit: float) -> dict[str, np.ndarray]:
         """The targets as ``Controls`` takes them, in metres: places, rotations where they count,
-        and influences where they are ever less than 1.
+        and influences where they are ever less than 1; and the lean, where there is any.
         """
         given = {}
         for role, target in self._targets.items():
@@ -293,6 +295,8 @@ class _Tracks:
             given["look_at"] = unit * np.array(self.looked_at)
             if min(self.looks) < 1.0:
                 given["look_at_influence"] = np.array(self.looks)
+        if any(self.leans):
+            given["lean"] = np.degrees(self.leans)
         return given
 
 
