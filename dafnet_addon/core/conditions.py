@@ -40,6 +40,7 @@ __all__ = [
     "over_a_seat",
     "rolled",
     "shot_steps",
+    "foot_targets",
     "targets_of",
     "turns_of",
     "PREROLL",
@@ -416,6 +417,17 @@ def targets_of(path: RootPath, request: Request) -> dict[str, np.ndarray]:
         name: np.where(given[:, slot, None], places[:, slot], np.nan)
         for name, slot in _SLOTS.items()
     }
+
+
+def foot_targets(controls: Controls) -> dict[str, np.ndarray]:
+    """Where feet are asked to be (T, 3), metres, by name; NaN where they are free, even in part."""
+    out, counts = {}, _modes(controls) != "FREE"
+    for name in FEET_ASKED:
+        if (target := getattr(controls, name)) is not None:
+            share = getattr(controls, f"{name}_influence")
+            whole = counts if share is None else counts & (share >= 1.0)
+            out[name] = np.where(whole[:, None], target, np.nan)
+    return out
 
 
 def turns_of(controls: Controls, path: RootPath) -> dict[str, Turn]:

@@ -337,7 +337,9 @@ def _finished_steps(
         log_likelihood=log_likelihood,
         raw_metrics=raw,
         metrics=metrics,
-        verdict=verdict(joints, controls.fps, shot.own_path, shot.own_scene, support, found),
+        verdict=verdict(
+            joints, controls.fps, shot.own_path, shot.own_scene, support, targets, found
+        ),
         seconds={"fitting": perf_counter() - started},
         warnings=shot.warnings,
     )

@@ -320,7 +320,7 @@ def motion_metrics(
         "foot_sliding_per_frame": float(foot_sliding(joints, fps, floor).mean()),
         "foot_sliding_4mm_s": float(foot_sliding(joints, fps, floor, per_frame=False).mean()),
         "skate_cm": skate(joints, fps, floor),
-        "slide_max": float(slides(joints, fps, floor).max(initial=0.0)),
+        "slide_max": float(slides(joints, fps, floor, targets).max(initial=0.0)),
         "bad_collisions_per_frame": collisions,
         "bad_collision_seconds": touching,
         "penetration_mean": depth[0],

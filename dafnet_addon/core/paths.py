@@ -63,6 +63,7 @@ _CORNER_RATE = np.radians(90.0)
 _SIDEWAYS = 2.0  # acceleration to the side that slows a walker who does not, m/s²
 _CORNER_CUT = 0.45  # metres of a straight that a rounded corner may use
 _CORNER_SPEED = 0.3  # metres a second, the slowest in a corner
+_NEAREST = 0.05  # metres between two points of a way, at least
 _SETTLED = 0.25  # metres before a seat, where the heading has settled
 _TURN_AWAY = 0.20  # metres after a seat, where the heading lets go
 
@@ -208,11 +209,15 @@ def _leg(origin: Stop, via: Sequence[Point], goal: Stop, cruise: float, fps: flo
 
     points += [np.asarray(p, float) for p in via]
     if goal.seated:
-        points.append(np.asarray(goal.position, float) + goal.before * forward_of(goal.yaw))
+        seat, ahead = np.asarray(goal.position, float), forward_of(goal.yaw)
+        before = seat + goal.before * ahead
+        if np.linalg.norm(before - points[-1]) < _NEAREST:  # one is there, and goes on from there
+            before = before - 2.0 * _NEAREST * ahead
+        points.append(before)
 
     points.append(np.asarray(goal.position, float))
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    if not np.isfinite(gaps).all() or (gaps < 0.05).any():
+    if not np.isfinite(gaps).all() or (gaps < _NEAREST).any():
         raise InputError(
             "Two neighbouring points of the root's path are less than 5 cm apart; move or remove "
             "one."

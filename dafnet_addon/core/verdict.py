@@ -4,8 +4,9 @@ through and whether its feet slide.
 Joints are (T, 22, 3), world, canonical metres, at ``fps``.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import product
+from types import MappingProxyType
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from .occupancy import distance
 from .root import RootPath
 from .series import runs
 from .skeleton import FEET, JOINTS, PARENTS, PELVIS
+from .sliding import led
 from .softness import Support, guessed
 from .solids import Scene
 from .take import Finding
@@ -50,18 +52,20 @@ def verdict(
     path: RootPath,
     scene: Scene,
     support: Support,
+    targets: Mapping[str, np.ndarray] = MappingProxyType({}),
     also: Iterable[Finding] = (),
 ) -> tuple[Finding, ...]:
     """What there is to say of a take: seats first, then what it goes through, then its feet.
 
     ``path`` (T): its root's; ``support``: of ``softness.support_under``, where the root is;
-    ``also``: what was found before.
+    ``targets``: of ``conditions.targets_of``, to which feet are moved; ``also``: what was found
+    before.
     """
     found = [
         *also,
         *_seats(joints, fps, path, scene, support),
         *_inside(joints, fps, path, scene),
-        *_feet(joints, fps, path),
+        *_feet(joints, fps, path, targets),
     ]
     return tuple(sorted(found, key=lambda each: each.good))
 
@@ -193,12 +197,16 @@ def _slid(places: np.ndarray, fps: float) -> float:
     return float(np.linalg.norm(np.ptp(places, axis=0)))
 
 
-def _feet(joints: np.ndarray, fps: float, path: RootPath) -> Iterator[Finding]:
+def _feet(
+    joints: np.ndarray, fps: float, path: RootPath, targets: Mapping[str, np.ndarray]
+) -> Iterator[Finding]:
+    by_itself = ~led(targets, len(joints), fps)
     for foot, side in enumerate(("left", "right")):
         slides = [
-            (_slid(joints[start:stop, FEET[foot], :2], fps), start)
-            for own, start, stop in standing_still(joints, path.position[:, 2], fps)
-            if own == foot and stop - start >= _BRIEF * fps
+            (_slid(joints[first + start : first + stop, FEET[foot], :2], fps), first + start)
+            for own, first, last in standing_still(joints, path.position[:, 2], fps)
+            if own == foot
+            for start, stop in runs(by_itself[first:last, foot], at_least=_BRIEF * fps)
         ]
         if slides and max(slides)[0] > _SLIDES:
             far, when = max(slides)

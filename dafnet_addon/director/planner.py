@@ -6,7 +6,7 @@ their places. All within is in the canonical body's metres; what comes in and go
 world's.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -120,8 +120,15 @@ def plan_tasks(
         holds=tuple(person.holds),
         scale=size,
         begins=begins,
-        warnings=tuple(chooser.warnings),
+        warnings=(*chooser.warnings, *_misread(room, entries)),
     )
+
+
+def _misread(room: Room, entries: Sequence[Entry]) -> Iterator[str]:
+    """Sentences about seats that are sat on as they are shaped, since what they say is wrong."""
+    for name in dict.fromkeys(each.seat for each in entries):
+        if name in room.misread:
+            yield f"{room.misread[name]} Until then it is sat on as it is shaped."
 
 
 def _do(chooser: Chooser, task: Task) -> Job[Done]:

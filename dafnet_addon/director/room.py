@@ -115,7 +115,8 @@ class Room:
     belong to a piece of another name, as a chair's back does. ``groups``: names of pieces by a name
     for all of them, as collections are. ``points`` (x, y, z): what can be looked at, reached or
     walked to besides furniture. ``lines`` (N, 2): curves to walk along. ``marked``: seats by the
-    names of pieces that say themselves where they are. ``floor``: its height.
+    names of pieces that say themselves where they are; ``misread``: what is wrong with what others
+    say, a sentence each. ``floor``: its height.
     """
 
     solids: Sequence[Box | Mesh] = ()
@@ -124,6 +125,7 @@ class Room:
     points: Mapping[str, Sequence[float] | np.ndarray] = field(default_factory=dict)
     lines: Mapping[str, np.ndarray] = field(default_factory=dict)
     marked: Mapping[str, Sequence[MarkedSeat]] = field(default_factory=dict)
+    misread: Mapping[str, str] = field(default_factory=dict)
     floor: float = 0.0
     known: "Known" = field(default_factory=lambda: Known(), repr=False, compare=False)
 
@@ -146,6 +148,7 @@ class Room:
                 name: [seat.resized(factor) for seat in seats]
                 for name, seats in self.marked.items()
             },
+            misread=self.misread,
             floor=factor * self.floor,
             known=Known(of=self, factor=factor),
         )

@@ -11,8 +11,10 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.tasks import Assignment, direct
 from bl_ext.user_default.dafnet.dafnet_addon.blender.populating.surroundings import room_of
 from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.marked_seats import marked_on
+from bl_ext.user_default.dafnet.dafnet_addon.director.tasks import SitOn
 
 from kit.stage import Stage
 
@@ -155,6 +157,11 @@ def test_what_is_no_seat_is_in_nobody_else_s_way(stage) -> None:
     row = stage.own.tasks.add()
     row.verb, row.about = "SIT_ON", "Stool"
     assert bpy.ops.dafnet.plan_tasks() == {"FINISHED"}
+    (done,) = direct(bpy.context, [Assignment(stage.ann, [SitOn("Stool")])])
+    assert not done.warnings
+    (done,) = direct(bpy.context, [Assignment(stage.ann, [SitOn("Broken")])])
+    assert "'Broken': its OMI_seat needs back" in done.warnings[0], "it is said"
+    assert "as it is shaped" in done.warnings[0]
     stage.select(broken)
     with pytest.raises(RuntimeError, match="'Broken': its OMI_seat needs back"):
         bpy.ops.dafnet.walk_to(goal="SEAT")

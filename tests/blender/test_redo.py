@@ -3,6 +3,7 @@ by the body.
 """
 
 from contextlib import ExitStack
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -18,13 +19,15 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import (
     root_keys,
     walking,
 )
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.lying import lying_replaces
 from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.plan_keys import plan_edited
 from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.tasks import Assignment, direct
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+from bl_ext.user_default.dafnet.dafnet_addon.director.tasks import SitOn
 from bl_ext.user_default.dafnet.panels.setup import DAFNET_PT_setup, DAFNET_PT_walks
 
 from kit.panels import drawn_by
-from kit.stage import Stage, keys_of
+from kit.stage import Stage, key, keys_of
 
 
 class Room(Stage):
@@ -441,3 +444,126 @@ def test_the_panel_shows_the_walk_s_fields_and_the_button(room: Room) -> None:
     room.go(2.0, 0.0)
     words = drawn_by(DAFNET_PT_walks, bpy.context).words()
     assert words[0] == "DAFNET_UL_walks" and "place" in words and "speed" not in words
+
+
+@pytest.fixture
+def tucked(room: Room) -> bpy.types.Object:
+    """A chair under a table, on which one sits once it is pulled out by keys."""
+    bpy.data.objects.remove(room.stool)
+    chair = room.box("Chair", (-0.22, 0.0, 0.0), (0.22, 0.44, 0.45), location=(0.0, 3.0, 0.0))
+    room.box("Back", (-0.22, 0.44, 0.0), (0.22, 0.48, 0.95), parent=chair)
+    room.box("Table", (-0.7, 2.6, 0.70), (0.7, 3.3, 0.73))
+    room.ann.location = room.root.location = (2.5, 2.0, 0.0)
+    bpy.context.view_layer.update()
+    room.select(chair, room.ann)
+    assert bpy.ops.dafnet.walk_to(goal="SEAT", pull_out="KEYED", seconds=1.0) == {"FINISHED"}
+    return chair
+
+
+def _at(chair: bpy.types.Object, frame: int) -> float:
+    bpy.context.scene.frame_set(frame)
+    return float(chair.matrix_world.translation.y)
+
+
+def test_a_chair_that_comes_out_by_keys_does_so_again(room: Room, tucked: bpy.types.Object) -> None:
+    last = room.own.walks[0].last
+    before, after = _at(tucked, 1), _at(tucked, last)
+    assert before == pytest.approx(3.0, abs=1e-4) and after > before + 0.1
+    room.own.speed = 0.7
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+    (row,) = room.own.walks
+    assert row.last > last + 15 and row.by_keys
+    assert _at(tucked, 1) == pytest.approx(before, abs=1e-4)
+    assert _at(tucked, row.last) == pytest.approx(after, abs=1e-3)
+    frames = {point.co[0] for curve in action_curves(tucked) for point in curve.keyframe_points}
+    assert len(frames) == 2 and max(frames) > 15
+
+    key(tucked, "location", (row.last + 20, (0.0, 3.0, 0.0)))
+    keys = keys_of(tucked)
+    with pytest.raises(RuntimeError, match="'Chair' has other keys of its location"):
+        bpy.ops.dafnet.redo_walk()
+    now = keys_of(tucked)
+    assert all(np.array_equal(now[each], keys[each]) for each in keys)
+
+
+def test_a_chair_that_came_out_is_as_it_was_where_its_walk_cannot_be_made(
+    room: Room, tucked: bpy.types.Object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_given: Any, **_named: Any) -> None:
+        raise InputError("No keys.")
+
+    keys, last = keys_of(tucked), room.own.walks[0].last
+    out = _at(tucked, last)
+    monkeypatch.setattr(walking, "key_route", fails)
+    with pytest.raises(RuntimeError, match="No keys"):
+        bpy.ops.dafnet.redo_walk()
+    now = keys_of(tucked)
+    assert now.keys() == keys.keys()
+    assert all(np.array_equal(now[each], keys[each]) for each in keys)
+    assert _at(tucked, 1) == pytest.approx(3.0, abs=1e-4)
+    assert _at(tucked, last) == pytest.approx(out, abs=1e-4)
+
+
+def test_of_a_linked_curve_and_one_of_the_file_the_right_one_is_meant(
+    room: Room, tmp_path: Path
+) -> None:
+    def line(x: float) -> bpy.types.Object:
+        data = bpy.data.curves.new("Path", "CURVE")
+        data.dimensions = "3D"
+        spline = data.splines.new("POLY")
+        spline.points.add(1)
+        for point, y in zip(spline.points, (1.0, 4.0), strict=True):
+            point.co = (x, y, 0.0, 1.0)
+        return bpy.data.objects.new("Path", data)
+
+    far = line(3.0)
+    bpy.data.libraries.write(str(tmp_path / "far.blend"), {far})
+    bpy.data.objects.remove(far)
+    with bpy.data.libraries.load(str(tmp_path / "far.blend"), link=True) as (_, linked):
+        linked.objects = ["Path"]
+    paths = [room.put(linked.objects[0], room.scene.collection)]
+    paths.append(room.put(line(-3.0), room.scene.collection))
+    assert {path.name for path in paths} == {"Path"}
+    for path, x in zip(paths, (3.0, -3.0), strict=True):
+        room.select(path, room.ann)
+        room.scene.frame_set(1)
+        assert bpy.ops.dafnet.walk_along_curve(seconds=1.0) == {"FINISHED"}
+        assert room.own.walks[-1].goal == path
+        for _ in range(2):
+            assert np.allclose(room.end()[:2], (x, 4.0), atol=1e-2)
+            assert bpy.ops.dafnet.redo_walk(replace_edited=True) == {"FINISHED"}
+
+
+def test_lying_down_is_a_walk_that_is_made_again(room: Room) -> None:
+    bed = room.box("Bed", (-0.7, 0.0, 0.0), (0.7, 2.0, 0.45), location=(2.0, 2.0, 0.0))
+    bpy.context.view_layer.update()
+    room.go(0.0, 1.0, seconds=0.5)
+    room.select(bed, room.ann)
+    assert not lying_replaces(room.scene, room.ann), "a walk as it was made is nobody's work"
+    assert bpy.ops.dafnet.lie_on(seconds=2.0) == {"FINISHED"}
+    assert room.rows() == [("Lie on Bed", 1)]
+    assert not lying_replaces(room.scene, room.ann)
+    before = room.end()
+    bed.location.x = 3.0
+    bpy.context.view_layer.update()
+    room.own.seconds = 4.0
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+    (row,) = room.own.walks
+    assert row.seconds == 4.0 and room.end()[0] > before[0] + 0.5
+    next(iter(action_curves(room.root))).keyframe_points[2].co[1] += 0.2
+    assert lying_replaces(room.scene, room.ann), "edited keys are asked about"
+    with pytest.raises(RuntimeError, match="were edited"):
+        bpy.ops.dafnet.redo_walk()
+
+
+def test_a_job_that_is_closed_leaves_no_root_that_it_added(room: Room) -> None:
+    bpy.data.objects.remove(room.root)
+    names = {each.name for each in bpy.data.objects}
+    job = direct.steps(bpy.context, [Assignment(room.ann, [SitOn("Stool")])])
+    next(job)
+    assert room.own.root is not None
+    job.close()
+    assert room.own.root is None and {each.name for each in bpy.data.objects} == names
+    with pytest.raises(InputError):
+        direct(bpy.context, [Assignment(room.ann, [SitOn("Nowhere")])])
+    assert room.own.root is None and {each.name for each in bpy.data.objects} == names

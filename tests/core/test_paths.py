@@ -133,3 +133,12 @@ def test_a_captured_sit_down_moves_alike() -> None:
     ours = profile(path.position, made.rests[1].start + 10, np.zeros(3))
     theirs = profile(captured.position, rest, captured.position[rest])
     assert np.abs(ours - theirs).max() < 0.2, f"differs by {np.abs(ours - theirs).max():.2f} m"
+
+
+@pytest.mark.parametrize("ahead", [0.1, 0.5, 0.52, 0.55, 0.58, 0.6, 0.62, 0.8])
+@pytest.mark.parametrize("yaw", [0.0, np.pi / 2, np.pi])
+def test_who_stands_anywhere_before_a_seat_sits_down_on_it(ahead: float, yaw: float) -> None:
+    made = route(Stop((0.02, ahead), yaw, 0.2), Stop((0.0, 0.0), 0.0, 1.0, seated=True))
+    assert np.allclose(made.path.position[-1, :2], 0.0, atol=1e-6)
+    step = np.linalg.norm(np.diff(made.path.position[:, :2], axis=0), axis=1)
+    assert step.max() * 30.0 < 1.2, "metres a second"

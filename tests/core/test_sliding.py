@@ -32,6 +32,41 @@ def test_one_frame_and_none_that_moves_are_nothing() -> None:
     assert slides(standing(1), 30.0).shape == (1, 2)
 
 
+def test_a_foot_that_goes_where_it_was_asked_to_does_not_slide() -> None:
+    """A foot that is drawn over the floor to its target, all along or for a while."""
+    glides = standing(90)
+    glides[30:50, [7, 10], 1] += np.linspace(0.0, 0.3, 20)[:, None]
+    glides[50:, [7, 10], 1] += 0.3
+    assert slides(glides, 30.0)[:, 0].max() > 0.2
+    target = glides[:, 7].copy()
+    assert slides(glides, 30.0, targets={"foot_left": target}).max() == 0.0
+    target[:40] = np.nan
+    assert slides(glides, 30.0, targets={"foot_left": target}).max() == 0.0, "on the way there"
+    target[:70] = np.nan
+    assert slides(glides, 30.0, targets={"foot_left": target})[:, 0].max() > 0.2, "before that"
+    assert slides(glides, 30.0, targets={"foot_right": glides[:, 8]})[:, 0].max() > 0.2
+
+
+@pytest.mark.slow
+def test_a_take_with_targets_of_feet_does_not_slide_for_them() -> None:
+    walked = route(Stop((0.0, 0.0), 0.0, 1.0), Stop((0.0, 2.0), 0.0, 1.5), fps=30.0)
+    root = walked.path.matrices()
+    place = np.tile([-0.25, 2.1, 0.08], (len(root), 1))
+    weights = load_weights(ROOT / "weights_stub" / "dafnet.safetensors")
+    plain, asked = (
+        generate(
+            Scene([]),
+            Controls(fps=30.0, root=root, mode="EE", foot_left=target),
+            weights,
+            clean_up=CleanUp(feet=1.0, reach=1.0),
+        )
+        for target in (None, place)
+    )
+    assert asked.metrics["slide_max"] <= plain.raw_metrics["slide_max"]
+    assert asked.metrics["slide_max"] < SEEN
+    assert not [each for each in asked.verdict if "left foot slides" in each.text]
+
+
 @pytest.mark.slow
 def test_a_good_walk_does_not_slide_though_the_paper_counts_its_roll_off() -> None:
     walked = route(Stop((0.0, 0.0), 0.0, 1.0), Stop((0.0, 4.0), 0.0, 1.0), fps=30.0)

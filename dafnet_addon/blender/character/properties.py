@@ -22,7 +22,7 @@ from .settings import AS_IT_IS, COMES_AND_GOES, HELD, MAX_TAKES, STANDING
 from .takes import PACKED
 from .task_rows import LEAN, TaskRow
 from .walk_rows import GROUPS as WALK_GROUPS
-from .walk_rows import MANNER, WalkRow, manner_of, set_manner
+from .walk_rows import MANNER, WalkRow, manner_counts, manner_of, set_manner
 
 __all__ = ["CharacterSettings", "TakeSettings", "ensure_registered", "register", "unregister"]
 
@@ -46,7 +46,8 @@ def _is_not_the_character(settings: "CharacterSettings", candidate: bpy.types.Ob
 def _walk_chosen(settings: "CharacterSettings", _context: bpy.types.Context) -> None:
     """Show how the chosen walk is gone, where it can be changed."""
     if 0 <= settings.active_walk < len(settings.walks):
-        set_manner(settings, manner_of(settings.walks[settings.active_walk]))
+        row = settings.walks[settings.active_walk]
+        set_manner(settings, manner_of(row), manner_counts(row))
 
 
 class TakeFinding(bpy.types.PropertyGroup):

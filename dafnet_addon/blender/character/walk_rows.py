@@ -2,6 +2,7 @@
 asked for, in which frames it is, and what tells its keys from edited ones.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,7 @@ from ...core.paths import GETS_UP, SITS_DOWN
 from ...core.trails import FASTEST, SLOWEST
 
 __all__ = [
+    "BED",
     "CURVE",
     "GROUPS",
     "MANNER",
@@ -33,13 +35,16 @@ __all__ = [
     "WalkRow",
     "asked_in",
     "fields_of_walk",
+    "manner_counts",
     "manner_of",
     "set_manner",
     "title_of_walk",
 ]
 
-SEAT, PLACE, CURVE, POINTS, OBJECT = "SEAT", "PLACE", "CURVE", "POINTS", "OBJECT"
-"""The kinds of walks: to a seat, to a place, along a curve, through points, as an object moves."""
+SEAT, BED, PLACE, CURVE, POINTS, OBJECT = "SEAT", "BED", "PLACE", "CURVE", "POINTS", "OBJECT"
+"""The kinds of walks: to a seat, to a bed to lie on, to a place, along a curve, through points, as
+an object moves.
+"""
 
 MANNER: dict[str, dict[str, Any]] = {
     "speed": {
@@ -93,9 +98,10 @@ class Manner:
 
 @dataclass(frozen=True)
 class Asked:
-    """What a walk was asked for. ``goal``: the name of the seat, curve or moving object, "" for
-    none; ``points``: the names of the empties on the way; ``place`` (3,), Blender units: where it
-    ends, or where on the seat, in the seat's own space; None where that is left open.
+    """What a walk was asked for. ``goal``: the ``name_full`` of the seat, bed, curve or moving
+    object, "" for none; ``points``: those of the empties on the way; ``place`` (3,), Blender units:
+    where it ends, or where on the seat, in the seat's own space; None where that is left open.
+    ``by_keys``: whether the seat is pulled out by keys of its own.
     """
 
     kind: str
@@ -105,6 +111,7 @@ class Asked:
     place: tuple[float, float, float] | None = None
     tables: bool = False
     pull_out: bool = False
+    by_keys: bool = False
     keep_facing: bool = False
     backwards: bool = False
 
@@ -123,6 +130,7 @@ class WalkRow(bpy.types.PropertyGroup):
         options={"HIDDEN"},
         items=[
             (SEAT, "Sit on", "To a seat"),
+            (BED, "Lie on", "To a bed, to lie down on it"),
             (PLACE, "Walk to", "To a place"),
             (CURVE, "Walk along", "Along a curve"),
             (POINTS, "Walk through", "Through points"),
@@ -149,6 +157,7 @@ class WalkRow(bpy.types.PropertyGroup):
     gets_up: FloatProperty(options=set(), **MANNER["gets_up"])
     tables: BoolProperty(options={"HIDDEN"})
     pull_out: BoolProperty(options={"HIDDEN"})
+    by_keys: BoolProperty(options={"HIDDEN"})
     keep_facing: BoolProperty(options={"HIDDEN"})
     backwards: BoolProperty(options={"HIDDEN"})
     first: IntProperty(options={"HIDDEN"})
@@ -165,10 +174,16 @@ def manner_of(owner: Any) -> Manner:
     return Manner(**{name: float(getattr(owner, name)) for name in MANNER})
 
 
-def set_manner(owner: Any, manner: Manner) -> None:
-    """Let a row, or a character's settings, say this."""
-    for name in MANNER:
+def set_manner(owner: Any, manner: Manner, names: Iterable[str] = tuple(MANNER)) -> None:
+    """Let a row, or a character's settings, say this, or those of the ``names`` of it."""
+    for name in names:
         setattr(owner, name, getattr(manner, name))
+
+
+def manner_counts(row: WalkRow) -> tuple[str, ...]:
+    """What of the manner counts for a row's kind."""
+    walks = ("speed", "seconds", "gets_up")
+    return {SEAT: tuple(MANNER), BED: ("seconds",), OBJECT: ()}.get(row.kind, walks)
 
 
 def fields_of_walk(row: WalkRow) -> tuple[str, ...]:
@@ -191,11 +206,12 @@ def asked_in(row: WalkRow) -> Asked:
     return Asked(
         kind=row.kind,
         manner=manner_of(row),
-        goal=row.goal.name if row.goal else "",
-        points=tuple(each.point.name if each.point else "" for each in row.points),
+        goal=row.goal.name_full if row.goal else "",
+        points=tuple(each.point.name_full if each.point else "" for each in row.points),
         place=tuple(float(value) for value in row.place) if row.placed else None,  # type: ignore[arg-type]
         tables=row.tables,
         pull_out=row.pull_out,
+        by_keys=row.by_keys,
         keep_facing=row.keep_facing,
         backwards=row.backwards,
     )

@@ -9,6 +9,7 @@ import bpy
 
 from ..character.standing import note_standing
 from ..character.walk_rows import Asked, WalkRow, asked_in, manner_of, set_manner
+from ..scene.lookup import object_named
 from .root_keys import MOVES, keys_within
 
 __all__ = [
@@ -56,13 +57,13 @@ def _add_row(scene: bpy.types.Scene, character: bpy.types.Object, asked: Asked) 
     own: Any = character.dafnet
     row = own.walks.add()
     row.kind = asked.kind
-    row.goal = scene.objects.get(asked.goal)
+    row.goal = object_named(scene, asked.goal)
     for name in asked.points:
-        row.points.add().point = scene.objects.get(name)
+        row.points.add().point = object_named(scene, name)
     row.placed = asked.place is not None
     row.place = asked.place or (0.0, 0.0, 0.0)
     set_manner(row, asked.manner)
-    for name in ("tables", "pull_out", "keep_facing", "backwards"):
+    for name in ("tables", "pull_out", "by_keys", "keep_facing", "backwards"):
         setattr(row, name, getattr(asked, name))
     return row
 

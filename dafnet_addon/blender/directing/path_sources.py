@@ -161,7 +161,8 @@ def along_curve(
     there instead of at the current frame. ``InputError``: not a curve, too short, or the root
     cannot be keyed. Then, or if the job is closed, nothing is changed.
     """
-    settings, name = settings_of(armature, context.scene), curve.name
+    settings, goal = settings_of(armature, context.scene), curve.name_full
+    name = curve.name
     line = line_of(context, curve)[:: -1 if backwards else 1]
     first = first_key(keyable_root(settings))
 
@@ -190,7 +191,7 @@ def along_curve(
     asked = Asked(
         kind=CURVE,
         manner=Manner(speed, seconds, gets_up=gets_up),
-        goal=name,
+        goal=goal,
         keep_facing=keep_facing,
         backwards=backwards,
     )
@@ -244,7 +245,7 @@ def along_object(
     The root's later keys are replaced. ``InputError``: the source hardly moves, or the root cannot
     be keyed. Then, or if the job is closed, nothing is changed.
     """
-    scene, name = context.scene, source.name
+    scene, name, goal = context.scene, source.name, source.name_full
     settings = settings_of(armature, scene)
     keys = [
         point.co[0]
@@ -267,7 +268,7 @@ def along_object(
         "slow it down."
     )
     warnings = [hurried] if fastest > FASTEST else []
-    written = _key_walk(context, settings, at, moved, Asked(OBJECT, Manner(), name), None, warnings)
+    written = _key_walk(context, settings, at, moved, Asked(OBJECT, Manner(), goal), None, warnings)
     return (yield from within(written, _FOUND, 1.0))
 
 
@@ -298,7 +299,7 @@ def through_points(
         return (yield from job)
 
     settings = settings_of(armature, context.scene)
-    names = tuple(point.name for point in points)
+    names = tuple(point.name_full for point in points)
     spots = [point.matrix_world.translation for point in points]
     end = None
     if to_cursor:

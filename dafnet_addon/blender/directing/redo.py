@@ -16,11 +16,13 @@ from ...core.progress import stepwise, within
 from ..character.armature import is_character, metres_per_unit
 from ..character.settings import settings_of
 from ..character.standing import moved_by_hand, pose_by_keys
-from ..character.walk_rows import CURVE, OBJECT, POINTS, SEAT, Asked, asked_in, manner_of
+from ..character.walk_rows import BED, CURVE, OBJECT, POINTS, SEAT, Asked, asked_in, manner_of
+from ..scene.lookup import object_named
+from .lying import lie_on
 from .made_walks import edited_from, walks_kept_on_failure
 from .path_sources import along_curve, along_object, through_points
 from .root_keys import first_key, keep_copy, keyable_root, last_key, unchanged_on_failure
-from .seat_pieces import top_of
+from .seat_pieces import moved_back, top_of
 from .walking import Beginning, Walk, walk
 
 __all__ = ["redo_walks"]
@@ -70,6 +72,9 @@ def redo_walks(
         if copied is not None:
             undo.enter_context(_removed_on_failure(copied))
         for k, each in enumerate(asked):
+            if each.by_keys and (top := _pulled(scene, each)) is not None:
+                moved_back(top, scene.frame_current_final)
+                context.view_layer.update()
             job = _made(context, armature, each, begins)
             made.append((yield from within(job, k / len(asked), (k + 1) / len(asked))))
             begins = Beginning(made[-1].last)
@@ -86,7 +91,9 @@ def _made(
 ) -> Generator[float, None, Walk]:
     """Key one walk, from there on."""
     scene, manner = context.scene, asked.manner
-    goal = scene.objects[asked.goal] if asked.goal else None
+    goal = object_named(scene, asked.goal)
+    if asked.kind == BED:
+        return lie_on.steps(context, armature, goal, manner.seconds)
     if asked.kind == OBJECT:
         return along_object.steps(context, armature, goal)
     if asked.kind == CURVE:
@@ -105,7 +112,7 @@ def _made(
         return through_points.steps(
             context,
             armature,
-            [scene.objects[name] for name in asked.points],
+            [object_named(scene, name) for name in asked.points],
             speed=manner.speed,
             seconds=manner.seconds,
             gets_up=manner.gets_up,
@@ -125,13 +132,20 @@ def _made(
         gets_up=manner.gets_up,
         place=asked.place,
         begins=begins,
+        by_keys=asked.by_keys,
     )
+
+
+def _pulled(scene: bpy.types.Scene, asked: Asked) -> bpy.types.Object | None:
+    """The piece that a walk pulls out, if it does."""
+    seat = object_named(scene, asked.goal) if asked.kind == SEAT and asked.pull_out else None
+    return None if seat is None else top_of(seat)
 
 
 def _require_goals(scene: bpy.types.Scene, asked: Asked) -> None:
     """``InputError`` where what a walk was made for is no longer in the scene."""
-    wanted = (asked.goal,) if asked.kind in (SEAT, CURVE, OBJECT) else asked.points
-    if any(name not in scene.objects for name in wanted):
+    wanted = (asked.goal,) if asked.kind in (SEAT, BED, CURVE, OBJECT) else asked.points
+    if any(object_named(scene, name) is None for name in wanted):
         raise InputError(
             "What this walk leads to is no longer in the scene; choose another Goal for it, or "
             "send the character anew."
@@ -176,10 +190,12 @@ def _unchanged_on_failure(
     own: Any = armature.dafnet
     ends = scene.frame_end, own.frame_end
     furniture = own.furniture
-    seats = [scene.objects[each.goal] for each in asked if each.kind == SEAT and each.pull_out]
-    places = [(top_of(seat), top_of(seat).matrix_world.copy()) for seat in seats]
-    with walks_kept_on_failure(scene, armature):
+    tops = [top for each in asked if (top := _pulled(scene, each)) is not None]
+    places = [(top, top.matrix_world.copy()) for top in tops]
+    with walks_kept_on_failure(scene, armature), ExitStack() as undo:
         try:
+            for top in dict.fromkeys(tops):
+                undo.enter_context(unchanged_on_failure(top))
             yield
         except BaseException:
             scene.frame_end, own.frame_end = ends

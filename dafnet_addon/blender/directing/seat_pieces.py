@@ -10,9 +10,9 @@ from mathutils import Matrix, Vector
 
 from ...core.errors import InputError
 from ..character.armature import bodies, is_character, metres_per_unit
-from ..compat import action_curves
+from ..compat import action_curves, remove_curves
 
-__all__ = ["add_furniture", "collection_of", "movable", "move", "piece_of", "top_of"]
+__all__ = ["add_furniture", "collection_of", "movable", "move", "moved_back", "piece_of", "top_of"]
 
 _LARGEST = 3.5
 """Metres across, of what is one piece though it has several objects; larger families are rooms."""
@@ -119,3 +119,24 @@ def move(top: bpy.types.Object, offset: np.ndarray, between: tuple[int, int] | N
     top.matrix_world = Matrix.Translation(Vector((*offset.tolist(), 0.0))) @ top.matrix_world
     if between is not None:
         top.keyframe_insert("location", frame=between[1])
+
+
+def moved_back(top: bpy.types.Object, frame: float) -> None:
+    """Take the keys back with which ``move`` has pulled a piece out: it is where it was before, or
+    as far from there as it was moved by hand since, in the current ``frame``.
+
+    Raises InputError where its location has other keys as well.
+    """
+    curves = {c.array_index: c for c in action_curves(top) if c.data_path == "location"}
+    if not curves:
+        return
+    if any(len(curve.keyframe_points) != 2 for curve in curves.values()):
+        raise InputError(
+            f"'{top.name}' has other keys of its location than those that pulled it out; remove "
+            "these, or send the character anew."
+        )
+    place = list(top.location)
+    for k, curve in curves.items():
+        place[k] += curve.keyframe_points[0].co[1] - curve.evaluate(frame)
+    remove_curves(top, "location")
+    top.location = place

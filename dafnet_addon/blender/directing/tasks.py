@@ -1,6 +1,7 @@
 """Characters with tasks: what they are to do is planned in the scene, and keyed."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import bpy
@@ -79,8 +80,31 @@ def direct(
     done or keyed; what was keyed for those before stays only if all of them could be planned.
     """
     armatures = [assigned.armature for assigned in people]
-    with roots_brought_along(context.scene, armatures, metres_per_unit(context.scene)):
+    with (
+        _roots_added(context, armatures),
+        roots_brought_along(context.scene, armatures, metres_per_unit(context.scene)),
+    ):
         return (yield from _direct(context, people))
+
+
+@contextmanager
+def _roots_added(
+    context: bpy.types.Context, armatures: Sequence[bpy.types.Object]
+) -> Iterator[None]:
+    """A block before which characters without a root get one; if it fails, or its job is closed,
+    they have none again.
+    """
+    added: dict[str, str] = {}
+    try:
+        for each in armatures:
+            if lacks_root(context, each):
+                added[each.name_full] = add_root(context, each).name_full
+        yield
+    except BaseException:
+        for each in [o for o in bpy.data.objects if o.name_full in added]:
+            if each.dafnet.root is not None and each.dafnet.root.name_full == added[each.name_full]:
+                bpy.data.objects.remove(each.dafnet.root)
+        raise
 
 
 def _direct(
@@ -88,9 +112,6 @@ def _direct(
 ) -> Generator[float, None, tuple[Directed, ...]]:
     scene = context.scene
     unit, fps = metres_per_unit(scene), scene.render.fps / scene.render.fps_base
-    for assigned in people:
-        if lacks_root(context, assigned.armature):
-            add_root(context, assigned.armature)
     settings = [settings_of(assigned.armature, scene, mode="FREE") for assigned in people]
     for each in settings:
         keyable_root(each)

@@ -24,7 +24,7 @@ from ..character.settings import Settings, settings_of
 from ..character.standing import standing
 from ..character.walk_rows import PLACE, SEAT, Asked, Manner
 from ..scene.furniture import furniture_at
-from ..scene.lookup import find_collection, find_object, find_scene
+from ..scene.lookup import find_collection, find_object, find_scene, object_named
 from ..scene.marked_seats import mark, marked_on, require_markable
 from .made_walks import intact_walks, note_walk
 from .root_keys import (
@@ -228,13 +228,14 @@ def walk(
     asked = Asked(
         kind=PLACE if seat is None else SEAT,
         manner=Manner(speed, seconds, sits_down, gets_up),
-        goal=seat.name if seat else "",
+        goal=seat.name_full if seat else "",
         place=_asked_place(scene, seat, place),
         tables=tables,
         pull_out=pull_out,
+        by_keys=by_keys,
     )
     try:
-        job = _walk(context, armature, asked, furniture, made, begins, by_keys, mark_seat)
+        job = _walk(context, armature, asked, furniture, made, begins, mark_seat)
         return (yield from job)
     except BaseException:
         added = next((c for c in bpy.data.collections if c.name_full == made), None)
@@ -260,12 +261,11 @@ def _walk(
     furniture: bpy.types.Collection | None,
     made: str | None,
     begins: Beginning | None,
-    by_keys: bool,
     mark_seat: bool,
 ) -> Generator[float, None, Walk]:
     scene = context.scene
     settings = settings_of(armature, scene, furniture=furniture.name_full if furniture else None)
-    seat = scene.objects[asked.goal] if asked.goal else None
+    seat = object_named(scene, asked.goal)
     names = piece_of(seat) if seat is not None else []
     goal = Vector(asked.place or (0.0, 0.0, 0.0))
     goal = seat.matrix_world @ goal if seat is not None else goal
@@ -302,7 +302,7 @@ def _walk(
         mark(carrier, sat_on, metres_per_unit(scene), frame)
     if found.pulled is not None:
         top = top_of(next(each for each in scene.objects if each.name == names[0]))
-        move(top, found.pulled / start.unit, _free_to_move(start, found) if by_keys else None)
+        move(top, found.pulled / start.unit, _free_to_move(start, found) if asked.by_keys else None)
         out = 100.0 * start.size * float(np.linalg.norm(found.pulled))
         warnings = (f"Pulled '{top.name}' out by {out:.0f} cm.", *warnings)
     if made is not None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ...core.conditions import foot_targets
 from ...core.distance import prepared, scaled
 from ...core.metrics import BAD_COLLISION_JOINTS, bad_collisions
 from ...core.nearby import REACH_OF_A_BODY, solids_near
@@ -59,7 +60,7 @@ def faults_of(
     """
     found, scenes = {}, {}
     for action in actions:
-        take, _ = stored_take(action)
+        take, controls = stored_take(action)
         first, last = frames = frames_of(action)
         if frames not in scenes:
             settings = settings_of(
@@ -73,7 +74,8 @@ def faults_of(
         solids, _ = prepared(scaled(near, 1.0 / take.scale), float(np.median(floor)))
         apart = distance(solids, joints[:, list(BAD_COLLISION_JOINTS)], floor)
         found[action.session_uid] = Faults(
-            (slides(joints, take.fps, floor) > SEEN).sum(axis=1), bad_collisions(apart)
+            (slides(joints, take.fps, floor, foot_targets(controls)) > SEEN).sum(axis=1),
+            bad_collisions(apart),
         )
 
     return found

@@ -62,6 +62,7 @@ def room_of(context: bpy.types.Context) -> Room:
     solids = tuple(meshes_in(context.evaluated_depsgraph_get(), members, unit))
     named = {solid.name for solid in solids}
     others = [each for each in scene.objects if each in members and each.name not in named]
+    marked, misread = _marked(members, named, unit)
     return Room(
         solids=solids,
         parts={
@@ -76,31 +77,39 @@ def room_of(context: bpy.types.Context) -> Room:
             if each.type in {"EMPTY", "CAMERA", "LIGHT"}
         },
         lines={each.name: line for each in others if (line := _line(each, unit)) is not None},
-        marked=_marked(members, named, unit),
+        marked=marked,
+        misread=misread,
         floor=_floor(solids),
     )
 
 
 def _marked(
     members: set[bpy.types.Object], named: set[str], unit: float
-) -> dict[str, tuple[MarkedSeat, ...]]:
+) -> tuple[dict[str, tuple[MarkedSeat, ...]], dict[str, str]]:
     """The seats that pieces say themselves, by their names: marked on a mesh, or on what carries it
-    or hangs on it. What does not say it as seats are marked says nothing.
+    or hangs on it; and of those that do not say it as seats are marked, what is wrong.
     """
     found: dict[str, tuple[MarkedSeat, ...]] = {}
+    misread: dict[str, str] = {}
     for each in sorted(members, key=lambda each: each.name):
+        seats: tuple[MarkedSeat, ...] = ()
+        wrong = ""
         try:
             seats = marked_on([each], unit)
-        except InputError:
-            continue
-        if not seats:
+        except InputError as error:
+            wrong = str(error)
+        if not seats and not wrong:
             continue
         family = [each, *_carriers(each), *each.children_recursive]
         mesh = next((other for other in family if other.name in named), None)
-        if mesh is not None:
-            name = _whole(mesh, named)
+        if mesh is None:
+            continue
+        name = _whole(mesh, named)
+        if wrong:
+            misread[name] = wrong
+        else:
             found[name] = (*found.get(name, ()), *seats)
-    return found
+    return found, misread
 
 
 def _carriers(part: bpy.types.Object) -> list[bpy.types.Object]:

@@ -8,7 +8,14 @@ from ...core.errors import InputError
 from ...core.skeleton import TARGETS
 from ..character.settings import Settings
 
-__all__ = ["find_action", "find_collection", "find_object", "find_scene", "names_in_use"]
+__all__ = [
+    "find_action",
+    "find_collection",
+    "find_object",
+    "find_scene",
+    "names_in_use",
+    "object_named",
+]
 
 
 def find_scene(settings: Settings) -> bpy.types.Scene:
@@ -21,6 +28,13 @@ def find_scene(settings: Settings) -> bpy.types.Scene:
     return scene
 
 
+def object_named(scene: bpy.types.Scene, name: str) -> bpy.types.Object | None:
+    """The scene's object of this ``name_full``: a linked one and one of the file may share a
+    ``name``.
+    """
+    return next((o for o in scene.objects if o.name_full == name), None)
+
+
 def find_object(settings: Settings, name: str, role: str) -> bpy.types.Object:
     """The scene's object of this ``name_full``; ``role`` says in the ``InputError`` what it was
     for.
@@ -28,7 +42,7 @@ def find_object(settings: Settings, name: str, role: str) -> bpy.types.Object:
     An object that was deleted in the scene may live on in the file as long as a property names it:
     it counts as gone.
     """
-    found = next((o for o in find_scene(settings).objects if o.name_full == name), None)
+    found = object_named(find_scene(settings), name)
     if found is None:
         raise InputError(
             f"The {role} '{name}' is not in the scene; choose another one in the DAFNet panel."
