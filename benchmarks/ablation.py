@@ -22,9 +22,7 @@ import argparse
 import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +50,7 @@ from dafnet_addon.training.evaluation.clips import (
 from dafnet_addon.training.evaluation.markdown import markdown_table
 from dafnet_addon.training.export import export
 from dafnet_addon.training.parts import load_run, trained_networks
+from dafnet_addon.training.processes import pool_of
 from dafnet_addon.training.train import train, train_part
 from dafnet_addon.training.validation import held_out_losses
 
@@ -117,7 +116,7 @@ def measure_variant(
     if not checkpoint_file(folder, "predictor").exists():
         shutil.copy(predictor, folder)
 
-    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+    with pool_of(2) as pool:
         jobs = [
             pool.submit(_train, part, dataset, folder, model, training, begin_with)
             for part in ("upper", "lower")

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Joins pictures into a film that pages and READMEs show: an animated WebP.
 
-    scripts/film.py out/cafe/truth/frames -o docs/guide/cafe.webp --seconds 22
+    scripts/film.py out/cafe/truth/frames/*.png -o docs/guide/cafe.webp --seconds 22
 
-The pictures are those of a folder, in the order of their names, as ``dafnet populate --render
-frames`` and the window tests write them. Needs Pillow.
+The pictures are joined as they are named, as ``dafnet populate --render frames`` and
+``scripts/window.sh … films`` write them. Needs Pillow.
 """
 
 import argparse
@@ -38,26 +38,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("folder", type=Path)
+    parser.add_argument("pictures", type=Path, nargs="+", metavar="PICTURE")
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--seconds", type=float, required=True, help="of the whole film")
     parser.add_argument("--width", type=int, default=720, help="pixels")
     parser.add_argument("--quality", type=int, default=60, help="0 to 100")
     options = parser.parse_args()
 
-    pictures = sorted(options.folder.glob("*.png"))
-    if not pictures:
-        sys.exit(f"There are no PNG files in '{options.folder}'.")
+    missing = [picture for picture in options.pictures if not picture.is_file()]
+    if missing:
+        sys.exit(f"There is no picture '{missing[0]}'.")
     film(
-        pictures,
+        options.pictures,
         options.output,
         seconds=options.seconds,
         width=options.width,
         quality=options.quality,
     )
-    print(
-        f"{options.output}: {len(pictures)} pictures, {options.output.stat().st_size / 1e6:.1f} MB"
-    )
+    size = options.output.stat().st_size / 1e6
+    print(f"{options.output}: {len(options.pictures)} pictures, {size:.1f} MB")
 
 
 if __name__ == "__main__":

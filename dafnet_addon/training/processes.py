@@ -1,17 +1,39 @@
 """A task of many items, shared out over the machine's cores."""
 
+import os
+import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import Any
 
 from ..core.threads import cores
 
-__all__ = ["map_in_processes"]
+__all__ = ["map_in_processes", "pool_of"]
 
 
 def _do_nothing() -> None:
     pass
+
+
+def pool_of(processes: int, start: Callable[[], None] = _do_nothing) -> ProcessPoolExecutor:
+    """So many new processes, each of which first calls ``start``, and none of which outlives this
+    one, be it killed.
+    """
+    return ProcessPoolExecutor(processes, get_context("spawn"), _begin, (start,))
+
+
+def _begin(start: Callable[[], None]) -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(128 + signal.SIGTERM)
 
 
 def map_in_processes(
@@ -35,7 +57,7 @@ def map_in_processes(
             yield result
         return
 
-    with ProcessPoolExecutor(processes, get_context("spawn"), start) as pool:
+    with pool_of(processes, start) as pool:
         for done, result in enumerate(pool.map(task, items)):
             progress((done + 1) / len(items))
             yield result

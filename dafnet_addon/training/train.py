@@ -8,10 +8,9 @@ any time.
 """
 
 import json
-import multiprocessing
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, wait
+from concurrent.futures import wait
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from pathlib import Path
@@ -31,6 +30,7 @@ from .checkpoints import BEFORE_COOLING, checkpoint_file
 from .config import TrainingConfig
 from .export import adopted_statistics
 from .parts import FlowRun, PredictorRun, load_run, new_run, resumed_run
+from .processes import pool_of
 from .run import Run
 from .steps import clock_of, dataset_pool, descend, held_out_pool, mean_loss
 
@@ -76,7 +76,7 @@ def train(
         return
 
     threads = max(1, min(torch.get_num_threads(), cores()) // len(parts))
-    with ProcessPoolExecutor(len(parts), mp_context=multiprocessing.get_context("spawn")) as pool:
+    with pool_of(len(parts)) as pool:
         begin = time.monotonic()
         jobs = [pool.submit(train_one, part, threads=threads) for part in parts]
         while wait(jobs, timeout=2.0).not_done:

@@ -169,11 +169,11 @@ class Driver:
             yield 0.1
         raise AssertionError(f"{what} did not come within {seconds:.0f} s")
 
-    def picture(self, name: str) -> Waits:
-        """The whole window as PICTURES/name.png."""
+    def picture(self, name: str, width: int = 1280, colours: int = 160) -> Waits:
+        """The whole window as PICTURES/name.png, so many pixels wide."""
         bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
         yield 0.3
-        small = ["-resize", "1280x", "-colors", "160"]
+        small = ["-resize", f"{width}x", "-colors", str(colours)]
         subprocess.run(
             ["import", "-window", "root", *small, f"png8:{self.pictures / name}.png"], check=True
         )

@@ -7,6 +7,8 @@ import json
 import os
 import subprocess
 import sys
+import threading
+import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -806,6 +808,30 @@ def test_it_trains_without_avx_512_in_a_bare_environment(dataset, tmp_path):
     }
     said = _tiny_train([], dataset, tmp_path / "run", bare)
     assert said.count("single precision") == 1
+
+
+def test_a_training_that_is_killed_leaves_no_process_behind(dataset: Path, tmp_path: Path):
+    (dataset / "dataset.json").write_text('{"train": []}', encoding="utf-8")
+    config = dataset / "tiny.toml"
+    config.write_text(
+        'preset = "small"\n[training]\nminutes_predictor = 0.01\nminutes_flow = 30.0\nbatch = 4\n',
+        encoding="utf-8",
+    )
+    asked = [sys.executable, "-m", "dafnet_addon", "train", config, dataset, "-o", tmp_path / "run"]
+    began = subprocess.Popen(asked, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+
+    latest = time.monotonic() + 240.0
+    while not all((tmp_path / "run" / f"{p}.checkpoint").exists() for p in ("upper", "lower")):
+        assert began.poll() is None and time.monotonic() < latest
+        time.sleep(0.2)
+
+    began.kill()
+    # Its processes hold this pipe, too: it ends when the last of them does.
+    assert began.stdout is not None
+    ended = threading.Thread(target=began.stdout.read, daemon=True)
+    ended.start()
+    ended.join(60.0)
+    assert not ended.is_alive()
 
 
 def test_two_processes_train_one_model(dataset, tmp_path):

@@ -14,6 +14,7 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
 from clicks import clicks
+from films import films
 from first_shot import first_shot
 from interruptions import interruptions
 from live import live
@@ -34,6 +35,8 @@ PARTS: dict[str, Callable[[Path], Waits]] = {
     "clicks": clicks,
     "first_shot": lambda pictures: first_shot(pictures, humanoids),
 }
+ONLY_NAMED: dict[str, Callable[[Path], Waits]] = {"films": films}
+"""Parts that try nothing out."""
 
 
 def everything() -> Waits:
@@ -41,7 +44,7 @@ def everything() -> Waits:
         if number:
             bpy.ops.wm.read_homefile(app_template="")
             yield 0.5
-        yield from PARTS[name](Path(PICTURES))
+        yield from (PARTS | ONLY_NAMED)[name](Path(PICTURES))
         print(f"{name}: done", flush=True)
 
 

@@ -11,7 +11,7 @@ from mathutils import Vector
 
 from kit.window import Driver, Waits
 
-__all__ = ["live"]
+__all__ = ["drag", "draw", "live", "pelvis_of", "running"]
 
 
 def _at(user: Driver, place: tuple[float, float, float]) -> tuple[int, int]:
@@ -34,7 +34,7 @@ def _slide(user: Driver, *places: tuple[float, float, float], steps: int = 12) -
             yield 0.04
 
 
-def _drag(user: Driver, *places: tuple[float, float, float]) -> Waits:
+def drag(user: Driver, *places: tuple[float, float, float]) -> Waits:
     """Move what is selected with G, over the floor, and let it go at the last place."""
     user.move(*_at(user, tuple(bpy.context.object.location)))
     yield 0.1
@@ -44,7 +44,23 @@ def _drag(user: Driver, *places: tuple[float, float, float]) -> Waits:
     yield from user.press("LEFTMOUSE")
 
 
-def _running() -> bool:
+def draw(user: Driver, start: tuple[float, float, float], *places: tuple[float, ...]) -> Waits:
+    """Press *Draw a Way* and draw one over the floor."""
+    yield from user.click("dafnet.live_draw")
+    user.move(*_at(user, start))
+    user.window.event_simulate("LEFTMOUSE", "PRESS", x=user.mouse[0], y=user.mouse[1])
+    yield 0.1
+    yield from _slide(user, *places)
+    user.window.event_simulate("LEFTMOUSE", "RELEASE", x=user.mouse[0], y=user.mouse[1])
+
+
+def pelvis_of(character: bpy.types.Object) -> Vector:
+    """Where a character's pelvis is, in the world."""
+    return character.matrix_world @ character.pose.bones["pelvis"].head
+
+
+def running() -> bool:
+    """Whether Live runs."""
     return bool(bpy.ops.dafnet.live_record.poll())
 
 
@@ -68,7 +84,7 @@ def live(pictures: Path) -> Waits:
     yield from user.sidebar("DAFNet")
 
     def pelvis() -> Vector:
-        return ann.matrix_world @ ann.pose.bones["pelvis"].head
+        return pelvis_of(ann)
 
     def nothing_moved() -> None:
         assert tuple(own.root.location) == (0.0, 0.0, 0.0)
@@ -77,41 +93,36 @@ def live(pictures: Path) -> Waits:
 
     def started() -> Waits:
         yield from user.click("dafnet.live()")
-        yield from user.until(_running, "Live")
+        yield from user.until(running, "Live")
 
     # Dragged, and put back with Esc.
     yield from started()
-    yield from _drag(user, (1.2, 0.0, 0.0), (1.4, 1.0, 0.0))
+    yield from drag(user, (1.2, 0.0, 0.0), (1.4, 1.0, 0.0))
     yield from user.until(
         lambda: (pelvis().xy - root.location.xy).length < 0.2, "the character", 60.0
     )
     yield from user.press("ESC")
-    yield from user.until(lambda: not _running(), "the end of Live", 3.0)
+    yield from user.until(lambda: not running(), "the end of Live", 3.0)
     nothing_moved()
     print("Live: dragged and put back", flush=True)
 
     # Recorded: away, onto the stool, and a way that is drawn.
     yield from started()
     yield from user.click("dafnet.live_record", 0.8)
-    yield from _drag(user, (1.4, 0.2, 0.0), (1.0, -0.8, 0.0))
+    yield from drag(user, (1.4, 0.2, 0.0), (1.0, -0.8, 0.0))
     yield 1.0
     yield from user.picture("live_walks")
-    yield from _drag(user, (*stool.location.xy, 0.0))
+    yield from drag(user, (*stool.location.xy, 0.0))
     yield from user.until(lambda: pelvis().z < 0.68, "sitting", 60.0)
     yield 1.0
     yield from user.picture("live_sits")
-    yield from user.click("dafnet.live_draw")
-    user.move(*_at(user, (1.2, 0.4, 0.0)))
-    user.window.event_simulate("LEFTMOUSE", "PRESS", x=user.mouse[0], y=user.mouse[1])
-    yield 0.1
-    yield from _slide(user, (1.3, -0.4, 0.0), (0.3, -1.0, 0.0), (-0.6, -0.6, 0.0))
-    user.window.event_simulate("LEFTMOUSE", "RELEASE", x=user.mouse[0], y=user.mouse[1])
+    yield from draw(user, (1.2, 0.4, 0.0), (1.3, -0.4, 0.0), (0.3, -1.0, 0.0), (-0.6, -0.6, 0.0))
     yield from user.until(
         lambda: (pelvis().xy - Vector((-0.6, -0.6))).length < 0.4, "the end of the way", 60.0
     )
     yield from user.click("dafnet.live_record", 0.8)
     yield from user.click("dafnet.live()", 0.2)
-    yield from user.until(lambda: not _running(), "the end of Live", 60.0)
+    yield from user.until(lambda: not running(), "the end of Live", 60.0)
     yield 0.5
     ann = scene.objects["Character"]
     assert len(ann.dafnet.takes) == 1 and ann.animation_data.action == ann.dafnet.takes[0].action
@@ -135,28 +146,28 @@ def live(pictures: Path) -> Waits:
     # Undone, saved and closed while it runs.
     only(own.root)
     yield from started()
-    yield from _drag(user, (1.2, 0.0, 0.0))
+    yield from drag(user, (1.2, 0.0, 0.0))
     with user.override():
         bpy.ops.wm.save_as_mainfile(filepath=str(pictures / "live.blend"))
-    yield from user.until(lambda: not _running(), "the end of Live after saving", 3.0)
+    yield from user.until(lambda: not running(), "the end of Live after saving", 3.0)
     nothing_moved()
     yield 0.3
     yield from started()
-    yield from _drag(user, (1.2, 0.0, 0.0))
+    yield from drag(user, (1.2, 0.0, 0.0))
     with user.override():
         bpy.ops.wm.open_mainfile(filepath=str(pictures / "live.blend"))
     yield 0.5
     user = Driver(pictures)
-    assert not _running() and bpy.context.preferences.edit.use_global_undo
+    assert not running() and bpy.context.preferences.edit.use_global_undo
     ann = bpy.context.scene.objects["Character"]
     own = ann.dafnet
     nothing_moved()
     only(own.root)
     yield from user.sidebar("DAFNet")
     yield from started()
-    yield from _drag(user, (1.2, 0.0, 0.0))
+    yield from drag(user, (1.2, 0.0, 0.0))
     with user.override():
         bpy.ops.object.select_all(action="DESELECT")
         ann.select_set(True)
         bpy.ops.object.delete()
-    yield from user.until(lambda: not _running(), "the end of Live without a character", 3.0)
+    yield from user.until(lambda: not running(), "the end of Live without a character", 3.0)
