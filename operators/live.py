@@ -15,6 +15,7 @@ from ..dafnet_addon.blender.live.listening import (
     LiveState,
     begin_live,
     end_live,
+    keep_listening,
     live_session,
     live_state,
 )
@@ -106,6 +107,7 @@ class DAFNET_OT_live(DafnetOperator, bpy.types.Operator):
             self._stop_listening(context)
 
     def _tick(self, context: bpy.types.Context) -> None:
+        keep_listening()
         now = perf_counter()
         if self._session.tick(context, now):
             _redraw(context, "WINDOW")

@@ -1,7 +1,6 @@
 """Operators whose work takes long: it is done between the user's events, and Esc cancels it."""
 
 from collections.abc import Callable, Generator
-from contextlib import ExitStack
 from time import perf_counter
 from typing import Any, ClassVar
 
@@ -9,7 +8,7 @@ import bpy
 
 from ..dafnet_addon.blender.pipeline.pace import Pace
 from ..dafnet_addon.blender.pipeline.running import RunningJob, begin_job, end_job, running_job
-from ..dafnet_addon.blender.pipeline.view import drawn_once
+from ..dafnet_addon.blender.pipeline.view import DrawnOnce
 from ..dafnet_addon.core.progress import run_to_end
 from .base import DafnetOperator, remember_character, reported
 
@@ -54,7 +53,7 @@ class LongOperator(DafnetOperator):
     _started: float
     _steps: Generator[float, None, Any]
     _timer: bpy.types.Timer
-    _view: ExitStack
+    _view: DrawnOnce
 
     def steps(self, context: bpy.types.Context) -> Generator[float, None, Any]:
         """The job, which leaves the scene as it was if it is closed. Its result is never None."""
@@ -73,7 +72,7 @@ class LongOperator(DafnetOperator):
         remember_character(context)
         with reported(self):
             self._steps, self._started, self._share = self.steps(context), perf_counter(), 0.0
-            self._view, self._running, listens = ExitStack(), begin_job(), False
+            self._running, listens = begin_job(), False
             try:
                 seconds = max(self.seconds_before_modal, _FIRST_WORK)
                 result = self._advance(seconds, max(seconds, _FIRST_READING))
@@ -107,6 +106,7 @@ class LongOperator(DafnetOperator):
             )
             return {"PASS_THROUGH"} if allowed else {"RUNNING_MODAL"}
 
+        self._view.keep()
         result = None
         running = False
         try:
@@ -132,7 +132,7 @@ class LongOperator(DafnetOperator):
         """End the job, which leaves the scene untouched unless it has finished."""
         self._steps.close()
         end_job()
-        self._view.close()
+        self._view.end()
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
         if context.workspace:
@@ -145,7 +145,7 @@ class LongOperator(DafnetOperator):
         self._timer = manager.event_timer_add(_SOON, window=context.window)
         manager.progress_begin(0, 100)
         manager.modal_handler_add(self)
-        self._view.enter_context(drawn_once(context.preferences))
+        self._view = DrawnOnce()
 
     def _advance(self, seconds: float, longest: float) -> Any:
         """Work for some ``seconds``, and up to ``longest`` while the scene is changed by it; the

@@ -95,8 +95,15 @@ def live(pictures: Path) -> Waits:
         yield from user.click("dafnet.live()")
         yield from user.until(running, "Live")
 
-    # Dragged, and put back with Esc.
+    # Dragged, and put back with Esc; while the preferences are shown, they are the user's.
     yield from started()
+    edit = bpy.context.preferences.edit
+    area = next(each for each in user.window.screen.areas if each.type == "OUTLINER")
+    for kind, undoes in (("PREFERENCES", True), ("OUTLINER", False)):
+        area.type = kind
+        yield from user.until(
+            lambda undoes=undoes: edit.use_global_undo == undoes, f"undo with {kind}", 5.0
+        )
     yield from drag(user, (1.2, 0.0, 0.0), (1.4, 1.0, 0.0))
     yield from user.until(
         lambda: (pelvis().xy - root.location.xy).length < 0.2, "the character", 60.0

@@ -16,10 +16,18 @@ from ...core.errors import DafnetError
 from ...core.progress import run_to_end
 from ..overlay import display
 from ..pipeline.job import Result
+from ..pipeline.lent import LentPreference
 from .keeping import keep_clips
 from .session import LiveSession
 
-__all__ = ["LiveState", "begin_live", "end_live", "live_session", "live_state"]
+__all__ = [
+    "LiveState",
+    "begin_live",
+    "end_live",
+    "keep_listening",
+    "live_session",
+    "live_state",
+]
 
 
 class LiveState:
@@ -38,7 +46,7 @@ class LiveState:
 
 
 _running: list[LiveState] = []  # at most one
-_undoes: list[tuple[bool, bool]] = []
+_undoes: list[LentPreference] = []  # at most one: whether Blender takes steps of undo
 
 
 def live_state() -> LiveState | None:
@@ -54,10 +62,7 @@ def live_session() -> LiveSession | None:
 def begin_live(session: LiveSession) -> LiveState:
     """Let a session run."""
     _running[:] = [LiveState(session)]
-    preferences = bpy.context.preferences
-    _undoes[:] = [(preferences.edit.use_global_undo, preferences.is_dirty)]
-    preferences.edit.use_global_undo = False
-    preferences.is_dirty = _undoes[0][1]
+    _undoes[:] = [LentPreference("edit", "use_global_undo", False)]
     try:
         session.begin()
         display.show_way(session.way_left)
@@ -67,6 +72,14 @@ def begin_live(session: LiveSession) -> LiveState:
         end_live()
         raise
     return _running[0]
+
+
+def keep_listening() -> None:
+    """Called now and then while a session runs: preferences that are shown have the user's
+    values.
+    """
+    for each in _undoes:
+        each.keep()
 
 
 def end_live() -> None:
@@ -84,10 +97,7 @@ def end_live() -> None:
     try:
         session.restore()
     finally:
-        preferences = bpy.context.preferences
-        was_dirty = preferences.is_dirty
-        preferences.edit.use_global_undo = _undoes.pop()[0]
-        preferences.is_dirty = was_dirty
+        _undoes.pop().back()
 
 
 def _ended(why: str, gone: bool) -> None:

@@ -1,30 +1,32 @@
 """The 3D view while a job runs in a window."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import bpy
 
-__all__ = ["drawn_once"]
+from .lent import LentPreference
+
+__all__ = ["DrawnOnce"]
 
 _DRAWN_ONCE = "FXAA"
 """The anti-aliasing of one pass; those of more draw the view eight times and oftener."""
 
 
-@contextmanager
-def drawn_once(preferences: bpy.types.Preferences) -> Iterator[None]:
-    """A block in which the view is drawn once for each time that it is asked for, instead of again
-    and again until its edges are smooth; the preferences are afterwards as they were, and meanwhile
-    not taken for changed ones.
+class DrawnOnce:
+    """From now on until its ``end`` the view is drawn once for each time that it is asked for,
+    instead of again and again until its edges are smooth.
     """
-    system, was, dirty = preferences.system, preferences.system.viewport_aa, preferences.is_dirty
-    if was in {"OFF", _DRAWN_ONCE}:
-        yield
-        return
-    system.viewport_aa, preferences.is_dirty = _DRAWN_ONCE, dirty
-    try:
-        yield
-    finally:
-        if system.viewport_aa == _DRAWN_ONCE:
-            dirty = preferences.is_dirty
-            system.viewport_aa, preferences.is_dirty = was, dirty
+
+    def __init__(self) -> None:
+        own = bpy.context.preferences.system.viewport_aa
+        self._lent: LentPreference | None = None
+        if own not in {"OFF", _DRAWN_ONCE}:
+            self._lent = LentPreference("system", "viewport_aa", _DRAWN_ONCE)
+
+    def keep(self) -> None:
+        """Called now and then: see ``LentPreference``."""
+        if self._lent is not None:
+            self._lent.keep()
+
+    def end(self) -> None:
+        """Let the view be drawn as ever."""
+        if self._lent is not None:
+            self._lent.back()
