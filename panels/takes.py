@@ -117,16 +117,15 @@ class DAFNET_PT_takes(CharacterPanel, bpy.types.Panel):
             layout.label(text="Generated takes are listed here", icon="INFO")
             return
 
-        row = layout.row()
-        row.template_list(DAFNET_UL_takes.bl_idname, "", own, "takes", own, "active_take", rows=4)
+        layout.template_list(
+            DAFNET_UL_takes.bl_idname, "", own, "takes", own, "active_take", rows=4
+        )
 
-        column = row.column(align=True)
-        column.operator(DAFNET_OT_play_take.bl_idname, text="", icon="TRIA_UP").step = "PREVIOUS"
-        column.operator(DAFNET_OT_play_take.bl_idname, text="", icon="TRIA_DOWN").step = "NEXT"
-        column.separator()
-        column.operator(DAFNET_OT_reject_take.bl_idname, text="", icon="REMOVE")
-        column.operator(DAFNET_OT_keep_accepted.bl_idname, text="", icon="CHECKMARK")
-
+        row = layout.row(align=True)
+        row.operator(DAFNET_OT_play_take.bl_idname, text="", icon="TRIA_UP").step = "PREVIOUS"
+        row.operator(DAFNET_OT_play_take.bl_idname, text="", icon="TRIA_DOWN").step = "NEXT"
+        row.operator(DAFNET_OT_reject_take.bl_idname, text="", icon="REMOVE")
+        row.operator(DAFNET_OT_keep_accepted.bl_idname, text="", icon="CHECKMARK")
         take = active_take(character)
         if take is None:
             return

@@ -96,6 +96,26 @@ def _own_room(user: Driver) -> Waits:
     assert user.clicks - before == 2
     yield from user.picture("redone_walk")
 
+    # Keys that were edited are asked about: not by Esc, but by the button are they replaced.
+    edited, names = character.dafnet.root, {each.name for each in bpy.data.actions}
+    edited.location.x += 0.3
+    edited.keyframe_insert("location", frame=end - 60)
+    bpy.ops.ed.undo_push(message="Edit")
+    yield from user.click("dafnet.redo_walk")
+    yield 0.7
+    yield from user.picture("replace_edited_keys")
+    yield from user.press("ESC")
+    yield 0.7
+    assert {each.name for each in bpy.data.actions} == names
+    yield from user.click("dafnet.redo_walk")
+    yield 0.7
+    yield from user.press("RET")
+    yield from user.until(
+        lambda: any(each.name.endswith(" before redo") for each in bpy.data.actions),
+        "the copy of the keys",
+        30.0,
+    )
+
     with user.override():
         bpy.ops.dafnet.add_character(name="Bob")
     user.select(next(child for child in character.children if child.type == "MESH"))
