@@ -11,7 +11,7 @@ from .root import gaussian, yaw_of
 from .rotations import matrix_from_vector, rotate, transpose
 from .skeleton import ELBOWS, HEAD, PARENTS, SPINE, WRISTS, joint
 
-__all__ = ["counting", "head_turn", "look_away", "with_chest_turned"]
+__all__ = ["counting", "eye_turns", "head_turn", "look_away", "with_chest_turned"]
 
 _EYES = np.array([0.0, 0.09, 0.08])
 """Metres from the head joint, in its frame."""
@@ -20,6 +20,8 @@ _HEAD_UP, _HEAD_DOWN = np.radians(40.0), np.radians(45.0)
 _ALONE = np.radians(35.0)  # of yaw that the head does without the chest
 _CHEST_YAW = np.radians(30.0)
 _CHEST_SHARE = 0.5  # of what is beyond that which the chest takes
+_EYES_SIDE, _EYES_UP, _EYES_DOWN = np.radians((35.0, 25.0, 25.0))  # of eyes in the head
+_EYES_EASE = 0.03  # seconds; deviation of a Gaussian: eyes jump
 _BEHIND = np.radians(210.0)  # of yaw, at which one turns to the other side
 _HEAD_SPEED = np.radians(200.0)  # a second
 _CHEST_SPEED = np.radians(80.0)
@@ -138,3 +140,19 @@ def head_turn(
     up, right = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
     across = chest @ matrix_from_vector(up * off_yaw[:, None]) @ transpose(chest)
     return Turn(across @ head @ matrix_from_vector(right * off_pitch[:, None]), counts)
+
+
+def eye_turns(
+    face: np.ndarray, eye: np.ndarray, target: np.ndarray, counts: np.ndarray, fps: float
+) -> np.ndarray:
+    """How an ``eye`` (T, 3) in a ``face`` (T, 3, 3), y ahead and z the crown, turns by what is left
+    of the angle to a target (T, 3), as far as that ``counts`` (T,) and eyes go: rotations (T, 3, 3)
+    in the face's frame. Any unit of length.
+    """
+    wanted = look_away(face, eye, _held(target))
+    yaw = _softly(wanted[:, 0], _EYES_SIDE)
+    up = wanted[:, 1] > 0.0
+    pitch = np.where(up, _softly(wanted[:, 1], _EYES_UP), _softly(wanted[:, 1], _EYES_DOWN))
+    yaw, pitch = (gaussian(counts * angle, _EYES_EASE * fps) for angle in (yaw, pitch))
+    upright, right = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+    return matrix_from_vector(upright * yaw[:, None]) @ matrix_from_vector(right * pitch[:, None])

@@ -29,6 +29,7 @@ from .controls import (
     find_attachments,
     rotations_without,
 )
+from .eyes import key_eyes
 from .keys import key_control, key_object, rekey_rotation
 from .maps import RigMap, require_usable, with_bone_names_of
 from .preparation import overruled, prepare_rig
@@ -235,6 +236,16 @@ def _bake(
             frames=options.frames,
         )
 
+    key_eyes(
+        context,
+        rig,
+        rig_map,
+        add_curve,
+        character=character,
+        axes=shape.axes,
+        frames=options.frames,
+        unit=options.unit,
+    )
     errors, angles = _measure(
         context,
         rig,

@@ -7,8 +7,16 @@ import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender import compat
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import create_character
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.takes import add_take
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, detection
+from bl_ext.user_default.dafnet.dafnet_addon.blender.rig.eyes import eyes_of
+from bl_ext.user_default.dafnet.dafnet_addon.core.cleanup import CleanUp
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+from bl_ext.user_default.dafnet.dafnet_addon.core.generate import Draw, generate
+from bl_ext.user_default.dafnet.dafnet_addon.core.solids import Scene
+from bl_ext.user_default.dafnet.dafnet_addon.core.take import Controls
+from bl_ext.user_default.dafnet.dafnet_addon.core.weights import load_weights
 from bl_ext.user_default.dafnet.operators.bake_to_rig import DAFNET_OT_bake_to_rig
 from bl_ext.user_default.dafnet.panels.rig import DAFNET_PT_rig
 
@@ -264,3 +272,77 @@ def test_the_character_is_made_as_large_as_the_rig(stage: RigStage) -> None:
     with pytest.raises(RuntimeError, match="locked or driven"):
         bpy.ops.dafnet.size_as_rig()
     assert tuple(stage.ann.scale) == before
+
+
+def _with_eyes(rig: Any, names: tuple[str, str]) -> None:
+    """Give a Mixamo rig eyes whose bones point anywhere."""
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    head = rig.data.edit_bones["mixamorig:Head"]
+    middle, size = np.array(head.head), head.length
+    for side, name in zip((1.0, -1.0), names, strict=True):
+        eye = rig.data.edit_bones.new(name)
+        eye.parent = head
+        eye.head = middle + np.array([0.3 * side, 0.3, 0.4]) * size
+        eye.tail = np.array(eye.head) + np.array([0.1, 0.2 * side, 0.4]) * size
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def _looks(rig: Any, name: str, frame: int, ahead: np.ndarray) -> np.ndarray:
+    """Where (3,) an eye looks in the world, that looked ``ahead`` at rest, in the rig's space."""
+    bpy.context.scene.frame_set(frame)
+    shown = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    rest = np.array(rig.data.bones[name].matrix_local, float)[:3, :3]
+    pose = np.array(shown.matrix_world @ shown.pose.bones[name].matrix, float)[:3, :3]
+    looks = pose @ rest.T @ ahead
+    return looks / np.linalg.norm(looks)
+
+
+@pytest.mark.parametrize("names", [("mixamorig:LeftEye", "mixamorig:RightEye"), ("eye.L", "eye.R")])
+def test_eyes_look_at_what_the_head_does_not_turn_to_far_enough(
+    stage: RigStage, names: tuple[str, str]
+) -> None:
+    still = np.tile(np.eye(4), (60, 1, 1))
+    behind = np.array([0.3, -4.0, 1.6])
+    aside = 4.0 * np.array([-np.sin(1.9), np.cos(1.9), 0.4])
+    for place, left in ((aside, 15.0), (np.array([0.3, 3.0, 1.5]), 0.0), (behind, None)):
+        controls = Controls(fps=30, root=still, look_at=np.tile(place, (60, 1)))
+        take = generate(Scene(()), controls, load_weights(), clean_up=CleanUp(feet=1.0))
+        action = bake(take, stage.ann, 1, "looks")
+        add_take(stage.ann, action, take, controls, Draw(), 1)
+        rig = stage.build("mixamo")
+        ahead = np.linalg.inv(np.array(rig.matrix_world)[:3, :3]) @ [0.0, -1.0, 0.0]
+        _with_eyes(rig, names)
+        stage.take = take
+        stage.bake("mixamo", rig)
+        for name in names:
+            (eye,) = stage.heads(rig, [name], 55)
+            away = (place - eye) / np.linalg.norm(place - eye)
+            astray = np.degrees(np.arccos(np.clip(_looks(rig, name, 55, ahead) @ away, -1.0, 1.0)))
+            shown = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            turn = shown.pose.bones[name].matrix_basis.to_quaternion().angle
+            assert np.degrees(turn) < 45.0, "within what eyes can"
+            if left is not None:
+                assert astray < 6.0
+                assert np.degrees(turn) > left, "the head alone does not come so far"
+
+
+def test_eyes_that_nothing_is_looked_at_with_or_that_others_move_have_no_keys(
+    stage: RigStage,
+) -> None:
+    stage.play("walk")
+    rig = stage.build("mixamo")
+    _with_eyes(rig, ("LeftEye", "RightEye"))
+    assert eyes_of(rig, stage.map("mixamo", rig)) == ["LeftEye", "RightEye"]
+    stage.bake("mixamo", rig)
+    assert not [c for c in compat.action_curves(rig) if "Eye" in c.data_path]
+    for name in ("J_Adj_R_FaceEye", "CC_Base_R_Eye", "right_eye_smplhf", "DEF-eye.R", "eye_r"):
+        rig.data.bones["RightEye"].name = name
+        assert len(eyes_of(rig, stage.map("mixamo", rig))) == 2, name
+        rig.data.bones[name].name = "RightEye"
+    for name in ("LeftEyeLid", "eyebrow.L", "eyes", "Eyelash_R"):
+        rig.data.bones["RightEye"].name = name
+        assert eyes_of(rig, stage.map("mixamo", rig)) == [], name
+        rig.data.bones[name].name = "RightEye"
+    rig.pose.bones["LeftEye"].constraints.new("DAMPED_TRACK")
+    assert eyes_of(rig, stage.map("mixamo", rig)) == []
