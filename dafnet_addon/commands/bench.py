@@ -42,6 +42,7 @@ _SHEETS = ("sitting",)
 
 _RESEARCH = {
     "ablation": "ablation",
+    "baked": "baked",
     "canonical": "canonical",
     "farm": "farm",
     "life-ablation": "life_ablation",
@@ -56,6 +57,7 @@ do it.
 _NEEDS = {
     "ablation": ("torch",),
     "life-ablation": ("torch",),
+    "baked": ("bpy",),
     "farm": ("bpy",),
     "live": ("bpy",),
     "rerun": ("torch",),
@@ -118,9 +120,9 @@ COMMAND = Command(
     name="bench",
     summary=(
         f"measure: {'; '.join(f'{name!r}: {does}' for name, does in _MEASURES.items())}; "
-        "'canonical' fits bodies to the skeleton; 'ablation', 'life-ablation' and 'tables' "
-        "train and compare; 'rerun' makes figures of the weights' report again; 'scale' makes "
-        "batches and kills them, 'farm' says what many shots take"
+        "'baked' puts takes onto a real rig; 'canonical' fits bodies to the skeleton; 'ablation', "
+        "'life-ablation' and 'tables' train and compare; 'rerun' makes figures of the weights' "
+        "report again; 'scale' makes batches and kills them, 'farm' says what many shots take"
     ),
     add_arguments=_add_arguments,
     run=_run,

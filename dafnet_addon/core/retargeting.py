@@ -78,13 +78,15 @@ class RetargetedMotion:
 
     ``targets`` (T, 22, 3): where its joints were to lie; of these wrists, ankles, head and the
     middle of the hip joints are aimed at. ``bends`` (T, 4, 3): unit directions in which the limbs
-    of ``LIMBS`` bend. ``ratio``: the body's size over the source's.
+    of ``LIMBS`` bend. ``laps`` (T, 2): how far hands lie on its own thighs, from 0 to 1. ``ratio``:
+    the body's size over the source's.
     """
 
     motion: Motion
     turns: np.ndarray
     targets: np.ndarray
     bends: np.ndarray
+    laps: np.ndarray
     ratio: float
 
 
@@ -141,7 +143,7 @@ def retarget(
         pose.place(*COLLARS, *SHOULDERS)
 
     bends = {leg: _place_limb(pose, leg, source, targets, shares[leg]) for leg in _LEGS}
-    _lay_in_lap(pose, source, source_body, targets, shares)
+    laps = _lay_in_lap(pose, source, source_body, targets, shares)
     for arm in _ARMS:
         _place_shoulder(pose, arm, source, targets, landing=landing, share=shares[arm])
         bends[arm] = _place_limb(pose, arm, source, targets, shares[arm])
@@ -156,6 +158,7 @@ def retarget(
         turns=pose.frames @ body.alignment,
         targets=targets,
         bends=np.stack([bends[limb] for limb in LIMBS], axis=1),
+        laps=laps,
         ratio=size_ratio(source_body, body),
     )
 
@@ -297,9 +300,9 @@ def _lay_in_lap(
     source_body: Body,
     targets: np.ndarray,
     shares: dict[str, np.ndarray],
-) -> None:
+) -> np.ndarray:
     """Bring the wrists' ``targets``, and the ``shares`` of the arms, to where the source's hands
-    lie on its thighs, on the body's own.
+    lie on its thighs, on the body's own; how far (T, 2) they do.
     """
     size = source_body.leg() / canonical_body(1.0).leg()
     lap = in_lap(source.joints / size, MODEL_FPS)
@@ -317,6 +320,7 @@ def _lay_in_lap(
             place = place + ratio * rotate(pose.frames[:, hip], aside)
             targets[:, wrist] += share[:, None] * (place - targets[:, wrist])
             shares[arm] = np.maximum(shares[arm], share)
+    return np.asarray(lap.max(axis=-1))
 
 
 def _place_limb(
@@ -324,27 +328,31 @@ def _place_limb(
 ) -> np.ndarray:
     """Put a limb's joints and turn its frames; the directions (T, 3) in which it bends.
 
-    By the ``share`` (T,) to which it is held its end comes to its target; else its bones lie as the
-    source's do, and ``targets`` say where that has brought its end.
+    By the ``share`` (T,) to which it is held its bones lie so that its end comes to its target;
+    else they lie as the source's do, and ``targets`` say where that has brought its end.
     """
     joints, body = pose.joints, pose.body
     first, middle, end = LIMBS[limb]
     bones = (first, middle), (middle, end)
-    for start, child in bones:
-        along = normalised(source.joints[:, child] - source.joints[:, start])
-        joints[:, child] = joints[:, start] + body.length(child) * along
-
-    targets[:, end] = joints[:, end] + share[:, None] * (targets[:, end] - joints[:, end])
     bend = _bend(source, limb, joints[:, first], targets[:, end])
-    held = share > 0.0
-    joints[held, middle], joints[held, end] = two_bone(
-        joints[held, first],
-        targets[held, end],
-        joints[held, first] + bend[held],
+    reached = two_bone(
+        joints[:, first],
+        targets[:, end],
+        joints[:, first] + bend,
         body.length(middle),
         body.length(end),
-        bend[held],
+        bend,
     )
+    came = joints[:, first].copy()
+    for (start, child), there in zip(bones, reached, strict=True):
+        # Directions are blended, not places: a straight limb would bend at the least pull.
+        free = normalised(source.joints[:, child] - source.joints[:, start])
+        held = normalised(there - came)
+        along = normalised(free + share[:, None] * (held - free), held)
+        joints[:, child] = joints[:, start] + body.length(child) * along
+        came = there
+    targets[:, end] = joints[:, end]
+    bend = _bend(source, limb, joints[:, first], targets[:, end])
 
     axis = np.array(LIMB_AXES[limb])
     for start, child in bones:

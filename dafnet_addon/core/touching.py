@@ -15,12 +15,14 @@ from .skeleton import ELBOWS, FEET, HEAD, HIPS, KNEES, LIMBS, TARGETS, TOE_HEIGH
 __all__ = ["in_lap", "touches"]
 
 _PALM = 0.08  # metres from the wrist on
-_NEAR, _FAR = 0.03, 0.12  # metres from what a palm touches, and where it is free
-_OFF_LAP = 0.08  # metres from a thigh, where a palm does not lie on it
+_NEAR, _FAR = 0.03, 0.06  # metres from what a palm touches, and where it is free
 _THIGH, _SKULL, _OTHER = 0.075, 0.11, 0.04  # metres of flesh around thighs, head and the other palm
+# Upwards, of the way from a thigh to a palm that hangs beside it, and that lies on it.
+_BESIDE, _ON = 0.1, 0.5
+_ASIDE = 0.12  # metres by which a palm that hangs beside a thigh counts as farther from it
 _UPRIGHT = 0.8  # of a thigh: nothing lies in the lap of one who stands
 _LOW, _HIGH = 0.10, 0.25  # metres of a toe over the floor: it may touch, and it is free
-_EASE = 0.1  # seconds in which a hold begins and ends
+_EASE = 0.15  # seconds in which a hold begins and ends
 
 
 def touches(
@@ -61,7 +63,7 @@ def in_lap(joints: np.ndarray, fps: float) -> np.ndarray:
     as for ``touches``.
     """
     gaps = np.stack(_to_thighs(joints, _palms(joints)), axis=-1)
-    return _eased(smoothstep((_OFF_LAP - gaps) / (_OFF_LAP - _NEAR)), fps)
+    return _eased(smoothstep((_FAR - gaps) / (_FAR - _NEAR)), fps)
 
 
 def _palms(joints: np.ndarray) -> np.ndarray:
@@ -83,8 +85,8 @@ def _to_own_body(joints: np.ndarray, palms: np.ndarray) -> np.ndarray:
 
 
 def _to_thighs(joints: np.ndarray, palms: np.ndarray) -> list[np.ndarray]:
-    """Metres (T, 2) from the palms to the left and to the right thigh; inf to one that is
-    upright.
+    """Metres (T, 2) from the palms to the left and to the right thigh; more to one that they only
+    hang beside, inf to one that is upright.
     """
     gaps = []
     for hip, knee in zip(HIPS, KNEES, strict=True):
@@ -93,6 +95,9 @@ def _to_thighs(joints: np.ndarray, palms: np.ndarray) -> list[np.ndarray]:
         along = ((palms - joints[:, [hip]]) * thigh).sum(-1) / np.maximum(length, 1e-9) ** 2
         nearest = joints[:, [hip]] + np.clip(along, 0.0, 1.0)[..., None] * thigh
         upright = -thigh[..., 2] > _UPRIGHT * length
-        gap = np.linalg.norm(palms - nearest, axis=-1) - _THIGH
-        gaps.append(np.where(upright, np.inf, gap))
+        offset = palms - nearest
+        away = np.linalg.norm(offset, axis=-1)
+        up = offset[..., 2] / np.maximum(away, 1e-9)
+        beside = 1.0 - smoothstep((up - _BESIDE) / (_ON - _BESIDE))
+        gaps.append(np.where(upright, np.inf, away - _THIGH + _ASIDE * beside))
     return gaps

@@ -46,6 +46,8 @@ _SHIN_LOW = 0.15
 # On the way to it.
 _STANDS = (0.12, 1.36)
 """Metres over the floor, in which one who walks meets furniture."""
+_HANGS = 1.0
+"""Metres over the floor; what has nothing that is lower hangs."""
 _SITS_DOWN = 0.55
 """Metres from a seat within which legs may be under a table."""
 _BY_OTHERS = 0.52
@@ -72,6 +74,8 @@ _ROOM_AHEAD = 0.34
 """Metres before the pelvis, that are free once a seat is pulled out."""
 _FARTHEST_OUT = 0.8
 """Metres by which a seat is pulled out, at most."""
+_NUDGE = 0.05
+"""Metres by which it is pulled out farther until one can come to it."""
 _TRIED = 4
 """Places on a seat that are tried, one after another."""
 
@@ -129,6 +133,12 @@ class _Around:
                 found.append((name, float(along[inside].min())))
         return found
 
+    def hangs(self, name: str, seat: SeatPlace) -> bool:
+        """Whether all that something has around a seat is higher than who sits there."""
+        points = self.points[self.names.index(name)]
+        near = np.linalg.norm(points[:, :2] - seat.position, axis=1) < _FRONT
+        return bool(near.any()) and float(points[near, 2].min()) > _HANGS
+
 
 def _around(
     room: Room, name: str, own: Sequence[Box | Mesh], seat: SeatPlace
@@ -176,8 +186,8 @@ def _carries(solid: Box | Mesh, seat: SeatPlace) -> bool:
     return float(np.linalg.norm(gap)) < _OWN and kind_by_name(solid.name) not in ("table", "desk")
 
 
-def _fits(around: _Around, seat: SeatPlace, name: str, floor: float) -> None:
-    """Raises Tucked where a body on a seat of the piece ``name`` would be in something else."""
+def _barred(around: _Around, seat: SeatPlace, floor: float) -> list[tuple[float, str]]:
+    """By how many metres what is where a body would be on a seat is too near, and its name."""
     top = seat.height - floor
     knees = max(_KNEES, seat.edge)
     boxes = (
@@ -185,23 +195,44 @@ def _fits(around: _Around, seat: SeatPlace, name: str, floor: float) -> None:
         (_THIGHS[0], _THIGHS[1], (top + _THIGHS[2][0], top + _THIGHS[2][1])),
         ((knees, knees + _SHIN), _THIGHS[1], (_SHIN_LOW, top)),
     )
-    barred = [
+    return [
         (max(ahead[1], _ROOM_AHEAD) - nearest, each)
         for ahead, half, high in boxes
         for each, nearest in around.within(seat, ahead, half, high)
     ]
+
+
+def _pulled(seat: SeatPlace, out: float) -> SeatPlace:
+    """A seat that is pulled out by so many metres."""
+    return replace(seat, position=seat.position - out * forward_of(seat.yaw))
+
+
+def _fits(around: _Around, seat: SeatPlace, name: str, floor: float) -> None:
+    """Raises Tucked where a body on a seat of the piece ``name`` would be in something else."""
+    barred = _barred(around, seat, floor)
     if not barred:
         return
     out, what = max(barred)
-    lap = top + _LAP_HIGH, _STANDS[1]
+    lap = seat.height - floor + _LAP_HIGH, _STANDS[1]
     before = around.within(seat, (_TRUNK[0][0], _ROOM_AHEAD), _TRUNK[1], lap)
     out = max([out, *(_ROOM_AHEAD - nearest for _, nearest in before)]) + _TOUCHES
-    if out > _FARTHEST_OUT:
-        raise InputError(f"'{what}' stands on the seat of '{name}'; choose another seat.")
+    if out > _FARTHEST_OUT or _barred(around, _pulled(seat, out), floor):
+        raise InputError(
+            f"'{what}' leaves no room for a body on '{name}'; choose another seat, or move it."
+        )
     raise _tucked(what, name, out)
 
 
-def _tucked(what: str, name: str, out: float) -> Tucked:
+def _no_place(name: str) -> InputError:
+    return InputError(
+        f"Parts of '{name}' itself are in the way of sitting there; choose another place on it "
+        "with the 3D cursor, or another seat."
+    )
+
+
+def _tucked(what: str, name: str, out: float) -> InputError:
+    if what == name:
+        return _no_place(name)
     return Tucked(
         f"'{what}' stands where one would sit on '{name}'; pull '{name}' out by "
         f"{100.0 * out:.0f} cm, or choose another seat.",
@@ -238,26 +269,37 @@ def way_in(
     return (yield from within(_ways_in(room, name, seat, around, others), 0.4, 1.0))
 
 
-def _ways_in(
-    room: Room, name: str, seat: SeatPlace, around: _Around, others: np.ndarray
-) -> Generator[float, None, WayIn]:
+def _open_ways(room: Room, seat: SeatPlace) -> Generator[float, None, list[WayIn]]:
+    """The ways to a seat that there may be: straight, then those from its sides, where one stands
+    free.
+    """
     ahead = forward_of(seat.yaw)
     across = np.array([ahead[1], -ahead[0]])
-    sides = [
-        (seat.position + front * ahead + side * across, before)
+    beside = [
+        WayIn((seat.position + front * ahead + side * across,), before)
         for front, befores in ((0.0, _BEFORE), *((lane, (lane,)) for lane in _LANE))
         for before in befores
         for side in (_SIDE, -_SIDE)
     ]
-    spots = np.array([side for side, _ in sides])
+    spots = np.array([way.via[0] for way in beside])
     stands = yield from within(has_room(room, spots, 0.2), 0.0, 0.0)
-    beside = [WayIn((side,), before) for side, before in sides]
-    options = [WayIn(), *(way for way, free in zip(beside, stands, strict=True) if free)]
+    return [WayIn(), *(way for way, free in zip(beside, stands, strict=True) if free)]
+
+
+def _coming(seat: SeatPlace, way: WayIn) -> RootPath:
+    """The last of a way to a seat."""
+    goal = Stop(pair(seat.position), seat.yaw, 0.0, seated=True, before=way.before)
+    begin = way.via[0] if way.via else seat.position + _FRONT * forward_of(seat.yaw)
+    return route(Stop(pair(begin), seat.yaw, 0.0), goal).path
+
+
+def _ways_in(
+    room: Room, name: str, seat: SeatPlace, around: _Around, others: np.ndarray
+) -> Generator[float, None, WayIn]:
+    options = yield from _open_ways(room, seat)
     best, widest, by_nobody, blocker = None, 0.0, False, ""
     for option in options:
-        goal = Stop(pair(seat.position), seat.yaw, 0.0, seated=True, before=option.before)
-        begin = option.via[0] if option.via else seat.position + _FRONT * ahead
-        path = route(Stop(pair(begin), seat.yaw, 0.0), goal).path
+        path = _coming(seat, option)
         gap, what = _gap(around, path, seat, room.floor)
         yield 0.5
         if option.via and _over_arms(around, path, seat):
@@ -274,32 +316,61 @@ def _ways_in(
         blocker = blocker or what
 
     if best is None:
-        lap = seat.height - room.floor + _LAP_HIGH
-        before = around.within(seat, (0.0, _ROOM_AHEAD), _TRUNK[1], (lap, _STANDS[1]))
-        if before:
-            what, nearest = min(before, key=lambda each: each[1])
-            raise _tucked(what, name, _ROOM_AHEAD - nearest + _TOUCHES)
-        raise InputError(
-            f"'{blocker}' stands where one comes to sit on '{name}'; pull '{name}' out, "
-            "or choose another seat."
-        )
+        raise (yield from within(_barred_ways(room, name, seat, around, blocker), 0.9, 1.0))
     return best
 
 
+def _barred_ways(
+    room: Room, name: str, seat: SeatPlace, around: _Around, blocker: str
+) -> Generator[float, None, InputError]:
+    """What is said where no way to a seat is free: by how much it has to be pulled out for one, if
+    that helps.
+    """
+    if blocker == name:
+        return _no_place(name)
+    ahead, lap = forward_of(seat.yaw), seat.height - room.floor + _LAP_HIGH
+    before = around.within(seat, (0.0, _ROOM_AHEAD), _TRUNK[1], (lap, _STANDS[1]))
+    least = [_ROOM_AHEAD - nearest + _TOUCHES for _, nearest in before]
+    for out in (*least, *np.arange(_NUDGE, _FARTHEST_OUT, _NUDGE)):
+        moved = _pulled(seat, float(out))
+        then = replace(around, own=around.own - (*(float(out) * ahead), 0.0))
+        for way in (yield from _open_ways(room, moved)):
+            path = _coming(moved, way)
+            free = _gap(then, path, moved, room.floor)[0] >= _SLIM
+            if free and not _barred(then, moved, room.floor) and not _over_arms(then, path, moved):
+                return _tucked(blocker, name, float(out))
+
+    if around.hangs(blocker, seat):
+        return InputError(
+            f"'{blocker}' is too low to stand under where one comes to sit on '{name}'; choose "
+            "another seat."
+        )
+    return InputError(
+        f"'{blocker}' stands where one comes to sit on '{name}'; choose another seat."
+    )
+
+
 def _gap(around: _Around, path: RootPath, seat: SeatPlace, floor: float) -> tuple[float, str]:
-    """The least metres between a body's axis and what stands around, along a path to a seat, and
-    what that is.
+    """The least metres between a body's axis and what stands around, along a path to a seat, of
+    those that matter, and what that is.
     """
     places = path.position[::2, :2]
     sitting = np.linalg.norm(places - seat.position, axis=1) < _SITS_DOWN
     lap = seat.height - floor + _LAP_HIGH
-    least, what = np.inf, ""
+    ways = [
+        (some, low, some.min(axis=0) - _CLEAR, some.max(axis=0) + _CLEAR)
+        for some, low in ((places[~sitting], _STANDS[0]), (places[sitting], lap))
+        if len(some)
+    ]
+    least, what = _CLEAR, ""
     for name, points in zip(around.names, around.points, strict=True):
-        for some, low in ((places[~sitting], _STANDS[0]), (places[sitting], lap)):
-            met = points[(points[:, 2] > low) & (points[:, 2] < max(_STANDS[1], low + 0.5)), :2]
-            if not len(some) or not len(met):
+        for some, low, first, last in ways:
+            met = (points[:, 2] > low) & (points[:, 2] < max(_STANDS[1], low + 0.5))
+            met &= ((points[:, :2] > first) & (points[:, :2] < last)).all(axis=1)
+            beside = points[met, :2]
+            if not len(beside):
                 continue
-            gap = min(float(((met - at) ** 2).sum(axis=1).min()) for at in some) ** 0.5
+            gap = min(float(((beside - at) ** 2).sum(axis=1).min()) for at in some) ** 0.5
             if gap < least:
                 least, what = gap, name
     return least, what

@@ -88,3 +88,27 @@ def test_hands_in_the_air_keep_their_arms_pose() -> None:
         for start, stop in ((SHOULDERS[side], ELBOWS[side]), (ELBOWS[side], WRISTS[side])):
             ours, theirs = onto[0, stop] - onto[0, start], lifted[0, stop] - lifted[0, start]
             assert ours @ theirs > 0.9999 * np.linalg.norm(ours) * np.linalg.norm(theirs)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.2, 0.5])
+def test_a_straight_arm_bends_no_more_than_its_hand_holds_on(share: float) -> None:
+    """A body of longer arms, whose hands would have to bend them by far to be in place: as far as
+    they hold on, by so much do they bend.
+    """
+    standing = np.tile(REST, (FRAMES, 1, 1))
+    _, frames = fit(standing)
+    motion, body = Motion(standing, frames), _body(arms=1.15)
+
+    def bent(hold: float) -> float:
+        held = np.zeros((FRAMES, 4))
+        held[:, :2] = hold
+        onto = retarget(
+            motion, canonical_body(1.0), body, np.zeros((FRAMES, 3)), held=held
+        ).motion.joints[0]
+        upper = onto[ELBOWS[0]] - onto[SHOULDERS[0]]
+        lower = onto[WRISTS[0]] - onto[ELBOWS[0]]
+        cosine = upper @ lower / np.linalg.norm(upper) / np.linalg.norm(lower)
+        return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+    assert bent(1.0) > bent(0.0) + 40.0
+    assert bent(share) < bent(0.0) + 1.2 * share * (bent(1.0) - bent(0.0))

@@ -37,6 +37,24 @@ def test_hands_hold_on_in_the_lap_but_not_beside_legs_that_stand() -> None:
     assert touches(seated, 30.0)[:, 0].min() > 0.9
 
 
+def test_a_hand_that_hangs_beside_a_seat_holds_on_to_nothing() -> None:
+    """Neither to the thigh that it hangs beside nor to the seat, before it touches that."""
+    seated = _standing()
+    for hip, knee in zip(HIPS, KNEES, strict=True):
+        seated[:, knee] = seated[:, hip] + (0.0, 0.42, 0.0)
+    for side, (hip, wrist) in enumerate(zip(HIPS, WRISTS, strict=True)):
+        outward = -1.0 if side == 0 else 1.0
+        seated[:, wrist] = seated[:, hip] + (0.12 * outward, 0.12, 0.08)
+        seated[:, wrist - 2] = seated[:, wrist] + (0.0, 0.0, 0.25)
+    assert touches(seated, 30.0)[:, :2].max() == 0.0
+
+    def seat(away: float) -> np.ndarray:
+        return touches(seated, 30.0, distance=lambda points: np.full(points.shape[:2], away))[:, 0]
+
+    assert seat(0.07).max() == 0.0 and seat(0.02).min() == 1.0
+    assert 0.2 < seat(0.045).min() < 0.8
+
+
 def test_a_hold_begins_and_ends_softly_and_targets_are_held() -> None:
     joints, target = _standing(60), np.full((60, 3), np.nan)
     target[20:40] = joints[20:40, WRISTS[1]]

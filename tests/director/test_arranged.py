@@ -7,11 +7,14 @@ import pytest
 
 from benchmarks.arranged import SCENES, asked_of, seats_asked, sent_to
 from benchmarks.marks import cuts, nearest_mark
-from dafnet_addon import InputError
+from dafnet_addon import InputError, Scene
+from dafnet_addon.core.distance import scaled
 from dafnet_addon.core.paths import Stop
 from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.root import forward_of
 from dafnet_addon.director.approach import Tucked, walk_to_seat
+from dafnet_addon.director.room import Room
+from dafnet_addon.director.seats import seats_of
 from kit.places import LIBRARY
 
 pytestmark = [pytest.mark.furniture, pytest.mark.slow]
@@ -47,3 +50,25 @@ def test_who_cannot_come_to_a_seat_is_told_before_anything_is_made() -> None:
     seats = seats_asked(room, asked, made.starts[0])
     with pytest.raises(InputError, match=r"no way between the furniture|stands where one comes"):
         walk_to_seat(room, room.pieces()[asked.name], Stop(made.starts[0], 0.0), seats)
+
+
+@pytest.mark.parametrize(
+    ("name", "seat", "start", "said"),
+    [
+        ("car", "Seat Left", 1, "'Roof' is too low to stand under where one comes to sit on 'Seat"),
+        ("stairs", "Stairs", 0, "Parts of 'Stairs' itself are in the way .* with the 3D cursor"),
+    ],
+)
+def test_for_so_tall_a_person_it_is_said_what_does_not_help_either(
+    name: str, seat: str, start: int, said: str
+) -> None:
+    """1.90 m: whose head meets the roof, and whose seat is a step that has to be climbed to; nobody
+    is asked to pull those out.
+    """
+    made, size = SCENES[name](LIBRARY), 1.90 / 1.75
+    room = Room(scaled(Scene(made.room().solids), 1.0 / size).solids)
+    own, here = room.pieces()[seat], np.array(made.starts[start]) / size
+    seats = seats_of(own.solids, here, 0.0, seat)
+    with pytest.raises(InputError, match=said) as raised:
+        walk_to_seat(room, own, Stop(tuple(here), 0.0), seats, size=size)
+    assert not isinstance(raised.value, Tucked)

@@ -18,7 +18,6 @@ __all__ = [
     "character_body",
     "mixamo",
     "odd",
-    "of_file",
     "rest_pose",
     "rested",
     "rigify",
@@ -574,26 +573,3 @@ def rest_pose(
             if f"{side}_foot" in joints:
                 turns.append((limb[5], joints[f"{side}_foot"], (0.1 * out, -1, -0.45)))
     return turns, more.get(kind, [])
-
-
-def of_file(bpy: Any, file: Any) -> Any:
-    """A character's armature as its rest pose is told in a JSON file (``shared/data/rigs``)."""
-    import json
-
-    told = json.loads(file.read_text(encoding="utf-8"))
-    armature = bpy.data.objects.new(file.stem, bpy.data.armatures.new(file.stem))
-    bpy.context.scene.collection.objects.link(armature)
-    bpy.context.view_layer.objects.active = armature
-    bpy.ops.object.mode_set(mode="EDIT")
-    for bone in told["bones"]:
-        edit = armature.data.edit_bones.new(bone["name"])
-        edit.head, edit.tail = bone["head"], bone["tail"]
-        edit.align_roll(bone["z_axis"])
-        if bone["parent"]:
-            edit.parent = armature.data.edit_bones[bone["parent"]]
-            edit.use_connect = bool(bone["connected"])
-    bpy.ops.object.mode_set(mode="OBJECT")
-    armature.matrix_world = _matrix(np.array(told["object_matrix"]))
-    for bone in armature.pose.bones:
-        bone.rotation_mode = told["rotation_mode"]
-    return armature

@@ -31,7 +31,7 @@ PARTS: dict[str, Callable[[Path], Waits]] = {
     "live": live,
     "slow_redraw": slow_redraw,
     "uses_of_takes": uses_of_takes,
-    "seats": lambda pictures: seats(pictures, humanoids, Path(__file__).parent / "rigs"),
+    "seats": lambda pictures: seats(pictures, Path(__file__).parent / "rigs"),
     "clicks": clicks,
     "first_shot": lambda pictures: first_shot(pictures, humanoids),
 }

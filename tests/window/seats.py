@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 from first_shot import progress
 
+from benchmarks.real_rig import real_rig
 from kit.window import Driver, Waits
 
 __all__ = ["seats"]
@@ -101,7 +102,7 @@ def _generated(user: Driver, ann: Any, at: Numbers, picture: str) -> Waits:
     yield from user.picture(picture)
 
 
-def seats(pictures: Path, builders: Any, rigs: Path) -> Waits:
+def seats(pictures: Path, rigs: Path) -> Waits:
     """Sit on a sofa, on a chair that has to be pulled out, lie on a bed, and bake onto ``rigs``:
     rest poses of real characters.
     """
@@ -155,7 +156,7 @@ def seats(pictures: Path, builders: Any, rigs: Path) -> Waits:
 
     for file in sorted(rigs.glob("*.json")):
         with user.override():
-            rig = builders.of_file(bpy, file)
+            rig = real_rig(file)
         rig.data.display_type, rig.show_in_front = "STICK", True
         _only(rig)
         yield 0.3

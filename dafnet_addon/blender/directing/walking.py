@@ -56,6 +56,8 @@ _THERE = 0.3
 """Metres from a seat within which one sits on it already."""
 _NEAR_SEAT = 1.0
 """Metres from a seat within which it is not pulled out by itself."""
+_PULLED = 3
+"""How often a seat is tried, being pulled out: for room on it, then for a way to it."""
 _PULLS = 0.8
 """Seconds of pulling a seat out."""
 _SITTING_DOWN = BEFORE_SEAT + 0.2
@@ -419,8 +421,8 @@ def _route_to_seat(start: Start, here: Stop, asked: _Request) -> Generator[float
         sits = AlreadyThere(f"The character sits on '{name}' already; choose another seat.")
         raise _there_already(start, sits)
 
-    pulled = None
-    while True:
+    pulled: np.ndarray | None = None
+    for left in reversed(range(_PULLED)):
         goes = walk_to_seat.steps(
             room,
             whole,
@@ -436,14 +438,15 @@ def _route_to_seat(start: Start, here: Stop, asked: _Request) -> Generator[float
             route, spot = yield from within(goes, done, done + 0.2)
             break
         except Tucked as error:
-            if not asked.out or pulled is not None:
+            if not asked.out or not left:
                 raise
             done = 0.35
-            pulled = -error.out * forward_of(seats[0].yaw)
-            solids = _pulled_out(room.solids, whole, pulled)
+            farther = -error.out * forward_of(seats[0].yaw)
+            pulled = farther if pulled is None else pulled + farther
+            solids = _pulled_out(room.solids, whole, farther)
             room = _room_of(solids, start.floor, asked.names)
             whole = room.pieces()[name]
-            seats = [replace(seats[0], position=seats[0].position + pulled)]
+            seats = [replace(seats[0], position=seats[0].position + farther)]
 
     scene = Scene(tuple(room.solids))
     sat_on = SatOn(spot.position, spot.height, frozenset(asked.names))

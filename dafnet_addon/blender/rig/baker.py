@@ -48,7 +48,8 @@ _HOLDS = 0.99
 class Baked:
     """The new ``action``; ``errors``: mean and largest distance (metres) of ankles, head and pelvis
     (the middle of the hip joints) from where they were to lie, and of wrists, in frames in which
-    hands hold on to something, from the character's. ``angles``: mean and largest angle (degrees)
+    hands hold on to something, from the character's, or from where they lie on the rig's own
+    thighs. ``angles``: mean and largest angle (degrees)
     between the limbs and trunk and the character's (``limb_errors``). Both are measured on the rig
     as Blender plays it. ``ratio``: the rig's size over the character's, by which the motion was
     scaled. ``overruled``: keyed bones that constraints or drivers of their own move, too.
@@ -251,6 +252,7 @@ def _bake(
         rig,
         rig_map,
         targets=retargeted.targets,
+        laps=retargeted.laps,
         source=motion.joints,
         held=held,
         options=options,
@@ -400,12 +402,14 @@ def _measure(
     rig_map: RigMap,
     *,
     targets: np.ndarray,
+    laps: np.ndarray,
     source: np.ndarray,
     held: np.ndarray,
     options: _BakeOptions,
 ) -> tuple[dict[str, tuple[float, float]], dict[str, tuple[float, float]]]:
     """Errors and angles as in ``Baked``, measured against the joints' targets and the source's
-    joints (T, 22, 3); ``held`` (T, 4): see ``touches``.
+    joints (T, 22, 3); ``held`` (T, 4): see ``touches``; ``laps`` (T, 2): how far hands lie on the
+    rig's own thighs, so that it is their targets that count.
     """
     count = len(options.frames)
     chosen = np.unique(np.linspace(0, count - 1, _MEASURED_FRAMES).astype(int))
@@ -420,9 +424,10 @@ def _measure(
     def mean_and_largest(values: np.ndarray) -> tuple[float, float]:
         return float(np.mean(values)), float(np.max(values))
 
-    off = played - targets[chosen]
+    off, away = played - targets[chosen], (played - source[chosen])[:, WRISTS]
+    away += laps[chosen, :, None] * (off[:, WRISTS] - away)
     parts = {
-        "wrists": (played - source[chosen])[:, WRISTS][held[chosen, :2] >= _HOLDS],
+        "wrists": away[held[chosen, :2] >= _HOLDS],
         "ankles": off[:, ANKLES],
         "head": off[:, [HEAD]],
         "pelvis": off[:, HIPS].mean(axis=1, keepdims=True),

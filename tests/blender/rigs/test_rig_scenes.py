@@ -6,16 +6,13 @@ from types import ModuleType
 from typing import Any
 
 import bpy
-import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, detection
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig.sizing import size_as_rig
-from mathutils import Matrix
 
 from benchmarks.arranged import SCENES, Arranged
-from dafnet_addon import Mesh
-from dafnet_addon.core.solids import BOX_CORNERS, BOX_TRIANGLES
-from kit import humanoids
+from benchmarks.baked import furnish
+from benchmarks.real_rig import real_rig
 from kit.places import LIBRARY, SHARED
 from kit.stage import Stage
 
@@ -24,28 +21,13 @@ pytestmark = [pytest.mark.furniture, pytest.mark.slow]
 RIG = SHARED / "rigs" / "mixamo_gltf_woman.json"
 
 
-def furnished(made: Arranged) -> None:
-    """Put a room's solids into the open scene."""
-    for solid in made.solids:
-        if isinstance(solid, Mesh):
-            points, faces, matrix = solid.vertices, solid.triangles, solid.matrix
-        else:
-            points, faces, matrix = BOX_CORNERS * solid.half_size, BOX_TRIANGLES, solid.matrices()
-        mesh = bpy.data.meshes.new(solid.name)
-        mesh.from_pydata(np.asarray(points).tolist(), [], np.asarray(faces).tolist())
-        each = bpy.data.objects.new(solid.name, mesh)
-        each.matrix_world = Matrix(np.asarray(matrix).tolist())
-        bpy.context.scene.collection.objects.link(each)
-    bpy.context.view_layer.update()
-
-
 def sent_and_baked(made: Arranged, number: int = 0, start: int = 0) -> tuple[Stage, Any, Any]:
     """Send a character who is as large as the rig to one of the room's seats, from one of its
     starts, and bake what she does there: the stage, the rig, and what was baked.
     """
     stage, asked = Stage(height=1.75, fps=30, furnished=False), made.asked[number]
-    furnished(made)
-    rig = humanoids.of_file(bpy, RIG)
+    furnish(made)
+    rig = real_rig(RIG)
     rig_map = detection.detect_map(rig)
     size_as_rig(bpy.context, stage.ann, rig, rig_map)
     stage.root.location = (*made.starts[start], 0.0)
@@ -59,15 +41,24 @@ def sent_and_baked(made: Arranged, number: int = 0, start: int = 0) -> tuple[Sta
 
 
 @pytest.mark.parametrize(
-    "name", ["dining, 12 cm out", "office", "bar", "sofa corner with table", "room in one mesh"]
+    ("name", "number"),
+    [
+        ("dining, 12 cm out", 0),
+        ("office", 0),
+        ("bar", 0),
+        # for so tall a person pulled out twice: for knees, then for a way past the counter
+        ("bar", 1),
+        ("sofa corner with table", 0),
+        ("room in one mesh", 0),
+    ],
 )
-def test_people_in_rooms_arrive_on_a_real_rig(blender: ModuleType, name: str) -> None:
+def test_people_in_rooms_arrive_on_a_real_rig(blender: ModuleType, name: str, number: int) -> None:
     """Legs, trunk, head, feet and pelvis as the character's; hands that hold on to something are
     there, for which arms of other proportions bend otherwise: what is off by more is told.
     """
     if not RIG.is_file():
         pytest.skip(f"needs the rest pose {RIG}")
-    stage, rig, baked = sent_and_baked(SCENES[name](LIBRARY))
+    stage, rig, baked = sent_and_baked(SCENES[name](LIBRARY), number)
     assert baked.ratio == 1.0
     for part, (mean, most) in baked.errors.items():
         assert mean < (0.03 if part == "wrists" else 0.01) and most < 0.05, (part, mean, most)

@@ -20,6 +20,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.core import (
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import JOINTS
 
+from benchmarks.real_rig import real_rig
 from kit import humanoids
 from kit.places import SHARED
 from kit.rig_stage import RigStage
@@ -294,7 +295,7 @@ def test_real_characters_keep_the_motions_shape(stage: RigStage, name: str, what
     file = SHARED / "rigs" / f"{name}.json"
     if not file.is_file():
         pytest.skip(f"needs the rest pose {file}")
-    rig = humanoids.of_file(bpy, file)
+    rig = real_rig(file)
     stage.size_as(rig)
     stage.play(what)
     baked = stage.bake(name, rig)
