@@ -59,8 +59,7 @@ def bounds(solid: Box | Mesh) -> tuple[np.ndarray, np.ndarray]:
     if isinstance(solid, Box):
         matrices, corners = solid.matrices(), _CORNERS * solid.half_size
     else:
-        vertices = np.asarray(solid.vertices, float)
-        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        low, high = solid.span
         matrices, linear = rigid_split(solid.matrix)
         corners = (0.5 * (low + high) + 0.5 * (high - low) * _CORNERS) @ linear.reshape(-1, 3, 3)[
             0

@@ -26,7 +26,9 @@ def runs(flags: np.ndarray, at_least: float = 1, gap: float = 0) -> list[tuple[i
     """The (start, stop) of runs of at least ``at_least`` frames in which the flags (T,) are set;
     stop is exclusive. Runs with no more than ``gap`` frames between them are one.
     """
-    edges = np.flatnonzero(np.diff(np.asarray(flags, bool), prepend=False, append=False))
+    padded = np.zeros(len(flags) + 2, bool)
+    padded[1:-1] = flags
+    edges = np.flatnonzero(padded[1:] != padded[:-1])
     found: list[tuple[int, int]] = []
     for start, stop in edges.reshape(-1, 2).tolist():
         if found and start - found[-1][1] <= gap:

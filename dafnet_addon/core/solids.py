@@ -5,7 +5,7 @@ on.
 """
 
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -157,6 +157,13 @@ class Mesh:
         hold("vertices", vertices)
         hold("triangles", corners(self.triangles, f"The triangles {whose}", len(vertices)))
         hold("matrix", matrix)
+
+    @cached_property
+    def span(self) -> tuple[np.ndarray, np.ndarray]:
+        """The lowest and the highest corner (3,) of the vertices, in the mesh's own space."""
+        # by columns, which takes a fraction of the time
+        columns = [np.ascontiguousarray(self.vertices[:, axis], float) for axis in range(3)]
+        return np.array([x.min() for x in columns]), np.array([x.max() for x in columns])
 
 
 @dataclass(frozen=True)

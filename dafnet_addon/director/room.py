@@ -3,6 +3,7 @@
 from collections.abc import Generator, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -89,22 +90,24 @@ def _thinned(parts: Sequence[np.ndarray]) -> np.ndarray:
     every, parts = parts, [part for part in parts if len(part)]
     if not parts:
         return np.zeros((0, every[0].shape[1] if every else 3), np.float32)
-    low = np.min([part.min(axis=0) for part in parts], axis=0)
-    high = np.max([part.max(axis=0) for part in parts], axis=0)
-    counts = np.rint((high - low) * 100.0).astype(np.int64) + 1
-    steps = np.append(np.cumprod(counts[:0:-1])[::-1], 1)
-    keys = [np.rint((part - low) * 100.0).astype(np.int64) @ steps for part in parts]
-    if counts.prod() > _TABLE_AT_MOST:
-        first = np.unique(np.concatenate(keys), return_index=True)[1]
+    points = np.concatenate(parts)
+    columns = [np.ascontiguousarray(column) for column in points.T]
+    low = [column.min() for column in columns]
+    cells = [
+        np.rint((column - least) * 100.0).astype(np.int64)
+        for column, least in zip(columns, low, strict=True)
+    ]
+    counts = [int(cell.max()) + 1 for cell in cells]
+    keys = cells[0]
+    for cell, count in zip(cells[1:], counts[1:], strict=True):
+        keys = keys * count + cell
+    if prod(counts) > _TABLE_AT_MOST:
+        first = np.unique(keys, return_index=True)[1]
     else:  # much faster than sorting
-        table = np.full(int(counts.prod()), -1, np.int32)
-        stop = sum(map(len, keys))
-        for key in reversed(keys):
-            start = stop - len(key)
-            table[key[::-1]] = np.arange(stop - 1, start - 1, -1, dtype=np.int32)
-            stop = start
+        table = np.full(prod(counts), -1, np.int32)
+        table[keys[::-1]] = np.arange(len(keys) - 1, -1, -1, dtype=np.int32)
         first = table[table >= 0]
-    return np.concatenate(parts)[first].astype(np.float32)
+    return points[first].astype(np.float32)
 
 
 @dataclass(frozen=True)

@@ -108,6 +108,8 @@ _HANGS = 0.16
 """Under the seat, that shins need there at least: before a pillow there is none of it."""
 _STANDS = (0.46, 0.60)
 """Before the pelvis, where one stands who is about to sit down."""
+_BODY = Columns.between(0.2, 1.4)
+"""The layers over the floor, in which he stands."""
 _UNDER = 0.08
 """Around a root, in which its seat is looked for."""
 
@@ -628,7 +630,7 @@ class _Lines:
             ahead, tall_back, facing_away = max(middle, ends - _FROM_EDGE), 0.0, 0.0
 
         patch = self._rows(ahead - 0.08, ahead + 0.08)
-        if self._mask[patch, hips].mean() < 0.7:
+        if _share(self._mask[patch, hips]) < 0.7:
             return None
         height = _median(self._heights[patch, hips])
         slope = self._heights[patch, hips.stop - 1] - self._heights[patch, hips.start]
@@ -650,9 +652,9 @@ class _Lines:
         if (risen.mean(axis=1) > 0.3).any():
             return None
         legs = self._layers[self._rows(ends + _LEGS[0], ends + _LEGS[1]), trunk]
-        hang = ((legs & Columns.between(height - _HANGS, height + 0.11)) != 0).mean() < 0.2
+        hang = _share(legs & Columns.between(height - _HANGS, height + 0.11)) < 0.2
         stands = self._layers[self._rows(ahead + _STANDS[0], ahead + _STANDS[1]), trunk]
-        stand = ((stands & Columns.between(0.2, 1.4)) != 0).mean() < 0.1
+        stand = _share(stands & _BODY) < 0.1
         good = tall_back + 1.0 * hang + 0.5 * stand
         good -= _TOO_HIGH * max(0.0, abs(height - _COMFORTABLE) - 0.1)
         good -= _UPHILL * max(0.0, height - self._part.lowest)
@@ -666,6 +668,11 @@ class _Lines:
         if not (np.isfinite(front).any() and np.isfinite(hollow).any()):
             return 0.0
         return float(np.clip(_median(front) - _median(hollow), 0.0, 0.1))
+
+
+def _share(values: np.ndarray) -> float:
+    """Of the values, those that are not 0; NaN where there are no values."""
+    return float(np.count_nonzero(values) / values.size) if values.size else float("nan")
 
 
 def _median(values: np.ndarray) -> float:
