@@ -60,7 +60,12 @@ class Pose:
 def limited(turn: np.ndarray, limit: float) -> np.ndarray:
     """Rotations (T, 3, 3), none by more than ``limit`` radians (which is under half a circle)."""
     axis, angle = _axis_angle(turn)
-    return matrix_from_vector(axis * np.minimum(angle, limit)[:, None])
+    farther = angle > limit
+    if not farther.any():
+        return turn
+    out = turn.copy()
+    out[farther] = matrix_from_vector(limit * axis[farther])
+    return out
 
 
 def partly(turn: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -47,15 +47,19 @@ def frame_from(primary: np.ndarray, secondary: np.ndarray, axes: str) -> np.ndar
 def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Smallest rotation (…, 3, 3) that takes direction ``a`` onto direction ``b``."""
     a, b = np.broadcast_arrays(normalised(a), normalised(b))
-    axis = np.cross(a, b)
+    (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
+    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx  # of a × b
     cos = (a * b).sum(-1)[..., None, None]
-    k = np.zeros((*axis.shape[:-1], 3, 3))
-    k[..., 0, 1], k[..., 0, 2], k[..., 1, 2] = -axis[..., 2], axis[..., 1], -axis[..., 0]
-    k = k - np.swapaxes(k, -1, -2)
+    k = np.zeros((*a.shape, 3))
+    k[..., 0, 1], k[..., 0, 2], k[..., 1, 2] = -z, y, -x
+    k[..., 1, 0], k[..., 2, 0], k[..., 2, 1] = z, -y, x
     smooth = np.eye(3) + k + k @ k / np.maximum(1.0 + cos, 1e-8)
+    opposite = cos < -1.0 + 1e-7
+    if not opposite.any():
+        return np.asarray(smooth)
     other = normalised(np.cross(a, np.where(np.abs(a[..., :1]) < 0.9, [1.0, 0, 0], [0, 1.0, 0])))
     half_turn = 2.0 * other[..., :, None] * other[..., None, :] - np.eye(3)
-    return np.where(cos < -1.0 + 1e-7, half_turn, smooth)
+    return np.where(opposite, half_turn, smooth)
 
 
 def rotate(matrix: np.ndarray, v: np.ndarray) -> np.ndarray:

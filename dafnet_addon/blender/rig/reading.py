@@ -47,13 +47,16 @@ class Shape:
 
 def pose_matrices(evaluated: bpy.types.Object, bones: list[str | None]) -> np.ndarray:
     """Pose matrices (N, 4, 4) of bones, in the armature's space; NaN for None."""
+    # all at once, which takes a tenth of the time of one after another
     pose = evaluated.pose.bones
-    return np.array(
-        [
-            np.full((4, 4), np.nan) if name is None else np.array(pose[name].matrix, float)
-            for name in bones
-        ]
-    )
+    columns = np.empty(16 * len(pose), np.float32)
+    pose.foreach_get("matrix", columns)
+    place = {name: k for k, name in enumerate(pose.keys())}
+    matrices = np.full((len(bones), 4, 4), np.nan)
+    found = [k for k, name in enumerate(bones) if name is not None]
+    of_bones = columns.reshape(-1, 4, 4).swapaxes(1, 2)
+    matrices[found] = of_bones[[place[name] for name in bones if name is not None]]
+    return matrices
 
 
 def rest_matrices(armature: bpy.types.Object, bones: list[str | None]) -> np.ndarray:

@@ -7,11 +7,11 @@ import numpy as np
 
 from ...core.body import canonical_body
 from ...core.errors import InputError
-from ...core.skeleton import JOINTS, STATURE
+from ...core.skeleton import ANKLES, JOINTS, KNEES, PARENTS, STATURE
 from ...core.units import PERSON, likely_unit, require_human_height
 from ..character.armature import character_scale, metres_per_unit
 from .maps import RigMap, require_usable, with_bone_names_of
-from .reading import rest_matrices, rigid_parts, shape_of
+from .reading import rest_matrices, rigid_parts
 
 __all__ = ["leg_ratio", "require_rig_of_a_person", "size_as_rig"]
 
@@ -25,8 +25,9 @@ def leg_ratio(rig: bpy.types.Object, rig_map: RigMap) -> float:
     require_usable(rig, rig_map)
     world = np.array(rig.matrix_world, float)[None]
     _, scale = rigid_parts(world, f"armature '{rig.name}'")
-    rest = rest_matrices(rig, [rig_map.place(name) for name in JOINTS])
-    return shape_of(rig, rig_map, rest, scale).body.leg() / canonical_body(1.0).leg()
+    heads = rest_matrices(rig, [rig_map.place(name) for name in JOINTS])[:, :3, 3]
+    bones = [np.linalg.norm(heads[j] - heads[PARENTS[j]]) for j in KNEES + ANKLES]
+    return 0.5 * scale * float(np.sum(bones)) / canonical_body(1.0).leg()
 
 
 def require_rig_of_a_person(scene: bpy.types.Scene, rig: bpy.types.Object, rig_map: RigMap) -> None:
