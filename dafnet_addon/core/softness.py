@@ -75,11 +75,13 @@ _LONGEST = (2.7, 4.0)  # beds and sofas; what is longer is several, or a room
 @dataclass(frozen=True)
 class Support:
     """What is under a root at T frames: the height (T,) of its ``top`` in the world, NaN where
-    there is nothing, and its ``softness`` (T,); canonical metres.
+    there is nothing, its ``softness`` (T,), and which ``solid`` of the scene it is (T,), -1 where
+    there is none; canonical metres.
     """
 
     top: np.ndarray
     softness: np.ndarray
+    solid: np.ndarray
 
     @property
     def carried(self) -> np.ndarray:
@@ -140,15 +142,15 @@ def _sides(solid: Box | Mesh, top: float) -> tuple[float, float, float]:
 def support_under(scene: Scene, path: RootPath) -> Support:
     """What carries a body that sits or lies where the root is; solids as for ``occupancy``."""
     tops = tops_under(scene, path)
-    softness = np.zeros(len(path))
+    softness, under = np.zeros(len(path)), np.full(len(path), -1)
     there = np.isfinite(tops)
     if there.any():
         places = np.column_stack([path.position[:, :2], np.where(there, tops, 0.0)])[:, None]
         gaps = [distance(Scene((s,)), places, path.position[:, 2])[:, 0] for s in scene.solids]
-        nearest = np.argmin(gaps, axis=0)
-        for k in np.unique(nearest[there]):
-            on_it, solid = there & (nearest == k), scene.solids[k]
+        under[there] = np.argmin(gaps, axis=0)[there]
+        for k in np.unique(under[there]):
+            on_it, solid = under == k, scene.solids[k]
             over_floor = float(np.median((tops - path.position[:, 2])[on_it]))
             own = solid.softness
             softness[on_it] = guessed(solid, over_floor) if own is None else own
-    return Support(tops, softness)
+    return Support(tops, softness, under)

@@ -70,19 +70,11 @@ def verdict(
     return tuple(sorted(found, key=lambda each: each.good))
 
 
-def _names_under(scene: Scene, path: RootPath, top: np.ndarray) -> list[str]:
-    """The pieces (T) whose top, at these heights (T,), is under the root."""
-    places = np.column_stack([path.position[:, :2], np.nan_to_num(top)])[:, None]
-    gaps = [distance(Scene((s,)), places, path.position[:, 2])[:, 0] for s in scene.solids]
-    return [scene.solids[k].name or _UNNAMED for k in np.argmin(gaps, axis=0)]
-
-
 def _seats(
     joints: np.ndarray, fps: float, path: RootPath, scene: Scene, support: Support
 ) -> Iterator[Finding]:
     if not np.isfinite(support.top).any():
         return
-    names = _names_under(scene, path, support.top)
     for episode in seat_episodes(joints, path, fps):
         here = slice(episode.start, episode.stop)
         middle = (episode.start + episode.stop) // 2
@@ -90,7 +82,7 @@ def _seats(
         if not over_floor > _SEATS:
             continue
 
-        name = names[middle]
+        name = scene.solids[support.solid[middle]].name or _UNNAMED
         over = float(np.median(joints[here, PELVIS, 2] - support.carried[here]))
         amount, when = f"{100 * abs(over):.0f} cm", f"at {middle / fps:.1f} s"
         if episode.pelvis_height > _STANDS and over > 2 * _OFF_SEAT:
@@ -115,13 +107,12 @@ def _seats(
 
 def _inside(joints: np.ndarray, fps: float, path: RootPath, scene: Scene) -> Iterator[Finding]:
     points, floor = body_points(joints, _PER_BONE), path.position[:, 2]
-    if not scene.solids or not (distance(scene, points, floor) < _CLOSE).any():
-        return
-
     at_least = max(1, round(_BRIEF * fps))
     for solid in scene.solids:
         own = Scene((solid,))
         depth = -distance(own, points, floor)
+        if not (depth > -_CLOSE).any():
+            continue
         gives = guessed(solid, _USUAL_TOP) if solid.softness is None else solid.softness
         allowed = _DEEP + gives
         name = solid.name or _UNNAMED

@@ -63,7 +63,7 @@ def _under(top: float, softness: float = 0.0) -> Support:
     """A seat that is under the root from the last third of the way down on."""
     tops = np.full(FRAMES, top)
     tops[:65] = np.nan
-    return Support(tops, np.full(FRAMES, softness))
+    return Support(tops, np.full(FRAMES, softness), np.zeros(FRAMES, int))
 
 
 @pytest.mark.parametrize("softness", [0.0, 0.03, 0.07, 0.11])
@@ -86,7 +86,7 @@ def test_who_hovers_or_sinks_comes_to_rest_where_the_seat_carries(over: float, s
 def test_who_rests_right_and_who_does_not_rest_are_left_alone():
     right = _sitting_down(0.45 + OVER_HARD + 0.004)
     assert rested(right, _under(0.45)) is right
-    nothing = Support(np.full(FRAMES, np.nan), np.zeros(FRAMES))
+    nothing = Support(np.full(FRAMES, np.nan), np.zeros(FRAMES), np.full(FRAMES, -1))
     hovers = _sitting_down(0.70)
     assert rested(hovers, nothing) is hovers
     assert rested(hovers, _under(0.75)) is hovers, "what is far over the pelvis is not a seat"
@@ -107,7 +107,7 @@ def test_life_on_a_seat_stays():
 
 def test_a_pose_of_one_frame_rests_too():
     pose = _sitting_down(0.70)[-1:]
-    out = rested(pose, Support(np.array([0.45]), np.zeros(1)))
+    out = rested(pose, Support(np.array([0.45]), np.zeros(1), np.zeros(1, int)))
     assert abs(out[0, PELVIS, 2] - (0.45 + OVER_HARD)) < 0.0101
 
 
@@ -123,7 +123,10 @@ def test_who_hovers_over_a_bed_comes_down_with_the_feet():
     lying = REST[:, [0, 2, 1]] * (1.0, -1.0, 1.0)
     lying[:, 2] += 0.62 - lying[PELVIS, 2]
     joints = np.repeat(lying[None], FRAMES, axis=0)
-    out = rested(joints, Support(np.full(FRAMES, 0.45), np.full(FRAMES, SOFTNESS["bed"])))
+    out = rested(
+        joints,
+        Support(np.full(FRAMES, 0.45), np.full(FRAMES, SOFTNESS["bed"]), np.zeros(FRAMES, int)),
+    )
     assert np.abs(out[:, PELVIS, 2] - 0.46).max() < 0.0101, "1 cm over the bed"
     legs = {*KNEES, *ANKLES, *FEET}
     rest = [j for j in range(22) if j not in legs]
@@ -245,7 +248,7 @@ def test_thighs_lie_on_the_edge_of_a_high_seat_and_feet_hang_from_it():
 def _closed_to_the_floor(front: float) -> tuple[Scene, Support]:
     """A seat of 0.45 m, closed down to the floor, whose front is at ``front`` metres."""
     box = Box(center=np.array([0.0, front - 0.3, 0.225]), half_size=np.array([0.4, 0.3, 0.225]))
-    support = Support(np.full(FRAMES, 0.45), np.zeros(FRAMES))
+    support = Support(np.full(FRAMES, 0.45), np.zeros(FRAMES), np.zeros(FRAMES, int))
     return Scene((box,)), support
 
 
