@@ -15,7 +15,7 @@ from dafnet_addon.core.root import forward_of
 from dafnet_addon.core.rotations import rotate, yaw_matrix
 from dafnet_addon.core.solids import BOX_CORNERS, BOX_TRIANGLES, Box
 from dafnet_addon.director.approach import Tucked, walk_to_seat
-from dafnet_addon.director.places import before_a_top
+from dafnet_addon.director.places import before_a_top, towards_top
 from dafnet_addon.director.room import Room
 from dafnet_addon.director.seats import SeatPlace, seats_of
 
@@ -252,7 +252,8 @@ def seats_asked(room: Room, asked: Asked, start: Place) -> list[SeatPlace]:
     seats = seats_of(own.solids, np.array(start), 0.0, asked.name, near)
     if near is None and not seats[0].back:
         top = run_to_end(before_a_top(room, own, seats[0]))
-        seats = seats if top is None else seats_of(own.solids, top, 0.0, asked.name)
+        if top is not None:
+            seats = towards_top(seats_of(own.solids, top, 0.0, asked.name), top)
     return seats
 
 

@@ -9,7 +9,7 @@ from ..core.progress import within
 from ..core.root import forward_of
 from .beds import Bed, bed_of
 from .choosing import Chooser, Done, Job, Taken
-from .places import Place, before_a_top, beside, known_seats
+from .places import Place, before_a_top, beside, known_seats, towards_top
 from .room import Piece
 from .seats import SeatPlace
 from .tasks import LieOn, SitOn, StandUp, Wait, WalkAlong, WalkTo
@@ -126,7 +126,8 @@ def _seats(
     if yaw is None and near is None and not seats[0].back:
         top = yield from before_a_top(room, piece, seats[0])
         if top is not None:
-            seats = yield from known_seats(room, piece, top, near, size, tables)
+            found = yield from known_seats(room, piece, top, near, size, tables)
+            seats = towards_top(found, top)
     return seats
 
 

@@ -30,10 +30,12 @@ __all__ = [
     "seats_on",
     "shoulder",
     "standing_pelvis",
+    "towards_top",
 ]
 
 _ELBOW_ROOM = 0.6  # metres between people on one seat or at one top
 _AT_TOP = 0.8  # metres between a pelvis and the table, desk or bar that one sits at
+_LOOKS_TO_TOP = 0.7  # cosine of the angle by which one looks past it, at most
 _TOPS = (0.15, 0.45)  # metres over a seat, where these are
 _SPACING = 0.05  # metres between points of what stands in the way
 _ARM = float(np.linalg.norm(OFFSETS[[joint("left_elbow"), joint("left_wrist")]], axis=1).sum())
@@ -159,6 +161,18 @@ def before_a_top(
             nearest = float(gaps.min())
             best = at[gaps < nearest + 0.05].mean(axis=0).astype(float)
     return best
+
+
+def towards_top(seats: Sequence[SeatPlace], top: np.ndarray) -> list[SeatPlace]:
+    """Of the seats, those from which one looks to a top (2,) that one sits down at; all, where
+    there are none of these.
+    """
+    kept = [
+        seat
+        for seat in seats
+        if forward_of(seat.yaw) @ normalised(top - seat.position) > _LOOKS_TO_TOP
+    ]
+    return kept or [*seats]
 
 
 @stepwise

@@ -15,7 +15,7 @@ from ...core.progress import stepwise, within
 from ...core.root import forward_of
 from ...core.solids import Box, Mesh, Scene
 from ...director.approach import Tucked, walk_to_seat
-from ...director.places import before_a_top, marked_places
+from ...director.places import before_a_top, marked_places, towards_top
 from ...director.room import Piece, Room
 from ...director.seats import MarkedSeat, SeatPlace, mark_of, on_a_seat, seats_of
 from ...director.walks import AlreadyThere, unit_doubt, walk_to
@@ -415,7 +415,7 @@ def _route_to_seat(start: Start, here: Stop, asked: _Request) -> Generator[float
         top = yield from within(before_a_top(room, whole, seats[0]), 0.1, 0.12)
         if top is not None:
             job = seats_of.steps(parts, top, start.floor, name, near, start.size, asked.tables)
-            seats = yield from within(job, 0.12, 0.15)
+            seats = towards_top((yield from within(job, 0.12, 0.15)), top)
 
     if here.seated and np.linalg.norm(seats[0].position - here.position) < _THERE:
         sits = AlreadyThere(f"The character sits on '{name}' already; choose another seat.")
