@@ -17,109 +17,34 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.arranged import SCENES, Arranged, Asked, asked_of
-from dafnet_addon import InputError, Mesh
+from benchmarks.arranged import SCENES, asked_of
+from dafnet_addon import InputError
 from dafnet_addon.core.limb_errors import limb_errors
-from dafnet_addon.core.skeleton import JOINTS, LIMBS
-from dafnet_addon.core.solids import BOX_CORNERS, BOX_TRIANGLES
+from dafnet_addon.core.skeleton import LIMBS
 
 if TYPE_CHECKING:
-    import bpy
+    from dafnet_addon.blender.delivery.rig_trial import RigTrial
 
-__all__ = ["furnish", "main", "sent_and_baked"]
+__all__ = ["main"]
 
 _TURNED, _OFF = 6.0, 2.0  # degrees, cm
-_FPS = 30
 
 
-def furnish(made: Arranged) -> None:
-    """Put a room's solids into the open scene."""
-    import bpy
-    from mathutils import Matrix
-
-    for solid in made.solids:
-        if isinstance(solid, Mesh):
-            points, faces, matrix = solid.vertices, solid.triangles, solid.matrix
-        else:
-            points, faces, matrix = BOX_CORNERS * solid.half_size, BOX_TRIANGLES, solid.matrices()
-        mesh = bpy.data.meshes.new(solid.name)
-        mesh.from_pydata(np.asarray(points).tolist(), [], np.asarray(faces).tolist())
-        each = bpy.data.objects.new(solid.name, mesh)
-        each.matrix_world = Matrix(np.asarray(matrix).tolist())
-        bpy.context.scene.collection.objects.link(each)
-    bpy.context.view_layer.update()
-
-
-def sent_and_baked(
-    made: Arranged, asked: Asked, start: tuple[float, float], file: Path
-) -> dict[str, Any]:
-    """Send a character as large as a rig to a seat and bake what she does there, in a new file:
-    degrees by which free limbs differ, cm by which contacts do, and what bake and verdict say.
+def _row_of(trial: "RigTrial") -> dict[str, Any]:
+    """Degrees by which free limbs and the trunk differ, cm by which contacts do, the most of each,
+    and what bake and verdict say.
     """
-    import bpy
-
-    from benchmarks.real_rig import real_rig
-    from dafnet_addon.blender.character.armature import character_scale, create_character
-    from dafnet_addon.blender.character.properties import ensure_registered
-    from dafnet_addon.blender.character.takes import stored_take
-    from dafnet_addon.blender.directing.walking import walk
-    from dafnet_addon.blender.pipeline import job
-    from dafnet_addon.blender.rig.baker import bake_onto_rig
-    from dafnet_addon.blender.rig.detection import detect_map
-    from dafnet_addon.blender.rig.doubts import doubts
-    from dafnet_addon.blender.rig.sizing import size_as_rig
-    from dafnet_addon.core.touching import touches
-
-    ensure_registered()
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    context, scene = bpy.context, bpy.context.scene
-    scene.render.fps = _FPS
-    scene.frame_start, scene.frame_end = 1, 10
-    furnish(made)
-    rig = real_rig(file)
-    rig_map = detect_map(rig)
-    character = create_character(context, "Ann")
-    size_as_rig(context, character, rig, rig_map)
-    character.dafnet.root.location = (*start, 0.0)
-    scene.cursor.location = (*(asked.near or (0.0, -99.0)), 0.0)
-    walk(context, character, bpy.data.objects[asked.name], 1.5, pull_out=True)
-    result = job.run(context, job.settings_of(character, scene))
-    baked = bake_onto_rig(context, character, rig, rig_map)
-
-    frames = range(scene.frame_start, scene.frame_end + 1)
-    ours, theirs = (
-        _played(character, list(JOINTS), frames),
-        _played(rig, [rig_map.place(name) for name in JOINTS], frames),
-    )
-    size = character_scale(character, 1.0)
-    known = stored_take(result.action)[0].touches
-    floor = np.zeros(len(frames))
-    held = np.maximum(touches(ours / size, float(_FPS), floor), known[: len(frames)])
-    free = {name: held[:, k] == 0.0 for k, name in enumerate(LIMBS)}
-    angles = {}
-    for limb, off in limb_errors(theirs, ours).items():
-        where = free.get(limb.replace(" ", "_"), np.ones(len(frames), bool))
-        angles[limb] = float(off[where].max(initial=0.0))
+    free = {name.replace("_", " "): trial.held[:, k] == 0.0 for k, name in enumerate(LIMBS)}
+    everywhere = np.ones(len(trial.held), bool)
     return {
-        "angles": {name: round(value, 1) for name, value in angles.items()},
-        "contacts": {part: round(100.0 * most, 1) for part, (_, most) in baked.errors.items()},
-        "said": list(doubts(baked)),
-        "verdict": [each.text for each in result.take.verdict if not each.good],
+        "angles": {
+            limb: round(float(off[free.get(limb, everywhere)].max(initial=0.0)), 1)
+            for limb, off in limb_errors(trial.theirs, trial.ours).items()
+        },
+        "contacts": {part: round(100.0 * most, 1) for part, (_, most) in trial.errors.items()},
+        "said": trial.said,
+        "verdict": trial.verdict,
     }
-
-
-def _played(armature: "bpy.types.Object", bones: Sequence[str | None], frames: range) -> np.ndarray:
-    """Where (T, 22, 3) bones begin, world, as Blender plays them; NaN where there is none."""
-    import bpy
-
-    found = np.full((len(frames), len(bones), 3), np.nan)
-    for k, frame in enumerate(frames):
-        bpy.context.scene.frame_set(frame)
-        shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        for j, bone in enumerate(bones):
-            if bone is not None:
-                found[k, j] = shown.matrix_world @ shown.pose.bones[bone].head
-    return found
 
 
 def faults_of(row: dict[str, Any]) -> list[str]:
@@ -130,9 +55,11 @@ def faults_of(row: dict[str, Any]) -> list[str]:
 
 def main(arguments: Sequence[str]) -> str:
     """Bake every take of the rooms; a line for each that is off or refused, and a summary."""
+    from dafnet_addon.blender.delivery.rig_trial import sent_and_baked
+
     parser = argparse.ArgumentParser("dafnet bench baked", description=__doc__)
     parser.add_argument("library", type=Path)
-    parser.add_argument("rig", type=Path, help="a rest pose (benchmarks.real_rig)")
+    parser.add_argument("rig", type=Path, help="a rest pose (blender.delivery.rig_trial)")
     parser.add_argument("rooms", nargs="*", metavar="ROOM", help="only these; all if left out")
     options = parser.parse_args(arguments)
     rows = []
@@ -141,7 +68,9 @@ def main(arguments: Sequence[str]) -> str:
         for asked, start in asked_of(made):
             row: dict[str, Any] = {"name": f"{room}: {asked.name} from {start}"}
             try:
-                row |= sent_and_baked(made, asked, start, options.rig)
+                row |= _row_of(
+                    sent_and_baked(made.solids, asked.name, asked.near, start, options.rig)
+                )
             except InputError as error:
                 row["refused"] = str(error)
             rows.append(row)

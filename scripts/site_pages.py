@@ -220,8 +220,8 @@ def _members(node: ast.ClassDef) -> Iterator[str]:
             default = f" = {ast.unparse(each.value)}" if each.value is not None else ""
             yield f"{ast.unparse(each.target)}: {ast.unparse(each.annotation)}{default}"
         elif isinstance(each, ast.FunctionDef) and not each.name.startswith("_"):
-            marks = [f"@{ast.unparse(mark)} " for mark in each.decorator_list]
-            yield f"{''.join(marks)}{_signature(each)}"
+            yield from (f"@{ast.unparse(mark)}" for mark in each.decorator_list)
+            yield _signature(each)
 
 
 def _command() -> str:

@@ -16,8 +16,7 @@ trap 'rm -rf "$work"; [[ -z ${mounted:-} ]] || umount "$debian/proc"' EXIT
 cp build/dafnet-*.zip "$work/dafnet.zip"
 cp -r tests/window "$work/drive"
 cp -r tests/kit "$work/drive/"
-mkdir "$work/drive/rigs" "$work/drive/benchmarks"
-cp benchmarks/real_rig.py "$work/drive/benchmarks/"
+mkdir "$work/drive/rigs"
 for rig in mixamo_gltf_woman vrm_b; do
     if [[ -n ${RIGS:-} ]]; then cp "$RIGS/$rig.json" "$work/drive/rigs/"; fi
 done

@@ -729,6 +729,6 @@ def _why_not_a_seat(solids: Sequence[Box | Mesh], name: str, size: float) -> str
             "character's size."
         )
     return (
-        f"'{name}' has no level surface between 22 and 85 cm over the floor to sit on; choose a "
-        "seat."
+        f"'{name}' has no level surface between {100 * _LOWEST * size:.0f} and "
+        f"{100 * _HIGHEST * size:.0f} cm over the floor to sit on; choose a seat."
     )

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+from bl_ext.user_default.dafnet.dafnet_addon.blender.delivery.rig_trial import real_rig
 from first_shot import progress
 
-from benchmarks.real_rig import real_rig
 from kit.window import Driver, Waits
 
 __all__ = ["seats"]

@@ -8,12 +8,11 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from bl_ext.user_default.dafnet.dafnet_addon.blender.delivery.rig_trial import furnish, real_rig
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, detection
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig.sizing import size_as_rig
 
 from benchmarks.arranged import SCENES, Arranged
-from benchmarks.baked import furnish
-from benchmarks.real_rig import real_rig
 from kit.places import LIBRARY, SHARED
 from kit.stage import Stage
 
@@ -27,7 +26,7 @@ def sent_and_baked(made: Arranged, number: int = 0, start: int = 0) -> tuple[Sta
     starts, and bake what she does there: the stage, the rig, and what was baked.
     """
     stage, asked = Stage(height=1.75, fps=30, furnished=False), made.asked[number]
-    furnish(made)
+    furnish(made.solids)
     rig = real_rig(RIG)
     rig_map = detection.detect_map(rig)
     size_as_rig(bpy.context, stage.ann, rig, rig_map)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import create_character
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.delivery.rig_trial import real_rig
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import detection, properties, reading
 from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.scene_reader import read_scene
 from bl_ext.user_default.dafnet.dafnet_addon.core import (
@@ -20,7 +21,6 @@ from bl_ext.user_default.dafnet.dafnet_addon.core import (
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import JOINTS
 
-from benchmarks.real_rig import real_rig
 from kit import humanoids
 from kit.places import SHARED
 from kit.rig_stage import RigStage
