@@ -2,10 +2,12 @@
 after the seat was moved.
 """
 
+from math import degrees, radians
 from pathlib import Path
 
 import bpy
 from first_shot import progress
+from mathutils import Vector
 
 from kit.window import Driver, Waits
 
@@ -89,11 +91,14 @@ def _own_room(user: Driver) -> Waits:
     end = character.dafnet.walks[0].last
     bpy.context.scene.frame_set(end)
     assert (character.dafnet.root.location.xy - stool.location.xy).length < 0.3, "to where it is"
+    character.dafnet.lean = radians(20.0)
     yield from _generated(user, 2)
     bpy.context.scene.frame_set(end)
     pelvis = character.matrix_world @ character.pose.bones["pelvis"].head
     assert (pelvis.xy - stool.location.xy).length < 0.3 and abs(pelvis.z - 0.57) < 0.1
     assert user.clicks - before == 2
+    trunk = character.matrix_world @ character.pose.bones["neck"].head - pelvis
+    print(f"Leans {degrees(trunk.angle(Vector((0.0, 0.0, 1.0)))):.0f} degrees", flush=True)
     yield from user.picture("redone_walk")
 
     # Keys that were edited are asked about: not by Esc, but by the button are they replaced.

@@ -1,8 +1,7 @@
-"""What is done with takes, with mouse and keys: a middle part anew, somebody looks at something, or
-leans, feet on their targets, a strip, an asset, a file.
+"""What is done with takes, with mouse and keys: a middle part anew, somebody looks at something,
+feet on their targets, a strip, an asset, a file.
 """
 
-from math import radians
 from pathlib import Path
 
 import bpy
@@ -56,14 +55,6 @@ def uses_of_takes(pictures: Path) -> Waits:
     yield from user.picture("look_at")
     own.look_at = None
 
-    own.lean = radians(15.0)
-    yield from user.click("dafnet.generate(task='NEW')")
-    yield from generated(4)
-    scene.frame_set(scene.frame_end - 20)
-    yield from user.picture("lean")
-    print([finding.text for finding in own.takes[3].action.dafnet.verdict], flush=True)
-    own.lean = 0.0
-
     own.mode = "EE"
     for role in ("head", "hand_left", "hand_right"):
         setattr(own, role, None)
@@ -71,7 +62,7 @@ def uses_of_takes(pictures: Path) -> Waits:
     own.foot_right.location.z += 0.15
     own.foot_right.location.y += 0.12
     yield from user.click("dafnet.generate(task='NEW')")
-    yield from generated(5)
+    yield from generated(4)
     scene.frame_set(scene.frame_end - 20)
     ankle = ann.matrix_world @ ann.pose.bones["right_ankle"].head
     off = (ankle - own.foot_right.location).length
