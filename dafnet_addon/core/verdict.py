@@ -88,8 +88,8 @@ def _seats(
         if episode.pelvis_height > _STANDS and over > 2 * _OFF_SEAT:
             yield Finding(
                 "stands",
-                f"Stands in '{name}' {when} and does not sit down; is it a seat, and does the root "
-                "rest on its level part?",
+                f"Stands in '{name}' {when} and does not sit down; where the root rests on the "
+                "level part of a seat, make other takes at temperature 1",
                 good=False,
             )
         elif abs(over) <= _OFF_SEAT:
