@@ -5,6 +5,7 @@ seat, and what she does there is baked.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -69,8 +70,10 @@ def real_rig(file: Path) -> bpy.types.Object:
     return armature
 
 
-def furnish(solids: Sequence[Box | Mesh]) -> None:
-    """Put solids into the open scene, as objects of their names."""
+def furnish(solids: Sequence[Any]) -> None:
+    """Put boxes and meshes into the open scene, as objects of their names; also those of another
+    copy of this package.
+    """
     for solid in solids:
         if hasattr(solid, "half_size"):
             points, faces, matrix = BOX_CORNERS * solid.half_size, BOX_TRIANGLES, solid.matrices()
