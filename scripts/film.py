@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Joins pictures into a film that pages and READMEs show: an animated WebP.
 
-    scripts/film.py out/cafe/truth/frames/*.png -o docs/guide/cafe.webp --seconds 22
+    scripts/film.py out/cafe/truth/frames/*.png -o docs/films/cafe.webp --seconds 22
 
 The pictures are joined as they are named, as ``dafnet populate --render frames`` and
 ``scripts/window.sh … films`` write them. Needs Pillow.
@@ -14,11 +14,21 @@ from pathlib import Path
 from PIL import Image
 
 
-def film(pictures: list[Path], out: Path, *, seconds: float, width: int, quality: int) -> None:
-    """Write ``pictures`` as a film of ``seconds`` that begins anew, ``width`` pixels wide."""
+def film(
+    pictures: list[Path],
+    out: Path,
+    *,
+    seconds: float,
+    width: int,
+    quality: int,
+    crop: tuple[int, int, int, int] | None,
+) -> None:
+    """Write ``pictures`` as a film of ``seconds`` that begins anew, ``width`` pixels wide, of the
+    part of them between the pixels ``crop``.
+    """
     images = []
     for picture in pictures:
-        image = Image.open(picture).convert("RGB")
+        image = Image.open(picture).convert("RGB").crop(crop)
         size = (width, round(image.height * width / image.width))
         images.append(image.resize(size, Image.Resampling.LANCZOS))
 
@@ -43,6 +53,9 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, required=True, help="of the whole film")
     parser.add_argument("--width", type=int, default=720, help="pixels")
     parser.add_argument("--quality", type=int, default=60, help="0 to 100")
+    parser.add_argument(
+        "--crop", type=int, nargs=4, metavar=("LEFT", "TOP", "RIGHT", "BOTTOM"), help="pixels"
+    )
     options = parser.parse_args()
 
     missing = [picture for picture in options.pictures if not picture.is_file()]
@@ -54,6 +67,7 @@ def main() -> None:
         seconds=options.seconds,
         width=options.width,
         quality=options.quality,
+        crop=options.crop and tuple(options.crop),
     )
     size = options.output.stat().st_size / 1e6
     print(f"{options.output}: {len(options.pictures)} pictures, {size:.1f} MB")

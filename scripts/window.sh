@@ -27,7 +27,11 @@ if [[ -n $debian ]]; then
     mountpoint -q "$debian/proc" || { mount -t proc proc "$debian/proc"; mounted=1; }
     run=(chroot "$debian" "${run[@]}")
 fi
-"${run[@]}" blender --command extension install-file -r user_default -e "$inside/dafnet.zip" >/dev/null
+if [[ ${parts[*]} == stranger ]]; then # installs it from a repository's address
+    scripts/repository.sh .venv/bin/python "$work/repository" build/dafnet-*.zip >/dev/null
+else
+    "${run[@]}" blender --command extension install-file -r user_default -e "$inside/dafnet.zip" >/dev/null
+fi
 "${run[@]}" xvfb-run -a -s "-screen 0 1600x1000x24 +extension GLX" blender --enable-event-simulate --no-window-focus \
     --python-exit-code 1 --window-geometry 0 0 1600 1000 --python "$inside/drive/drive.py" -- "$inside/pictures" "${parts[@]}" 2>&1 |
     tee "$work/log"

@@ -20,6 +20,7 @@ from interruptions import interruptions
 from live import live
 from seats import seats
 from slow_redraw import slow_redraw
+from stranger import stranger
 from uses_of_takes import uses_of_takes
 
 from kit import humanoids
@@ -35,8 +36,13 @@ PARTS: dict[str, Callable[[Path], Waits]] = {
     "clicks": clicks,
     "first_shot": lambda pictures: first_shot(pictures, humanoids),
 }
-ONLY_NAMED: dict[str, Callable[[Path], Waits]] = {"films": films}
-"""Parts that try nothing out."""
+ONLY_NAMED: dict[str, Callable[[Path], Waits]] = {
+    "films": films,
+    "stranger": lambda pictures: stranger(
+        pictures, humanoids, (pictures.parent / "repository" / "index.json").as_uri()
+    ),
+}
+"""Parts that are played where they are named, alone."""
 
 
 def everything() -> Waits:

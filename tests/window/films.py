@@ -1,9 +1,10 @@
-"""Films of the guide, picture by picture: the first shot, from the Add menu's example to its take,
+r"""Films of the pages, picture by picture: the first shot, from the Add menu's example to its take,
 and somebody who was led live.
 
     scripts/window.sh out/films DEBIAN films
-    scripts/film.py out/films/first_shot_*.png -o docs/guide/first_shot.webp --seconds 14
-    scripts/film.py out/films/live_*.png -o docs/guide/live.webp --seconds 12
+    scripts/film.py out/films/first_shot_*.png -o docs/films/first_shot.webp --seconds 11 \
+        --crop 0 20 790 560
+    scripts/film.py out/films/live_*.png -o docs/films/live.webp --seconds 12 --crop 0 20 790 560
 """
 
 from pathlib import Path
@@ -16,12 +17,9 @@ from kit.window import Driver, Waits
 
 __all__ = ["films"]
 
-_EVERY = 4
-"""Frames of the scene between two pictures."""
-
 
 def films(pictures: Path) -> Waits:
-    """A picture of every fourth frame of both."""
+    """Pictures of both."""
     user = Driver(pictures)
     yield from user.press("ESC")  # the splash screen
     yield from _first_shot(user)
@@ -34,10 +32,10 @@ def _emptied(user: Driver) -> None:
         bpy.ops.object.delete()
 
 
-def _played(user: Driver, name: str, first: int) -> Waits:
-    """A picture of every fourth frame of the scene, numbered from ``first`` on."""
+def _played(user: Driver, name: str, first: int, every: int) -> Waits:
+    """A picture of ``every`` so many frames of the scene, numbered from ``first`` on."""
     scene = bpy.context.scene
-    for number, frame in enumerate(range(1, scene.frame_end + 1, _EVERY)):
+    for number, frame in enumerate(range(1, scene.frame_end + 1, every)):
         scene.frame_set(frame)
         yield from user.picture(f"{name}_{first + number:03d}", width=960, colours=256)
 
@@ -54,7 +52,7 @@ def _first_shot(user: Driver) -> Waits:
     yield from user.until(lambda: (progress() or 0.0) > 0.5, "the middle of the job")
     yield from user.picture("first_shot_001", width=960, colours=256)
     yield from user.until(lambda: len(character.dafnet.takes) == 1, "the take")
-    yield from _played(user, "first_shot", 2)
+    yield from _played(user, "first_shot", first=2, every=4)
 
 
 def _live(user: Driver) -> Waits:
@@ -86,4 +84,4 @@ def _live(user: Driver) -> Waits:
     yield from user.until(lambda: not running(), "the end of Live", 60.0)
     yield 0.5
     bpy.context.scene.frame_end = int(character.dafnet.root.animation_data.action.frame_range[1])
-    yield from _played(user, "live", 0)
+    yield from _played(user, "live", first=0, every=12)
