@@ -50,7 +50,7 @@ from dafnet_addon.training.evaluation.clips import (
 from dafnet_addon.training.evaluation.markdown import markdown_table
 from dafnet_addon.training.export import export
 from dafnet_addon.training.parts import load_run, trained_networks
-from dafnet_addon.training.processes import pool_of
+from dafnet_addon.training.processes import new_processes
 from dafnet_addon.training.train import train, train_part
 from dafnet_addon.training.validation import held_out_losses
 
@@ -116,7 +116,7 @@ def measure_variant(
     if not checkpoint_file(folder, "predictor").exists():
         shutil.copy(predictor, folder)
 
-    with pool_of(2) as pool:
+    with new_processes(2) as pool:
         jobs = [
             pool.submit(_train, part, dataset, folder, model, training, begin_with)
             for part in ("upper", "lower")

@@ -10,14 +10,14 @@ from typing import Any
 
 from ..core.threads import cores
 
-__all__ = ["map_in_processes", "pool_of"]
+__all__ = ["map_in_processes", "new_processes"]
 
 
 def _do_nothing() -> None:
     pass
 
 
-def pool_of(processes: int, start: Callable[[], None] = _do_nothing) -> ProcessPoolExecutor:
+def new_processes(processes: int, start: Callable[[], None] = _do_nothing) -> ProcessPoolExecutor:
     """So many new processes, each of which first calls ``start``, and none of which outlives this
     one, be it killed.
     """
@@ -57,7 +57,7 @@ def map_in_processes(
             yield result
         return
 
-    with pool_of(processes, start) as pool:
+    with new_processes(processes, start) as pool:
         for done, result in enumerate(pool.map(task, items)):
             progress((done + 1) / len(items))
             yield result

@@ -30,7 +30,7 @@ from .checkpoints import BEFORE_COOLING, checkpoint_file
 from .config import TrainingConfig
 from .export import adopted_statistics
 from .parts import FlowRun, PredictorRun, load_run, new_run, resumed_run
-from .processes import pool_of
+from .processes import new_processes
 from .run import Run
 from .steps import clock_of, dataset_pool, descend, held_out_pool, mean_loss
 
@@ -76,7 +76,7 @@ def train(
         return
 
     threads = max(1, min(torch.get_num_threads(), cores()) // len(parts))
-    with pool_of(len(parts)) as pool:
+    with new_processes(len(parts)) as pool:
         begin = time.monotonic()
         jobs = [pool.submit(train_one, part, threads=threads) for part in parts]
         while wait(jobs, timeout=2.0).not_done:
