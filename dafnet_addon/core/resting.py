@@ -133,8 +133,8 @@ def resting(
     pelvis, rate = joints[:, PELVIS], fps / MODEL_FPS
     speed = np.zeros(len(joints))
     if len(joints) > 1:
-        settled = gaussian(pelvis, _SETTLED * rate)
-        speed = np.linalg.norm(np.gradient(settled, axis=0), axis=-1) * fps
+        smooth = gaussian(pelvis, _SETTLED * rate)
+        speed = np.linalg.norm(np.gradient(smooth, axis=0), axis=-1) * fps
     over = pelvis[:, 2] - carried
     there = (over > -_SINKS) & (over < _HOVERS) & (speed < _STILL)
     return runs(there, at_least=min(round(_RESTS * rate), len(joints)), gap=round(_STIRS * rate))

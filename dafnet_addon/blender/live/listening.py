@@ -16,7 +16,7 @@ from ...core.errors import DafnetError
 from ...core.progress import run_to_end
 from ..overlay import display
 from ..pipeline.job import Result
-from ..pipeline.lent import LentPreference
+from ..pipeline.lent_preference import LentPreference
 from .keeping import keep_clips
 from .session import LiveSession
 

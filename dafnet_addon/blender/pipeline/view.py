@@ -2,7 +2,7 @@
 
 import bpy
 
-from .lent import LentPreference
+from .lent_preference import LentPreference
 
 __all__ = ["DrawnOnce"]
 

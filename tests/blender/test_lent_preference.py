@@ -4,8 +4,8 @@ from types import ModuleType
 
 import bpy
 import pytest
-from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import lent
-from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.lent import LentPreference
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import lent_preference
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.lent_preference import LentPreference
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.view import DrawnOnce
 
 
@@ -13,7 +13,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.view import DrawnO
 def shown(blender: ModuleType, monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Whether a window shows the preferences, as this says: the module has no windows."""
     is_shown = [False]
-    monkeypatch.setattr(lent, "_shown", lambda: is_shown[0])
+    monkeypatch.setattr(lent_preference, "_shown", lambda: is_shown[0])
     return is_shown
 
 
