@@ -441,7 +441,6 @@ TOOLTIPS = {
         "Am Möbel merken, wo man sitzt, als eigene Eigenschaft OMI_seat, die glTF-Dateien "
         "mitnehmen; das nächste Mal zählt sie"
     ),
-    "How long it stays there, in seconds": "Wie lange sie dort bleibt, in Sekunden",
     (
         "Walk to the selected bed or sofa, sit down on its edge and lie down: root, targets "
         "and modes are keyed from the start of the range on. Keys that you have edited are "

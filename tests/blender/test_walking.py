@@ -19,6 +19,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import (
     walking,
 )
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import running
+from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.view import DrawnOnce
 from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.scene_reader import read_scene
 from bl_ext.user_default.dafnet.dafnet_addon.blender.showcase.demo_room import build_room
 from bl_ext.user_default.dafnet.dafnet_addon.blender.showcase.examples import add_example
@@ -640,7 +641,7 @@ def test_esc_ends_a_walk_and_leaves_the_scene_as_it_was(room: Room) -> None:
 
         def _listen(self, context) -> None:
             self._timer = context.window_manager.event_timer_add(0.01, window=context.window)
-            self._running = running.begin_job()
+            self._running, self._view = running.begin_job(), DrawnOnce()
 
         def event(self, kind: str) -> set[str]:
             return self.modal(bpy.context, SimpleNamespace(type=kind))

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -66,6 +65,7 @@ from dafnet_addon.training.noise import (  # noqa: E402
     take_noise,
 )
 from dafnet_addon.training.parts import load_run, new_run, trained_networks  # noqa: E402
+from dafnet_addon.training.processes import new_processes  # noqa: E402
 from dafnet_addon.training.run import Run  # noqa: E402
 from dafnet_addon.training.train import train_part  # noqa: E402
 
@@ -656,8 +656,8 @@ def test_what_a_run_cannot_be_trained_with_is_said(dataset, tmp_path, capsys):
 
 
 def test_a_process_that_was_ended_from_outside_is_told(dataset, tmp_path, monkeypatch):
-    ended = partial(ProcessPoolExecutor, initializer=os._exit, initargs=(9,))
-    monkeypatch.setattr(training, "ProcessPoolExecutor", ended)
+    ended = partial(new_processes, start=partial(os._exit, 9))
+    monkeypatch.setattr(training, "new_processes", ended)
     with pytest.raises(InputError, match="give the same command again"):
         training.train(dataset, tmp_path, replace(TINY, system="moglow"), _config(1))
 
