@@ -275,11 +275,11 @@ def _finished_steps(
     motion = _eased(bent(joints), poses, unchanged, shot)
     yield 0.2
     own = at_own_rate(motion)
-    metrics = raw = judged(on_joints(own))
+    before, lean = on_joints(own), None
+    metrics = raw = judged(before)
     yield 0.4
     looked_at, counts = _looked_at(controls)
     leans = np.radians(0.0 if controls.lean is None else np.asarray(controls.lean, float))
-    before, lean = on_joints(own), None
     if clean_up.asked or counts.any() or leans.any():
         joints = before
         if clean_up.asked:

@@ -114,7 +114,7 @@ def switch(kind: str, on: bool) -> None:
 
 
 def suggest(kind: str) -> None:
-    """Turn a kind on, unless it was turned off in this session."""
+    """Turn a kind on, unless it was turned off since Blender was started."""
     if kind not in _declined and kind not in _on:
         switch(kind, True)
 
