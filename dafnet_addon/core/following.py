@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .paths import AFTER_SEAT, BEFORE_SEAT, GETS_UP, SITS_DOWN
+from .paths import AFTER_SEAT, BEFORE_SEAT, GETS_UP, SEATED_WAY, SITS_DOWN, pace_at_seat
 from .root import forward_of, yaw_of
 from .series import MODEL_FPS, smoothstep
 
@@ -42,8 +42,6 @@ _ALIGNED = 0.16  # metres beside the way to a seat
 _BEFORE = (0.3, BEFORE_SEAT + 0.15)  # metres before a seat, between which one begins to sit down
 _FACES = np.radians(35.0)  # from the way that one sits
 _TURNS_AWAY = 0.20  # metres before a seat, where the heading lets go
-_SEATED_WAY = 0.25  # metres before a seat, in which one sits down or gets up
-_ROOT_TIME = 1.87  # of the root for that way, over the pelvis' for 80 % of its own
 _CARROT = 0.7  # metres by which what is led along a way is ahead of the body
 _SPACED = 0.05  # metres between two points of a way
 _AROUND = 0.75  # metres beside a seat, where who comes from behind it passes
@@ -157,12 +155,12 @@ class RootFollower:
         """
         assert self.seat is not None
         from_seat = float(np.linalg.norm(self.position[:2] - self.seat.position))
-        seconds = GETS_UP if self._leaves else SITS_DOWN
-        slow = 2.0 * _SEATED_WAY / (_ROOT_TIME * seconds) ** 2
-        begins = 0.08 if self._leaves else 0.02
-        return float(np.sqrt(2.0 * slow * (min(from_seat, _SEATED_WAY) + begins))) + max(
-            0.0, from_seat - _SEATED_WAY
+        pace = (
+            pace_at_seat(GETS_UP, down=False)
+            if self._leaves
+            else pace_at_seat(SITS_DOWN, down=True)
         )
+        return pace + max(0.0, from_seat - SEATED_WAY)
 
     def _bound_for(
         self, goal: np.ndarray, yaw: float, seats: Sequence[Seat]

@@ -84,8 +84,8 @@ def test_refuses_paths_that_cannot_be_walked() -> None:
 
 @pytest.mark.parametrize("seconds", [0.8, 1.3, 2.0])
 def test_a_root_tells_how_long_sitting_down_and_getting_up_take(seconds: float) -> None:
-    """Captured roots take 1.18 times as long for 80 % of their last quarter of a metre as the
-    pelvis takes for 80 % of its way down.
+    """Captured roots go the last quarter of a metre at an even pace: they take 1.22 times as long
+    for 80 % of it as the pelvis for 80 % of its way down, as long as it on its way up.
     """
     seat = replace(SEAT, sits_down=seconds, gets_up=seconds)
     walked = route(FROM_SIDE, seat, Stop((3.0, 2.0), 0.0, 1.0))
@@ -93,8 +93,11 @@ def test_a_root_tells_how_long_sitting_down_and_getting_up_take(seconds: float) 
     away = np.linalg.norm(walked.path.position[:, :2], axis=1)
     comes = (away[: rest.start] > 0.025) & (away[: rest.start] < 0.225)
     goes = (away[rest.stop :] > 0.025) & (away[rest.stop :] < 0.225)
-    assert comes.sum() / 30 == pytest.approx(1.18 * seconds, rel=0.06)
-    assert goes.sum() / 30 == pytest.approx(1.18 * seconds, rel=0.06)
+    assert comes.sum() / 30 == pytest.approx(1.22 * seconds, rel=0.06)
+    assert goes.sum() / 30 == pytest.approx(1.0 * seconds, rel=0.06)
+
+    pace = 30 * np.abs(np.diff(away[: rest.start]))[comes[1:]]
+    assert pace.max() < 1.2 * pace.mean()
 
 
 def test_people_take_their_time_unless_they_are_asked_not_to() -> None:
@@ -120,7 +123,7 @@ def test_a_captured_sit_down_moves_alike() -> None:
 
     captured = root_from_joints(joints)
     rest = 170
-    made = route(FROM_SIDE, replace(SEAT, sits_down=0.55))  # as long as that person takes
+    made = route(FROM_SIDE, replace(SEAT, sits_down=0.4))  # that person comes fast, and takes 0.55 s
     path = smoothed(made.path)
     seconds = np.arange(-30, 1)
 
