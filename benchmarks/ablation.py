@@ -35,7 +35,7 @@ from dafnet_addon.core.weights import Weights, load_weights
 from dafnet_addon.data.dataset.prepare import prepare
 from dafnet_addon.data.held_out.captured import HeldClip, held_out
 from dafnet_addon.data.held_out.real import real_test
-from dafnet_addon.model.config import SMALL, ModelConfig
+from dafnet_addon.model.config import AHEAD_SIZE, SMALL, ModelConfig
 from dafnet_addon.training import precision
 from dafnet_addon.training.checkpoints import checkpoint_file
 from dafnet_addon.training.config import TrainingConfig
@@ -54,7 +54,7 @@ from dafnet_addon.training.processes import new_processes
 from dafnet_addon.training.train import train, train_part
 from dafnet_addon.training.validation import held_out_losses
 
-MODEL = replace(SMALL, width=96, code=96, ahead=18)
+MODEL = replace(SMALL, width=96, code=96, ahead=AHEAD_SIZE)
 TRAINING = TrainingConfig(batch=32, free_run=1.0, mixed=True, dropout_windows=0.5)
 VARIANTS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "all that ships": ({}, {}),

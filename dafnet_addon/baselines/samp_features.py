@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from ..core.kinematics import fit
-from ..core.root import RootPath
+from ..core.root import AHEAD, RootPath
 from ..core.rotations import rotate, yaw_matrix
 from ..core.series import MODEL_FPS, runs
 from ..core.skeleton import SEAT_TO_PELVIS, joint
@@ -292,7 +292,8 @@ def _window_root(root: np.ndarray, velocity: np.ndarray, ahead: np.ndarray) -> n
         step = np.concatenate([velocity[:, i, :2], np.zeros((len(root), 1))], axis=1)
         out[:, i, :2] = out[:, i + 1, :2] - rotate(yaw_matrix(out[:, i, 2]), step)[:, :2]
 
-    way = ahead[:, 40:, -3:]
+    last = 3 * AHEAD.index(_SECOND)
+    way = ahead[:, 40:, last : last + 3]
     step = np.concatenate([way[..., :2], np.zeros_like(way[..., :1])], axis=-1)
     out[:, 81:, :2] = root[:, 40:, :2] + rotate(yaw_matrix(root[:, 40:, 2]), step)[..., :2]
     out[:, 81:, 2] = root[:, 40:, 2] + way[..., 2]

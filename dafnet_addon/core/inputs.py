@@ -29,7 +29,7 @@ class Inputs(Protocol):
         """Of all frames at once: what the nets are given of the root (T, n), and what ``at`` needs
         of the scene (T, m).
 
-        ``velocities`` (T, 33): up to now; ``way`` (T, 3 [+ 18 [+ 1]]): the last of them, the way
+        ``velocities`` (T, 33): up to now; ``way`` (T, 3 [+ 24 [+ 1]]): the last of them, the way
         ahead, and whether it is known.
         """
         ...

@@ -95,7 +95,7 @@ class Sizes:
 @dataclass(frozen=True)
 class Normalisation:
     """Mean and deviation of poses (66,) in the model's order, of velocities (3,) and of the way
-    ahead (18,), or (0,) of a model without.
+    ahead (24,), or (0,) of a model without.
     """
 
     pose_mean: np.ndarray
@@ -282,8 +282,8 @@ def _sizes(weights: Weights, system: System) -> Sizes:
         steps={part: size(f"steps_{part}", _MAX_STEPS) for part in system.partition},
         ahead=read(
             "ahead",
-            lambda value: type(value) is int and value in (0, _AHEAD_SIZE),
-            f"0 or {_AHEAD_SIZE}",
+            lambda value: type(value) is int and value in range(0, _AHEAD_SIZE + 1, 3),
+            f"a multiple of 3 from 0 to {_AHEAD_SIZE}",
             0,
         ),
         mask=switch("mask"),

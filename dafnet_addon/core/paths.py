@@ -58,8 +58,8 @@ _RISE = 0.9  # from where one has got up
 SEATED_WAY = 0.25
 """Metres over the floor before a seat, that are gone while one sits down or gets up."""
 
-# Metres that the root goes, at an even pace, while the pelvis does the middle 80 % of its way: down,
-# from 0.24 before the seat to 0.07, and up again. Medians of 125 captured sit-downs and 139
+# Metres that the root goes, at an even pace, while the pelvis does the middle 80 % of its way
+# down, from 0.24 before the seat to 0.07, or up. Medians of 125 captured sit-downs and 139
 # stand-ups, alike where they are retimed to take 0.8 to 2 s and smoothed as drawn paths are.
 _GONE_DOWN, _GONE_UP = 0.165, 0.20
 

@@ -35,8 +35,9 @@ YAW_SIGMA = 6.0
 """The same of the one over its yaw."""
 
 _MAX_TURN = np.radians(15.0)  # in a frame
-AHEAD = (5, 10, 15, 20, 25, 30)
-"""How far ahead the model is told of the root, in 30-fps frames."""
+AHEAD = (5, 10, 15, 20, 25, 30, 45, 60)
+"""How far ahead the model is told of the root, in 30-fps frames: as far as it takes to see where
+one will have sat down. Weights that were trained on fewer are told of the first of them."""
 
 
 def yaw_of(direction: np.ndarray) -> np.ndarray:
@@ -175,7 +176,7 @@ def velocities(path: RootPath) -> np.ndarray:
 
 
 def ahead(path: RootPath) -> np.ndarray:
-    """Where the root will be (T, 18): right, forward (metres) and turn (radians) from R^τ to each
+    """Where the root will be (T, 24): right, forward (metres) and turn (radians) from R^τ to each
     of ``AHEAD`` frames later.
 
     Beyond its end the path goes on as it last moved. Not in the paper; in Blender the whole path is

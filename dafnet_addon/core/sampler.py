@@ -37,7 +37,7 @@ class Conditions:
     """What the model is given at each of T frames, 30 a second, in the target root's frame R^τ
     (paper, section 4.1).
 
-    ``velocity`` (T, 3): c_vel, metres and radians per frame. ``ahead`` (T, 18): where the root will
+    ``velocity`` (T, 3): c_vel, metres and radians per frame. ``ahead`` (T, 24): where the root will
     be (``root.ahead``), for models that are given it; NaN where nobody knows. ``occupancy`` (T,
     2640): c_env. ``observation`` (T, 66): c_ob, positions in metres in the model's order; what is
     not ``given`` (T, 22) is ignored.
@@ -322,7 +322,7 @@ class Sampler:
         return np.concatenate([observation[:, ~made], *mask], axis=1)
 
     def _way_ahead(self, conditions: Conditions) -> np.ndarray:
-        """What the nets are given of the way ahead (T, 0), (T, 18), or (T, 19) with whether it is
+        """What the nets are given of the way ahead (T, 0), (T, 24), or (T, 25) with whether it is
         known.
 
         Raises InputError where it is not known to a model that was always given it.
@@ -337,7 +337,7 @@ class Sampler:
         if not known.all():
             raise InputError(
                 f"The weights '{self.weights.path}' have to know where the root goes during the "
-                "next second; give its whole path, or choose weights for a live root."
+                "next seconds; give its whole path, or choose weights for a live root."
             )
 
         return way

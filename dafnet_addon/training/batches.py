@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ..core.errors import InputError
 from ..core.sensor import RADIUS, REACH, SPHERES
 from ..core.skeleton import (
     END_EFFECTORS,
@@ -26,7 +27,7 @@ from ..data.capture.archive import mapped_arrays
 from ..data.dataset.prepare import POSE_UNIT, load_pool
 from ..data.furnish.flesh import NO_BANK
 from ..data.furnish.shapes import ShapeBank
-from ..model.config import ModelConfig
+from ..model.config import AHEAD_SIZE, ModelConfig
 from .placed_shapes import DeviceBank
 
 __all__ = [
@@ -58,7 +59,7 @@ _LEGS_ALONE = 0.3  # share of those, in which the upper body is not
 
 @dataclass(frozen=True)
 class Statistics:
-    """Mean and deviation of poses (66, upper first), velocities (3) and the way ahead (18);
+    """Mean and deviation of poses (66, upper first), velocities (3) and the way ahead (24);
     deviations floored.
     """
 
@@ -93,7 +94,7 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Batch:
-    """``past`` (B, T, 693); ``upper`` (B, T, 42), ``lower`` (B, T, 24); ``root`` (B, T, 3 [+ 18
+    """``past`` (B, T, 693); ``upper`` (B, T, 42), ``lower`` (B, T, 24); ``root`` (B, T, 3 [+ 24
     [+ 1]]): velocity, way ahead, and 1, since it is known; all standardised; ``seen``
     (B, T, 2640): what the sensor sees in bytes, 255 of which are 1; ``step`` (B, T, 3): the
     velocity in metres and radians.
@@ -175,10 +176,17 @@ class Pool:
         return int(self.ends[-1]) if len(self.ends) else 0
 
     def refresh(self) -> None:
-        """Read the shards that were not there before."""
+        """Read the shards that were not there before. Raises InputError where one was made for
+        networks that look less far ahead.
+        """
         for file in self.files():
             if file not in self.shards:
                 self.shards[file] = mapped_arrays(file)
+                if self.shards[file]["ahead"].shape[-1] != AHEAD_SIZE:
+                    raise InputError(
+                        f"The windows '{file}' were made by another version, which looked less far "
+                        "ahead; make the dataset anew with 'dafnet prepare'."
+                    )
                 if on_disk(self.device):
                     self.shards[file]["seen"] = seen(file, self.bank)
                 elif self._has_room():

@@ -37,6 +37,8 @@ def tensors_of(
     out: dict[str, np.ndarray] = {
         name: value.astype(np.float32) for name, value in asdict(statistics).items()
     }
+    for name in ("ahead_mean", "ahead_std"):
+        out[name] = out[name][: flow.config.ahead]
     for name, tensor in predictor.state_dict().items() if predictor is not None else ():
         out[f"predictor.{name}"] = tensor.numpy()
 
@@ -93,19 +95,18 @@ def adopt_part(part: PartFlow, name: str, weights: Weights, config: ModelConfig)
     """Give the flow's part ``name`` what a weights file of the same or smaller sizes holds. Raises
     WeightsError where they do not fit.
 
-    Weights without inputs for the root's way ahead, or for whether that is known, serve a model
-    that has them: these start at zero.
+    Weights that are told less of the root's way ahead, or not whether it is known, serve a model
+    that is: these inputs start at zero.
     """
     for key, target in part.encoders.state_dict().items():
         _copy_into_wider(weights, key, weights.require(f"{name}.encoders.{key}"), target)
 
     model = weights.config["model"]
-    given = int(model.get("ahead", 0)) + bool(model.get("ahead_mask", False))
-    wanted = config.ahead + config.ahead_mask
-    if given not in (0, config.ahead, wanted):
+    told, masked = int(model.get("ahead", 0)), bool(model.get("ahead_mask", False))
+    if told > config.ahead or masked > config.ahead_mask:
         raise WeightsError(
-            f"The weights '{weights.path}' read the root's way ahead in another form; choose "
-            "another file."
+            f"The weights '{weights.path}' are told more of the root's way ahead than this model; "
+            "choose others, or a configuration with as much 'ahead'."
         )
 
     for k, (norm, linear, coupling) in enumerate(part.steps()):
@@ -119,19 +120,22 @@ def adopt_part(part: PartFlow, name: str, weights: Weights, config: ModelConfig)
 
         for key, target in coupling.state_dict().items():
             array = weights.require(f"{prefix}.{key}")
-            if key == "lstm.weight_ih_l0" and given < wanted:
-                way = coupling.passes + config.actions + VELOCITY_SIZE
-                array = np.insert(array, [way + given] * (wanted - given), 0.0, axis=1)
+            if key == "lstm.weight_ih_l0":
+                end = coupling.passes + config.actions + VELOCITY_SIZE + told
+                new = [end] * (config.ahead - told) + [end + masked] * (config.ahead_mask - masked)
+                array = np.insert(array, new, 0.0, axis=1)
             _copy_into_wider(weights, f"{prefix}.{key}", array, target)
 
 
 def adopted_statistics(weights: Weights, found: Statistics) -> Statistics:
     """What a weights file standardises with; what was ``found`` where it has nothing, as older
-    files have not for the way ahead.
+    files have not for all of the way ahead.
     """
-    return Statistics(
-        **{name: weights.tensors.get(name, value) for name, value in asdict(found).items()}
-    )
+    values = {name: value.copy() for name, value in asdict(found).items()}
+    for name, value in values.items():
+        own = weights.tensors.get(name, value[:0])
+        value[: len(own)] = own
+    return Statistics(**values)
 
 
 def export(

@@ -204,7 +204,7 @@ class FlowRun(Run):
         return base
 
     def root_inputs(self, root: Tensor) -> Tensor:
-        """The root (B, T, 3 [+ 18 [+ 1]]) with its way ahead hidden in some windows: a root that is
+        """The root (B, T, 3 [+ 24 [+ 1]]) with its way ahead hidden in some windows: a root that is
         led live has none yet.
         """
         if not self.model.ahead_mask:

@@ -52,7 +52,7 @@ def test_single_steps_give_what_a_run_gives() -> None:
     rng = np.random.default_rng(0)
     conditions = Conditions(
         velocity=rng.normal(0.0, 0.01, (frames, 3)),
-        ahead=np.full((frames, 18), np.nan),
+        ahead=np.full((frames, 24), np.nan),
         occupancy=(rng.random((frames, 2640)) < 0.1).astype(float),
         observation=rng.normal(0.0, 0.5, (frames, 66)),
         given=(rng.random((frames, 22)) < 0.1).astype(float),

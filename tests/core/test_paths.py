@@ -123,7 +123,9 @@ def test_a_captured_sit_down_moves_alike() -> None:
 
     captured = root_from_joints(joints)
     rest = 170
-    made = route(FROM_SIDE, replace(SEAT, sits_down=0.4))  # that person comes fast, and takes 0.55 s
+    made = route(
+        FROM_SIDE, replace(SEAT, sits_down=0.4)
+    )  # that person comes fast, and takes 0.55 s
     path = smoothed(made.path)
     seconds = np.arange(-30, 1)
 

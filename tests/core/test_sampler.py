@@ -22,7 +22,7 @@ def _conditions(frames: int, seed: int = 0) -> Conditions:
     given = np.zeros((frames, 22))
     given[frames // 3 : frames // 2, 12:14] = 1.0
     observation = np.tile(rng.normal(size=66) * 0.1 + np.tile([0.0, 0.2, 1.0], 22), (frames, 1))
-    return Conditions(smooth, np.repeat(smooth, 6, axis=1), occupancy, observation, given)
+    return Conditions(smooth, np.repeat(smooth, 8, axis=1), occupancy, observation, given)
 
 
 def test_orders_are_inverse():
@@ -51,7 +51,7 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
         code=8,
         shared_encoder=False,
         mask=True,
-        ahead=18,
+        ahead=24,
     )
     flow, predictor = BodyFlow(config), ActionPredictor(config)
     with torch.no_grad():
@@ -63,8 +63,8 @@ def test_frame_by_frame_equals_the_model_in_float64(tmp_path: Path):
         rng.uniform(0.1, 0.3, 66),
         rng.normal(size=3) * 0.01,
         np.full(3, 0.02),
-        rng.normal(size=18) * 0.1,
-        np.full(18, 0.2),
+        rng.normal(size=24) * 0.1,
+        np.full(24, 0.2),
     )
     flow.double(), predictor.double()
     tensors = tensors_of(flow, predictor, statistics)
@@ -147,8 +147,8 @@ def test_frame_by_frame_the_baselines_equal_their_models(system: str, tmp_path: 
         rng.uniform(0.1, 0.3, 66),
         rng.normal(size=3) * 0.01,
         np.full(3, 0.02),
-        np.zeros(18),
-        np.ones(18),
+        np.zeros(24),
+        np.ones(24),
     )
     tensors = tensors_of(flow, predictor, statistics)
     description = {"model": config.as_dict(), "fps": 30, "offsets": OFFSETS.tolist()}
@@ -320,7 +320,7 @@ def test_poses_that_are_no_bodys_are_refused_before_they_are_shown(weights):
     sampler, shown = Sampler(far), []
     conditions = Conditions(
         np.zeros((3, 3)),
-        np.zeros((3, 18)),
+        np.zeros((3, 24)),
         np.zeros((3, 2640)),
         np.zeros((3, 66)),
         np.zeros((3, 22)),

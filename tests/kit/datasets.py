@@ -27,7 +27,7 @@ def small_dataset(folder: Path) -> Path:
     pool = {
         "poses": np.round(poses / POSE_UNIT).astype(np.int16),
         "velocity": rng.normal(scale=0.01, size=(windows, 80, 3)),
-        "ahead": rng.normal(size=(windows, 70, 18)),
+        "ahead": rng.normal(size=(windows, 70, 24)),
         "root": rng.normal(scale=0.1, size=(windows, 70, 3)),
         "boxes": rows,
         "shapes": np.tile(ABSENT_SHAPE, (windows, SHAPES, 1)),

@@ -47,7 +47,7 @@ TINY = ModelConfig(
 )
 TINY_SAMP = SampConfig(width=16, code=8, experts=2, latent=4, frames=10)
 STEPPED = TrainingConfig(steps_flow=4, batch=4, warmup=2, save_every=2, free_run=1.0)
-UNIT = Statistics(np.zeros(66), np.ones(66), np.zeros(3), np.ones(3), np.zeros(18), np.ones(18))
+UNIT = Statistics(np.zeros(66), np.ones(66), np.zeros(3), np.ones(3), np.zeros(24), np.ones(24))
 
 
 class _Stopped(Exception):
@@ -268,7 +268,7 @@ MOVED = "couplings.0.out.bias"
         ({"generator.cpu": torch.zeros(5056)}, {}, "generators"),
         ({"statistics.pose_std": torch.zeros(66, dtype=torch.double)}, {}, "pose_std"),
         (
-            {"statistics.ahead_mean": torch.full((18,), torch.nan, dtype=torch.double)},
+            {"statistics.ahead_mean": torch.full((24,), torch.nan, dtype=torch.double)},
             {},
             "ahead_mean",
         ),

@@ -176,7 +176,7 @@ def test_pools_take_in_new_shards(dataset):
     (dataset / "pool-0001.npz").write_bytes((dataset / "pool-0000.npz").read_bytes())
     pool.refresh()
     assert len(pool) == 24
-    unit = Statistics(np.zeros(66), np.ones(66), np.zeros(3), np.ones(3), np.zeros(18), np.ones(18))
+    unit = Statistics(np.zeros(66), np.ones(66), np.zeros(3), np.ones(3), np.zeros(24), np.ones(24))
     batch = pool.batch(torch.tensor([3, 15, 23]), unit, TINY)
     assert (batch.root[0] == batch.root[1]).all() and not (batch.root[0] == batch.root[2]).all()
 
@@ -353,12 +353,14 @@ def test_a_run_begins_with_what_weights_have_learnt(dataset, tmp_path):
         )
 
 
-FORESEEING = replace(TINY, ahead=18)
+FORESEEING = replace(TINY, ahead=24)
+SHORT_SIGHTED = replace(TINY, ahead=18, ahead_mask=True)
 LIVE = replace(FORESEEING, ahead_mask=True)
 
 
 @pytest.mark.parametrize(
-    ("before", "after"), [(TINY, FORESEEING), (TINY, LIVE), (FORESEEING, LIVE)]
+    ("before", "after"),
+    [(TINY, FORESEEING), (TINY, LIVE), (FORESEEING, LIVE), (SHORT_SIGHTED, LIVE)],
 )
 def test_weights_that_were_told_less_of_the_way_ahead_begin_a_model_that_is_told(
     before: ModelConfig, after: ModelConfig, dataset: Path, tmp_path: Path
@@ -385,7 +387,7 @@ def test_weights_that_were_told_less_of_the_way_ahead_begin_a_model_that_is_told
 def test_the_way_ahead_is_hidden_from_a_share_of_the_windows(dataset, tmp_path):
     statistics = _pool(dataset).statistics()
     root = _pool(dataset).batch(torch.arange(4), statistics, LIVE).root.repeat(100, 1, 1)
-    assert root.shape[-1] == 22 and (root[..., -1] == 1.0).all()
+    assert root.shape[-1] == 28 and (root[..., -1] == 1.0).all()
     run = new_run("upper", tmp_path, LIVE, replace(_config(2), ahead_hidden=0.25), statistics)
     told = run.root_inputs(root)
     hidden = (told[..., 3:] == 0.0).all(-1)
@@ -398,7 +400,7 @@ def test_a_root_that_is_led_live_has_no_way_ahead(dataset, tmp_path):
     """Models that learnt without it make poses; those that were always told say what they need."""
     conditions = Conditions(
         np.zeros((5, 3)),
-        np.full((5, 18), np.nan),
+        np.full((5, 24), np.nan),
         np.zeros((5, 2640)),
         np.zeros((5, 66)),
         np.zeros((5, 22)),
@@ -407,7 +409,7 @@ def test_a_root_that_is_led_live_has_no_way_ahead(dataset, tmp_path):
     live = load_weights(_exported(dataset, tmp_path / "live", LIVE))
     made = [run_to_end(Sampler(live, device).run(conditions, z)).poses for device in (None, "cpu")]
     assert np.isfinite(made[0]).all() and np.abs(made[0] - made[1]).max() < 1e-4
-    known = replace(conditions, ahead=np.zeros((5, 18)))
+    known = replace(conditions, ahead=np.zeros((5, 24)))
     assert np.abs(run_to_end(Sampler(live).run(known, z)).poses - made[0]).max() > 1e-6
     with pytest.raises(InputError, match="whole path"):
         told = load_weights(_exported(dataset, tmp_path / "told", FORESEEING))
@@ -664,7 +666,7 @@ def test_a_process_that_was_ended_from_outside_is_told(dataset, tmp_path, monkey
 
 def test_batches_are_noisy_by_three_millimetres(dataset):
     pool, rows = _pool(dataset), torch.arange(12)
-    unit = Statistics(np.zeros(66), np.ones(66), np.zeros(3), np.ones(3), np.zeros(18), np.ones(18))
+    unit = Statistics(np.zeros(66), np.ones(66), np.zeros(3), np.ones(3), np.zeros(24), np.ones(24))
     one, two = (pool.batch(rows, unit, TINY) for _ in range(2))
     assert abs(float((one.upper - two.upper).std()) - 0.003 * 2**0.5) < 3e-4
 
@@ -867,7 +869,7 @@ def test_baselines_learn_and_their_weights_run(system: str, dataset: Path, tmp_p
     export(tmp_path / "w.safetensors", flow, predictor, statistics, {}, noise)
     weights = load_weights(tmp_path / "w.safetensors")
     sampler = sampler_of(weights)
-    nothing = {"velocity": 3, "ahead": 18, "occupancy": 2640, "observation": 66, "given": 22}
+    nothing = {"velocity": 3, "ahead": 24, "occupancy": 2640, "observation": 66, "given": 22}
     conditions = Conditions(**{name: np.zeros((20, size)) for name, size in nothing.items()})
     made = run_to_end(sampler.run(conditions, sampler.noise(20, 1))).poses
     assert made.shape == (20, 1, 66) and np.isfinite(made).all()

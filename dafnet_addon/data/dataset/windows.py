@@ -53,7 +53,7 @@ __all__ = [
 
 HISTORY, LENGTH = 10, 70
 _FRAMES = HISTORY + LENGTH
-_MARGIN = 32  # frames that a root is known ahead, and two
+_MARGIN = 32  # frames around a window, in which a desk leaves the body room
 _AROUND = 130  # frames before and after a window, in which the body shows what furniture there is
 _KNOWN = 200  # frames before and after a moment that a window may be drawn of
 _SITS = 24  # frames of rest by which a seat is known
@@ -88,7 +88,7 @@ AS_PEOPLE_DO = Augmentation()
 @dataclass(frozen=True)
 class Window:
     """``poses`` (80, 66) in each frame's root, ``velocity`` (80, 3); of the last 70 frames:
-    ``ahead`` (70, 18) and ``root`` (70, 3), its place x, y and yaw in the world of ``boxes``
+    ``ahead`` (70, 24) and ``root`` (70, 3), its place x, y and yaw in the world of ``boxes``
     (``boxes.MOST``, 7) and ``shapes`` (``shapes.SHAPES``, 5). Metres, radians.
     """
 
