@@ -62,6 +62,7 @@ _WRONG = 0.25  # of the paths, that are a little off
 LOWEST, HIGHEST = 0.36, 0.95
 """Metres over the floor at which a pelvis may rest: from a step of 0.22 to a bar stool of 0.81."""
 _USUAL = 0.38, 0.66  # metres: the pelvis on sofas and chairs
+_USUALLY = 0.45  # of the seats that are moved; the others are of any height
 _TOPS = 0.62, 0.82  # metres over the floor, of the desks that people sit at
 # metres that a top moves, down more than up (paper, section 5.2), and that its wrists are over a
 # pelvis at least: thighs are between; how often it moves at all
@@ -152,7 +153,7 @@ def _seat_height(rng: np.random.Generator, height: float) -> float:
     if rng.random() < 0.2:
         wanted = height + rng.normal(0, 0.02)
     else:
-        wanted = rng.uniform(*(_USUAL if rng.random() < 0.6 else (LOWEST, HIGHEST)))
+        wanted = rng.uniform(*(_USUAL if rng.random() < _USUALLY else (LOWEST, HIGHEST)))
     return float(np.clip(wanted, lowest_pelvis(height), HIGHEST))
 
 
