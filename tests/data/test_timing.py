@@ -132,7 +132,7 @@ def test_sway_belongs_to_the_pose_where_a_path_is_smooth() -> None:
 def test_windows_hold_whole_ways_of_all_these_times() -> None:
     motion, rng = _down_and_up(30), np.random.default_rng(3)
     found = []
-    for _ in range(150):
+    for _ in range(300):
         window = windows.draw_window(rng, motion, 75)
         if window is not None:
             height = window.poses.reshape(80, 22, 3)[:, 0, 2]

@@ -228,7 +228,10 @@ def draw_window(
 
     first = int(np.clip(frame - rng.integers(HISTORY, _FRAMES - 10), 0, len(joints) - _FRAMES))
     path = root_from_joints(joints)
-    ways = transitions(joints, resting(joints, path))
+    seated = resting(joints, path)
+    if rests and not seated:
+        return None  # too high, or too short a while, to be known: it would sit on nothing
+    ways = transitions(joints, seated)
     # Seconds farther away nobody uses what this window shows.
     kept = _whole_ways(ways, first - _AROUND, first + _FRAMES + _AROUND, len(joints))
     joints, path, first = (
