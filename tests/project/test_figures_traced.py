@@ -1,27 +1,34 @@
-"""The figures of README and card are those of the reports that commands made."""
+"""The figures of README, card and docs are those of the reports that commands made."""
 
-import json
+import copy
 import runpy
+
+import pytest
 
 from kit.places import ROOT
 
 TRACE = runpy.run_path(str(ROOT / "scripts" / "trace_figures.py"))
+REPORTS = TRACE["reports"]()
 
 
-def test_every_traced_figure_is_its_reports() -> None:
-    looked_at = {}
-    for name, count, wrong in TRACE["checks"]():
-        assert not wrong, name
-        looked_at[name] = count
-    assert len(looked_at) == 3 and looked_at["the card's table"] > 200
-    assert looked_at["README's table"] == 25 and looked_at["sentences on real furniture"] > 10
+@pytest.mark.parametrize("page", TRACE["pages"](), ids=lambda page: page.name)
+def test_every_traced_figure_is_its_reports(page) -> None:
+    wrong = [each for each in TRACE["traced"](page, REPORTS) if not each.holds]
+    assert not [(each.said, each.expected) for each in wrong]
 
 
-def test_a_wrong_figure_is_found() -> None:
-    rows, card = TRACE["held_out_rows"](), TRACE["CARD"].read_text(encoding="utf-8")
-    changed = json.loads(json.dumps(rows))
-    changed["free_t0"]["sits_within_6cm"] -= 0.01
-    _, wrong = TRACE["wrong_cells"](card, changed)
-    assert len(wrong) == 1 and wrong[0].startswith("FREE, temperature 0, sits within 6 cm")
-    _, wrong = TRACE["wrong_readme_cells"](TRACE["README"].read_text(encoding="utf-8"), changed)
-    assert len(wrong) == 1 and wrong[0].startswith("sits with the pelvis, free_t0:")
+def test_the_tables_and_what_else_speaks_for_the_weights_are_traced() -> None:
+    assert len(TRACE["traced"](TRACE["CARD"], REPORTS)) > 290
+    assert len(TRACE["traced"](TRACE["README"], REPORTS)) > 28
+
+
+def test_a_wrong_figure_is_found_and_mended() -> None:
+    changed = copy.deepcopy(REPORTS)
+    changed["rows"]["free_t0"]["sits_within_6cm"] -= 0.1
+    for page in (TRACE["CARD"], TRACE["README"]):
+        figures = TRACE["traced"](page, changed)
+        (wrong,) = (each for each in figures if not each.holds)
+        text = page.read_text(encoding="utf-8")
+        assert TRACE["mended"](page, figures) == (
+            text[: wrong.start] + wrong.expected + text[wrong.stop :]
+        )
