@@ -17,6 +17,15 @@ def test_every_traced_figure_is_its_reports(page) -> None:
     assert not [(each.said, each.expected) for each in wrong]
 
 
+def test_pages_hold_what_commands_wrote() -> None:
+    for page, section in TRACE["written"](REPORTS):
+        text = page.read_text(encoding="utf-8")
+        assert section in text, f"{page.name}: scripts/trace_figures.py --mend"
+        assert TRACE["with_section"](text, section).strip() == text.strip()
+        changed = TRACE["with_section"](text, section.replace("0", "7"))
+        assert section not in changed and TRACE["with_section"](changed, section) == text
+
+
 def test_the_tables_and_what_else_speaks_for_the_weights_are_traced() -> None:
     assert len(TRACE["traced"](TRACE["CARD"], REPORTS)) > 290
     assert len(TRACE["traced"](TRACE["README"], REPORTS)) > 28
