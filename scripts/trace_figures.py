@@ -242,6 +242,16 @@ def _sways(heat: float | None) -> Value:
     return value
 
 
+def _feet(run: str) -> Value:
+    """Centimetres that feet are from where captured ones were: the mean."""
+
+    def value(of: Reports) -> float:
+        found = [each[run] for each in of["life"]["feet"]]
+        return sum(found) / len(found)
+
+    return value
+
+
 def _lives(state: str) -> tuple[Value, ...]:
     """How much who sits or stands moves at temperature 1, over captured people, by band."""
     bands = ("slow", "middle", "quick")
@@ -338,6 +348,14 @@ CLAIMS: tuple[tuple[Path, str, tuple[Value, ...]], ...] = (
     ),
     (
         CARD,
+        r"0\.55 / 0\.65 m \| (\d+) % / (\d+) % / (\d+) % / (\d+) % \|.{0,60}no seat \| (\d+) cm",
+        (
+            *(_sits("sits_by_height", height) for height in ("0.350", "0.450", "0.550", "0.650")),
+            _at("seats", "largest_drop_without_seat", times=100.0),
+        ),
+    ),
+    (
+        CARD,
         r"walks in FREE (\d\.\d) times real motion, all clips (\d\.\d) \(after the clean-up "
         r"(\d\.\d+)\)",
         (
@@ -382,6 +400,11 @@ CLAIMS: tuple[tuple[Path, str, tuple[Value, ...]], ...] = (
         r"who sits moves (\d\.\d) / (\d\.\d) / (\d\.\d) times as much as captured people .{0,40}"
         r"who stands (\d\.\d) / (\d\.\d) / (\d\.\d) times",
         (*_lives("seated"), *_lives("standing")),
+    ),
+    (
+        CARD,
+        r"feet are (\d+\.\d) cm from where they are asked for, and (\d+\.\d) without",
+        (_feet("asked"), _feet("not asked")),
     ),
     (
         CARD,

@@ -7,10 +7,11 @@ statue. So takes draw both (``core.noise.TakeNoise``), with the autocorrelation 
 windows: temperature 1 is then how far, and how, real takes differ. What lasts is what is still
 alike over the longest times that a window shows.
 
-What comes and goes has the spectrum that was found, but for this: noise along captured motion is
-tied to that motion, and noise that is drawn is not. Where it comes and goes fast, what is made of
-it trembles more than people do. So each frequency is damped until poses of people who stay where
-they are, which is where one sees it, move as fast in it as captured ones.
+What comes and goes has the spectrum that was found, but for two things. No dimension varies more
+than the N(0, I) that the flow is trained to be drawn from (``within_normal``). And noise along
+captured motion is tied to that motion, and noise that is drawn is not: where it comes and goes
+fast, what is made of it trembles more than people do. So each frequency is damped until poses of
+people who stay where they are, which is where one sees it, move as fast in it as captured ones.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -33,6 +34,7 @@ __all__ = [
     "part_noise",
     "process_of",
     "take_noise",
+    "within_normal",
 ]
 
 _SETTLED = 20
@@ -126,7 +128,7 @@ def take_noise(
 
     tensors: dict[str, np.ndarray] = {}
     for part, noises in found.items():
-        for name, tensor in process_of(np.concatenate(noises)).items():
+        for name, tensor in within_normal(process_of(np.concatenate(noises))).items():
             tensors[f"{part}.{name}"] = tensor
 
     rests = _resting(pool, rows)[:_DAMPED_OVER]
@@ -268,6 +270,23 @@ def process_of(noise: np.ndarray) -> dict[str, np.ndarray]:
         "spread": _root(lasting),
         "passing": _root(_moment(noise, 0) - lasting),
         "taps": _filters(noise, np.diag(lasting)),
+    }
+
+
+def within_normal(process: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The tensors of ``PartNoise`` with no dimension varying more than N(0, I), from which the flow
+    is trained to be drawn (paper, section 4.3).
+
+    Captured noise does in some: free runs hold what is drawn to seats and targets, so a network
+    makes noise count for less and needs more of it to say what was captured, above all of people
+    who gesture. Drawn as large where nothing asks for it, people stay standing before their seats.
+    """
+    varies = (process["spread"] ** 2).sum(axis=1) + (process["passing"] ** 2).sum(axis=1)
+    shrunk = 1.0 / np.sqrt(np.maximum(varies, 1.0))[:, None]
+    return {
+        **process,
+        "spread": shrunk * process["spread"],
+        "passing": shrunk * process["passing"],
     }
 
 

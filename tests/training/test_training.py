@@ -63,6 +63,7 @@ from dafnet_addon.training.noise import (  # noqa: E402
     noise_along,
     process_of,
     take_noise,
+    within_normal,
 )
 from dafnet_addon.training.parts import load_run, new_run, trained_networks  # noqa: E402
 from dafnet_addon.training.processes import new_processes  # noqa: E402
@@ -889,7 +890,7 @@ def test_takes_are_drawn_from_the_noise_along_captured_motion(dataset: Path, tmp
     tensors = take_noise(run.flow, predictor, pool, run.statistics)
     batch = pool.batch(torch.arange(12), run.statistics, TINY, noise=0.0)
     for part, noise in noise_along(run.flow, predictor, batch).items():
-        found = process_of(noise[:, 20:].numpy().astype(float))
+        found = within_normal(process_of(noise[:, 20:].numpy().astype(float)))
         for name in ("spread", "passing"):
             assert np.abs(tensors[f"{part}.{name}"] - found[name]).max() < 1e-4
             assert (np.triu(found[name], 1) == 0).all()
@@ -918,6 +919,20 @@ def test_drawn_noise_follows_upon_itself_as_what_it_was_found_in():
             for values in (drawn, noise)
         )
         assert np.abs(alike - wanted).max() < 0.1, apart
+
+
+def test_no_dimension_is_drawn_wider_than_the_flow_s_own_noise():
+    rng = np.random.default_rng(0)
+    small, large = 0.5 * rng.standard_normal((400, 50, 1)), 3.0 * rng.standard_normal((400, 50, 1))
+    found = process_of(np.concatenate([small, large + small], axis=2))
+    bounded = within_normal(found)
+    torch.manual_seed(0)
+    noise = PartNoise(**{name: torch.from_numpy(t).float() for name, t in bounded.items()})
+    narrow, wide = noise.draw(500, 50).numpy().std((0, 1))
+    assert narrow == pytest.approx(0.5, rel=0.05) and wide == pytest.approx(1.0, rel=0.05)
+    assert np.corrcoef(noise.draw(500, 50).numpy().reshape(-1, 2).T)[0, 1] == pytest.approx(
+        np.corrcoef(np.concatenate([small, large + small], axis=2).reshape(-1, 2).T)[0, 1], abs=0.05
+    ), "what goes together still does"
 
 
 def test_noise_is_damped_where_poses_would_move_faster_than_captured(dataset: Path, tmp_path: Path):
