@@ -12,9 +12,10 @@ sentences of ``CLAIMS``. Exits with 1 where a figure is another than its report'
 
 import argparse
 import json
+import math
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -217,16 +218,21 @@ def _sits(*keys: Any) -> Value:
     return _at("seats", *keys, times=100.0)
 
 
+def _mean(values: Iterable[float]) -> float:
+    """Of those that were measured: a take that never came down has no descent."""
+    found = [value for value in values if math.isfinite(value)]
+    return sum(found) / len(found)
+
+
 def _descent(heat: float, asked: float) -> Value:
     """Seconds that a descent takes which was asked in ``asked``: the mean."""
 
     def value(of: Reports) -> float:
-        took = [
+        return _mean(
             each["took"]
             for each in of["life"]["descents"]
-            if (each["temperature"], each["asked"]) == (heat, asked) and each["took"] is not None
-        ]
-        return sum(took) / len(took)
+            if (each["temperature"], each["asked"]) == (heat, asked)
+        )
 
     return value
 
@@ -236,8 +242,7 @@ def _sways(heat: float | None) -> Value:
 
     def value(of: Reports) -> float:
         walks = of["life"]["captured walks" if heat is None else "walks"]
-        found = [each["sway"] for each in walks if heat in (None, each["temperature"])]
-        return sum(found) / len(found)
+        return _mean(each["sway"] for each in walks if heat == each.get("temperature"))
 
     return value
 
@@ -245,11 +250,7 @@ def _sways(heat: float | None) -> Value:
 def _feet(run: str) -> Value:
     """Centimetres that feet are from where captured ones were: the mean."""
 
-    def value(of: Reports) -> float:
-        found = [each[run] for each in of["life"]["feet"]]
-        return sum(found) / len(found)
-
-    return value
+    return lambda of: _mean(each[run] for each in of["life"]["feet"])
 
 
 def _lives(state: str) -> tuple[Value, ...]:
@@ -269,6 +270,14 @@ CLAIMS: tuple[tuple[Path, str, tuple[Value, ...]], ...] = (
         ),
     ),
     (README, r"on by default, (\d+) % within 4", _within("all seats", "free_t0_clean", 4)),
+    (
+        README,
+        r"by \*Sit on Selected\*, (\d+) % of (\d+) do",
+        (
+            *_within("sent by the director", "free_t0", 8),
+            _real("sent by the director", "free_t0", "clips"),
+        ),
+    ),
     (
         CARD,
         r"share of (\d+) seated episodes .{0,90}network gives it: \*\*(\d+) / (\d+) %\*\*",
@@ -330,6 +339,20 @@ CLAIMS: tuple[tuple[Path, str, tuple[Value, ...]], ...] = (
             ),
         ),
     ),
+    (
+        REAL,
+        r"\| refused \| (\d\.\d) % .{0,60}carries one \| (\d+\.\d) % .{0,50}mark \| (\d+\.\d) %",
+        tuple(_at("sitting", "all", name) for name in ("refused", "within 4 cm", "place right")),
+    ),
+    (
+        REAL,
+        r"tenth of a second \| (\d\.\d) %, (\d\.\d) %, (\d\.\d) % .{0,50}facing \| (\d+\.\d) %",
+        tuple(
+            _at("sitting", "all", name)
+            for name in ("shin inside", "foot inside", "trunk inside", "right")
+        ),
+    ),
+    (REAL, r"in the take's row \| (\d\.\d) %", (_at("sitting", "all", "short and not told"),)),
     (CARD, r"\*\*(\d+) % of 360 takes sit within 8 cm\*\*", (_sits("sits"),)),
     (
         CARD,
