@@ -12,13 +12,14 @@ sentences of ``CLAIMS``. Exits with 1 where a figure is another than its report'
 
 import argparse
 import json
-import math
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 ROOT = Path(__file__).absolute().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -49,19 +50,20 @@ class Figure:
     value: float | None
 
     @property
+    def _decimals(self) -> int:
+        return len(self.said.partition(".")[2])
+
+    @property
     def expected(self) -> str:
         """The report's value with as many decimals as the page gives."""
-        if self.value is None:
-            return "–"
-        decimals = len(self.said.partition(".")[2])
-        return f"{self.value:.{decimals}f}"
+        return "–" if self.value is None else f"{self.value:.{self._decimals}f}"
 
     @property
     def holds(self) -> bool:
         """Whether what is said is the value, rounded to the said decimals."""
         if self.value is None or self.said == "–":
             return self.value is None and self.said == "–"
-        half = 0.5 * 10.0 ** -len(self.said.partition(".")[2])
+        half = 0.5 * 10.0**-self._decimals
         return abs(float(self.said) - self.value) <= half * (1.0 + 1e-6)
 
 
@@ -73,7 +75,7 @@ def reports() -> dict[str, Any]:
     return {**found, "rows": load_weights(None).says("held_out")}
 
 
-def _cells(text: str, line_start: int, line: str) -> list[tuple[int, str]]:
+def _cells(line_start: int, line: str) -> list[tuple[int, str]]:
     """The cells of a table's line: where each begins in the text, and what it says."""
     found, at = [], line_start + line.index("|") + 1
     for cell in line.split("|")[1:-1]:
@@ -132,11 +134,11 @@ def card_table(text: str, of: Reports) -> Iterator[Figure]:
     """The card's table of held-out clips."""
     lines = list(_lines(text))
     first = next(i for i, (_, line) in enumerate(lines) if "| sits within 6 cm |" in line)
-    names = [said for _, said in _cells(text, *lines[first])[1:]]
+    names = [said for _, said in _cells(*lines[first])[1:]]
     for at, line in lines[first + 2 :]:
         if not line.startswith("|"):
             break
-        (_, label), *cells = _cells(text, at, line)
+        (_, label), *cells = _cells(at, line)
         row = of["rows"][_run(label)]
         for name, (start, cell) in zip(names, cells, strict=True):
             key, factor = _CARD_COLUMNS[name]
@@ -160,9 +162,7 @@ def readme_table(text: str, of: Reports) -> Iterator[Figure]:
     for at, line in _lines(text):
         for begins, (key, factor) in _README_ROWS.items():
             if line.startswith(f"| {begins}"):
-                for run, (start, cell) in zip(
-                    _README_RUNS, _cells(text, at, line)[1:], strict=True
-                ):
+                for run, (start, cell) in zip(_README_RUNS, _cells(at, line)[1:], strict=True):
                     yield _figure(README, start, cell, factor * of["rows"][run][key])
 
 
@@ -220,8 +220,7 @@ def _sits(*keys: Any) -> Value:
 
 def _mean(values: Iterable[float]) -> float:
     """Of those that were measured: a take that never came down has no descent."""
-    found = [value for value in values if math.isfinite(value)]
-    return sum(found) / len(found)
+    return float(np.nanmean(list(values)))
 
 
 def _descent(heat: float, asked: float) -> Value:
@@ -249,7 +248,6 @@ def _sways(heat: float | None) -> Value:
 
 def _feet(run: str) -> Value:
     """Centimetres that feet are from where captured ones were: the mean."""
-
     return lambda of: _mean(each[run] for each in of["life"]["feet"])
 
 
@@ -535,7 +533,8 @@ def main() -> None:
     options = parser.parse_args()
 
     of, faults = reports(), 0
-    for page, section in written(of):
+    sections = list(written(of))
+    for page, section in sections:
         text = page.read_text(encoding="utf-8")
         if section in text:
             continue
@@ -549,7 +548,7 @@ def main() -> None:
     for page in pages():
         figures = traced(page, of)
         wrong = [each for each in figures if not each.holds]
-        rest = untraced(page, figures, [section for where, section in written(of) if where == page])
+        rest = untraced(page, figures, [section for where, section in sections if where == page])
         name = page.relative_to(ROOT).as_posix()
         print(f"{name}: {len(figures) - len(wrong)} of {len(figures)} hold; {len(rest)} untraced")
         for each in wrong:

@@ -155,11 +155,8 @@ class RootFollower:
         """
         assert self.seat is not None
         from_seat = float(np.linalg.norm(self.position[:2] - self.seat.position))
-        pace = (
-            pace_at_seat(GETS_UP, down=False)
-            if self._leaves
-            else pace_at_seat(SITS_DOWN, down=True)
-        )
+        seconds = GETS_UP if self._leaves else SITS_DOWN
+        pace = pace_at_seat(seconds, down=not self._leaves)
         return pace + max(0.0, from_seat - SEATED_WAY)
 
     def _bound_for(

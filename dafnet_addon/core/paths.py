@@ -255,10 +255,11 @@ def walked_along(
     )
     pace = np.full(len(arc), cruise)
     if origin.seated:
-        pace[arc < SEATED_WAY] = min(cruise, pace_at_seat(origin.gets_up, down=False))
+        near = arc < SEATED_WAY
+        pace[near] = np.minimum(pace[near], pace_at_seat(origin.gets_up, down=False))
     if goal.seated:
-        slowly = pace_at_seat(goal.sits_down, down=True)
-        pace[length - arc < SEATED_WAY] = np.minimum(pace[length - arc < SEATED_WAY], slowly)
+        near = length - arc < SEATED_WAY
+        pace[near] = np.minimum(pace[near], pace_at_seat(goal.sits_down, down=True))
     start, end = _RISE if origin.seated else _START, _SIT if goal.seated else _HALT
     speed = _speeds(arc, tangent, heading, pace, start, end)
     clock = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(arc) / (speed[1:] + speed[:-1]))])
