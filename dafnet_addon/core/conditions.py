@@ -73,11 +73,12 @@ STAYS = (
 _STILL = 0.02  # metres or radians in the whole shot, under which a root does not move
 _FAR_FROM_ROOT = 1.0  # metres that a pelvis may be beside its root where the character begins
 _CROWDED = 0.35  # share of the sensor that furniture fills, above which the user is told
+_FILLED = 0.75  # occupancy of a sphere whose centre is 4 cm from a solid
 _AROUND = 6  # spheres of the sensor's innermost ring
 _UNDER = (
     (np.hypot(SPHERES[:, 0], SPHERES[:, 1]) < 0.2) & (SPHERES[:, 2] > 0.2) & (SPHERES[:, 2] < 0.9)
 )
-_SOLID = 0.3
+_SOLID = 0.65
 
 
 @dataclass(frozen=True)
@@ -495,7 +496,7 @@ def _look_around(scene: Scene, path: RootPath, occupied: np.ndarray, warnings: l
             "furniture."
         )
 
-    crowd = occupied.mean(axis=1)
+    crowd = (occupied > _FILLED).mean(axis=1)
     if crowd.max() > _CROWDED:
         warnings.append(
             f"Furniture fills {100 * crowd.max():.0f} % of the character's surroundings "

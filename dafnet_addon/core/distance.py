@@ -2,9 +2,9 @@
 
 A grid lives in the mesh's *rigid space*: scale, shear and mirroring are in its vertices, in metres,
 and only the rigid motion (``rigid_split``) stays outside, so furniture may move without being
-measured again. Distances are truncated beyond ``BAND``; the sensor needs 7 cm, the collision metric
-10 cm. All of it is NumPy, so that a scene looks the same inside Blender and outside; that is faster
-than asking a BVH tree for each node, and agrees with one (see the tests).
+measured again. Distances are truncated beyond ``BAND``; the sensor needs 14 cm, the collision
+metric 10. All of it is NumPy, so that a scene looks the same inside Blender and outside; that is
+faster than asking a BVH tree for each node, and agrees with one (see the tests).
 
 Real furniture is rarely a clean solid. What is inside is therefore voted on by rays along the three
 axes, for each loose part of its own, so that overlapping parts unite; a part that the votes call

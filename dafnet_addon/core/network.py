@@ -184,7 +184,7 @@ class Part:
 class Network:
     """All of one weights file. ``noise``: what takes are made of, the paper's where the file does
     not say how captured takes differ. ``predictor`` is None where the flow is given the past
-    itself. ``parts``: in the order of making.
+    itself. ``parts``: in the order of making. ``sphere_radius``: of the sensor, metres.
     """
 
     sizes: Sizes
@@ -192,6 +192,7 @@ class Network:
     noise: TakeNoise
     predictor: Predictor | None
     parts: tuple[Part, ...]
+    sphere_radius: float
 
 
 def unusable(weights: Weights, why: str) -> WeightsError:
@@ -215,7 +216,7 @@ def load_network(weights: Weights, system: System, backend: Backend) -> Network:
         _part(tensors, sizes, system, name, tuple(columns for _, columns in places[:i]))
         for i, (name, _) in enumerate(places)
     )
-    return Network(sizes, normalisation, noise, predictor, parts)
+    return Network(sizes, normalisation, noise, predictor, parts, weights.sphere_radius)
 
 
 class _Tensors:

@@ -22,8 +22,8 @@ class TakeNoise:
     second, and that is what makes a body that sits or stands look alive.
 
     ``lasting`` (66, 66): what a take holds is this times N(0, I). ``passing`` (66, 66): what comes
-    and goes is white noise, this times N(0, I) at each frame, under the filters ``taps`` (66, 49),
-    each of unit length at most. Zeros where the weights do not say: such takes hold their noise.
+    and goes is white noise, this times N(0, I) at each frame, under the filters ``taps`` (66, 49).
+    Zeros where the weights do not say: such takes hold their noise.
     """
 
     lasting: np.ndarray

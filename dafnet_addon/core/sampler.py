@@ -17,6 +17,7 @@ from .errors import InputError
 from .inputs import inputs_of, velocities_up_to
 from .network import DAFNET, CouplingNet, Part, System, load_network, unusable
 from .progress import run_to_end, within
+from .sensor import narrowed
 from .series import smoothstep
 from .skeleton import POSE_SIZE, model_order, smpl_order
 from .threads import one_thread
@@ -258,7 +259,7 @@ class Sampler:
         up_to = velocities_up_to(velocity, sizes.history)[since:]
         if since:
             conditions, velocity = conditions.between(since, len(conditions)), velocity[since:]
-        occupancy = array(conditions.occupancy)
+        occupancy = array(narrowed(conditions.occupancy, self.network.sphere_radius))
         root, scene = self.inputs.in_advance(
             up_to,
             np.concatenate([velocity, self._way_ahead(conditions)], axis=1),

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from .errors import WeightsError
+from .sensor import RADIUS
 from .text import printable, read_json
 
 __all__ = [
@@ -239,6 +240,21 @@ class Weights:
                 self.path, f"'{name}' has the shape {tensor.shape}, not {tuple(shape)}"
             )
         return tensor
+
+    @property
+    def sphere_radius(self) -> float:
+        """Radius of the sensor's spheres that these weights were trained with (metres): a config
+        that has no ``sphere_radius`` is of before these overlapped. Raises WeightsError where it is
+        none.
+        """
+        radius = self.config.get("sphere_radius", RADIUS / 2.0)
+        if isinstance(radius, bool) or not isinstance(radius, (int, float)):
+            radius = 0.0
+        if not 0.0 < radius <= RADIUS:
+            raise _other_version(
+                self.path, "its sensor's spheres are of a size that this one has not"
+            )
+        return float(radius)
 
     @property
     def heeds_legs(self) -> bool:

@@ -128,7 +128,7 @@ def seen(file: Path, bank: DeviceBank) -> np.ndarray:
     """Occupancy of a shard's windows (N, 70, 2640) in bytes, 255 of which are 1; made once and kept
     beside the shard.
     """
-    kept = file.with_suffix(".seen.npy")
+    kept = file.with_suffix(".occupancy.npy")
     if not kept.exists():
         shard = load_pool([file])
         boxes, shapes, root = (torch.from_numpy(shard[name]) for name in _ROOM)

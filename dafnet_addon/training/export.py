@@ -12,6 +12,7 @@ import torch
 
 from ..core.errors import WeightsError
 from ..core.files import whole_file
+from ..core.sensor import RADIUS
 from ..core.series import MODEL_FPS
 from ..core.skeleton import JOINTS, OFFSETS
 from ..core.weights import FORMAT, Weights, quantised, read_safetensors, write_safetensors
@@ -161,6 +162,7 @@ def export(
         "joints": list(JOINTS),
         "offsets": OFFSETS.tolist(),
         "noise_metres": NOISE,
+        "sphere_radius": RADIUS,
     }
 
     tensors = {}

@@ -10,8 +10,9 @@ alike over the longest times that a window shows.
 What comes and goes has the spectrum that was found, but for two things. No dimension varies more
 than the N(0, I) that the flow is trained to be drawn from (``within_normal``). And noise along
 captured motion is tied to that motion, and noise that is drawn is not: where it comes and goes
-fast, what is made of it trembles more than people do. So each frequency is damped until poses of
-people who stay where they are, which is where one sees it, move as fast in it as captured ones.
+fast, what is made of it trembles more than people do; where it goes slowly, it moves them less. So
+each frequency is damped, or raised, until poses of people who stay where they are, which is where
+one sees it, move as fast in it as captured ones; the whole stays within N(0, I) (``within_room``).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,12 +30,13 @@ from .batches import Batch, Pool, Statistics
 
 __all__ = [
     "PartNoise",
-    "kept_of_noise",
+    "gains_of_noise",
     "noise_along",
     "part_noise",
     "process_of",
     "take_noise",
     "within_normal",
+    "within_room",
 ]
 
 _SETTLED = 20
@@ -49,6 +51,10 @@ _DAMPED_OVER = 400
 """Windows whose speed is compared with what the noise makes."""
 _SMOOTH = np.array([0.25, 0.5, 0.25])
 """Weights by which shares of neighbouring frequencies are averaged."""
+_MOST_POWER = 2.0
+"""Of what was found, that a frequency is raised to: what moves people no more at twice the power
+does not come of the noise.
+"""
 _JITTER = 1e-6
 """Of variance, for what a few windows leave out of the space."""
 
@@ -136,8 +142,10 @@ def take_noise(
         pool.batch(some, statistics, flow.config, noise=0.0) for some in rests.split(_AT_ONCE)
     )
     drawn = {part: _part_noise(tensors, part, pool.device) for part in found}
-    for part, kept in kept_of_noise(flow, predictor, batches, statistics, drawn).items():
-        tensors[f"{part}.taps"] = _damped(tensors[f"{part}.taps"], kept)
+    for part, gains in gains_of_noise(flow, predictor, batches, statistics, drawn).items():
+        process = {name: tensors[f"{part}.{name}"] for name in PartNoise.__annotations__}
+        taps = np.fft.irfft(np.fft.rfft(process["taps"], axis=1) * gains, TAPS, axis=1)
+        tensors[f"{part}.taps"] = within_room({**process, "taps": taps})
 
     return {name: tensor.astype(np.float32) for name, tensor in tensors.items()}
 
@@ -167,18 +175,19 @@ def _part_noise(tensors: Mapping[str, np.ndarray], part: str, device: torch.devi
 
 
 @torch.no_grad()
-def kept_of_noise(
+def gains_of_noise(
     flow: BodyFlow,
     predictor: ActionPredictor | None,
     batches: Iterable[Batch],
     statistics: Statistics,
     noise: Mapping[str, PartNoise],
 ) -> dict[str, np.ndarray]:
-    """Of each of these parts' noise, how much of what comes and goes is kept at each frequency of
-    its filters (25,), in amplitude.
+    """Of each of these parts' noise, by how much what comes and goes is to be multiplied at each
+    frequency of its filters (25,), in amplitude: 0 to the root of ``_MOST_POWER``.
 
-    Poses made of what lasts alone move too little at a frequency, those made of all of it too much;
-    power adds, so that between them lies the captured motion's.
+    Poses made of what lasts alone move too little at a frequency, those made of all of it too much
+    or too little; power adds, so that the share between them which moves as captured motion does is
+    known.
     """
     powers: dict[str, np.ndarray] = {}
     # All devices' generators come back as they were: a run draws on from where it was.
@@ -188,14 +197,15 @@ def kept_of_noise(
             for name, power in _powers(flow, predictor, batch, statistics, noise).items():
                 powers[name] = powers.get(name, 0.0) + power
 
-    kept = {}
+    gains = {}
     for name, (captured, lasting, all_of_it) in powers.items():
         added = np.maximum(all_of_it - lasting, 1e-12)
         share = np.convolve(np.pad((captured - lasting) / added, 1, mode="edge"), _SMOOTH, "valid")
         found_at = np.linspace(0.0, 0.5, len(share))
-        kept[name] = np.sqrt(np.clip(np.interp(np.fft.rfftfreq(TAPS), found_at, share), 0.0, 1.0))
+        wanted = np.interp(np.fft.rfftfreq(TAPS), found_at, share)
+        gains[name] = np.sqrt(np.clip(wanted, 0.0, _MOST_POWER))
 
-    return kept
+    return gains
 
 
 def _powers(
@@ -256,11 +266,6 @@ def _speed_spectrum(poses: np.ndarray) -> np.ndarray:
     return (np.abs(np.fft.rfft(speed * taper, axis=1)) ** 2).sum(axis=(0, 2))
 
 
-def _damped(taps: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """Filters (n, 49) of which as much is ``kept`` (25,) at each frequency."""
-    return np.fft.irfft(np.fft.rfft(taps, axis=1) * kept, TAPS, axis=1)
-
-
 def process_of(noise: np.ndarray) -> dict[str, np.ndarray]:
     """The tensors of ``PartNoise`` with the autocorrelation of noise (N, T, n), of 49 frames or
     more, undamped.
@@ -288,6 +293,16 @@ def within_normal(process: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         "spread": shrunk * process["spread"],
         "passing": shrunk * process["passing"],
     }
+
+
+def within_room(process: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The filters of ``PartNoise``'s tensors, with what comes and goes under them made to vary in
+    no dimension more than what lasts leaves of N(0, I).
+    """
+    lasts = (process["spread"] ** 2).sum(axis=1)
+    comes = (process["passing"] ** 2).sum(axis=1) * (process["taps"] ** 2).sum(axis=1)
+    room = np.sqrt(np.clip(1.0 - lasts, 0.0, None) / np.maximum(comes, _JITTER))
+    return np.minimum(1.0, room)[:, None] * process["taps"]
 
 
 def _resting(pool: Pool, rows: Tensor) -> Tensor:

@@ -11,7 +11,7 @@ from dafnet_addon.core.occupancy import distance, occupancy, tops_under
 from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.root import RootPath, to_world
 from dafnet_addon.core.rotations import rotate, transpose, yaw_matrix
-from dafnet_addon.core.sensor import SPHERES, occupancy_of_distance
+from dafnet_addon.core.sensor import RADIUS, REACH, SPHERES, occupancy_of_distance
 from dafnet_addon.core.solids import Box, Mesh, Scene, box_distance
 from dafnet_addon.core.take import Controls
 
@@ -53,6 +53,19 @@ def expected(boxes, path):
         for box in boxes
     ]
     return occupancy_of_distance(np.min(found, axis=0))
+
+
+def test_no_height_of_a_seat_looks_like_another():
+    """Every centimetre is seen as one, between two layers of spheres as elsewhere."""
+    over_it = RootPath(np.zeros((2, 3)), np.array([0.0, 0.1]))
+
+    def seen(top):
+        seat = Box(np.array([0.0, 0.0, top / 2]), np.array([0.25, 0.25, top / 2]))
+        return occupancy(Scene((seat,)), over_it)[0]
+
+    tops = [seen(top) for top in np.arange(0.25, 0.91, 0.01)]
+    steps = np.abs(np.diff(tops, axis=0)).max(axis=1)
+    assert steps.min() > 0.03
 
 
 def test_boxes_are_exact():
@@ -97,7 +110,7 @@ def test_furniture_that_comes_is_seen_when_it_is_there():
     still = RootPath(np.zeros((30, 3)), np.zeros(30))
     for solid in (rolling, as_mesh(rolling)):
         seen = occupancy(Scene([solid]), still).any(axis=1)
-        np.testing.assert_array_equal(seen, np.abs(5 * t - 2.5) < 1.27)
+        np.testing.assert_array_equal(seen, np.abs(5 * t - 2.5) < 0.2 + REACH + RADIUS)
 
 
 def test_floor_is_not_seen_and_follows_the_root_upstairs():

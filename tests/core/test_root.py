@@ -25,7 +25,7 @@ from dafnet_addon.core.rotations import (
     transpose,
     yaw_matrix,
 )
-from dafnet_addon.core.sensor import HEIGHT, RADIUS, REACH, SPHERES, occupancy_of_distance
+from dafnet_addon.core.sensor import HEIGHT, RADIUS, REACH, SPHERES, narrowed, occupancy_of_distance
 from dafnet_addon.core.skeleton import REST
 
 RNG = np.random.default_rng(7)
@@ -136,9 +136,15 @@ def test_sensor_rings_run_outwards_from_the_right():
 
 
 def test_occupancy_falls_from_the_centre_to_the_radius():
-    assert pytest.approx(1 / 14) == RADIUS
+    assert pytest.approx(1 / 7) == RADIUS
     distance = np.array([-1.0, 0.0, RADIUS / 2, RADIUS, 1.0])
     np.testing.assert_allclose(occupancy_of_distance(distance), [1, 1, 0.5, 0, 0], atol=1e-12)
+
+
+def test_smaller_spheres_see_what_is_within_them():
+    distance = np.linspace(-0.1, 0.2, 61)
+    own = np.clip(1.0 - distance / 0.05, 0.0, 1.0)
+    np.testing.assert_allclose(narrowed(occupancy_of_distance(distance), 0.05), own, atol=1e-12)
 
 
 def random_rotations(n: int) -> np.ndarray:

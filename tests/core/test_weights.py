@@ -11,6 +11,7 @@ import pytest
 
 from dafnet_addon.core import weights
 from dafnet_addon.core.errors import WeightsError
+from dafnet_addon.core.sensor import RADIUS
 from dafnet_addon.core.weights import (
     FORMAT,
     load_weights,
@@ -141,6 +142,20 @@ def test_weights_expand_what_is_stored_small(tmp_path: Path) -> None:
     for name, shape in (("half", (5,)), ("absent", None)):
         with pytest.raises(WeightsError, match="another version"):
             loaded.require(name, shape)
+
+
+def test_weights_say_how_large_the_spheres_are_that_they_know(tmp_path: Path) -> None:
+    file = tmp_path / "w.safetensors"
+
+    def known(config: str) -> float:
+        write_safetensors(file, {}, {"format": FORMAT, "config": config})
+        return load_weights(file).sphere_radius
+
+    assert known("{}") == RADIUS / 2, "the first ones do not say it"
+    assert known(f'{{"sphere_radius": {RADIUS}}}') == RADIUS
+    for wrong in (0, -1, 2 * RADIUS, "true", '"wide"'):
+        with pytest.raises(WeightsError, match="spheres are of a size"):
+            known(f'{{"sphere_radius": {wrong}}}')
 
 
 @pytest.mark.parametrize(

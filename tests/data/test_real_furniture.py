@@ -304,8 +304,9 @@ def test_a_real_seat_carries_the_pelvis_as_high_as_it_rests(bank: ShapeBank) -> 
         "the seat's surface is where the piece says"
     )
     # Its back is behind the sitter, who faces 0.8.
-    behind = rest.position + 0.35 * np.array([np.sin(0.8), -np.cos(0.8), 0.0]) + (0.0, 0.0, 0.15)
-    assert float(bank.distances(found.shapes, behind[None])[0]) < FARTHEST
+    behind = 0.1 * np.array([np.sin(0.8), -np.cos(0.8), 0.0])
+    back, front = bank.distances(found.shapes, rest.position + (0.0, 0.0, 0.15) + [behind, -behind])
+    assert back < 0.06 and front > 0.1
     too_high = Rest(0, 10, np.array([0.0, 0.0, 0.9]), 0.0)
     assert seat_shape_for(rng, bank, too_high, _free(0.0)) is None
 

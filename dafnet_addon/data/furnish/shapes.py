@@ -65,7 +65,7 @@ SHAPES = 6
 NO_SHAPES = np.zeros((0, 5))
 ABSENT_SHAPE = np.array([-1.0, 0.0, 0.0, 0.0, 1.0])
 """A row of no shape: fills up the rows of a window."""
-DEEPEST, FARTHEST = -0.05, 0.11
+DEEPEST, FARTHEST = -0.05, 0.15
 """Metres between which distances are kept, in bytes; beyond them they are these."""
 
 _SEAT_NUMBERS = 8
@@ -197,6 +197,7 @@ class ShapeBank:
         np.savez_compressed(
             part,
             texts=np.array([[s.name, s.kind, s.maker] for s in self.shapes]),
+            between=np.array([DEEPEST, FARTHEST]),
             places=np.array([[s.factor, *s.origin, s.spacing] for s in self.shapes]),
             seats=np.array(seats).reshape(-1, _SEAT_NUMBERS),
             sizes=np.array([s.values.shape for s in self.shapes]),
@@ -211,8 +212,9 @@ class ShapeBank:
             texts, places, seats, sizes, values = (
                 z[name] for name in ("texts", "places", "seats", "sizes", "values")
             )
+            between = z["between"] if "between" in z else np.zeros(2)
 
-        if seats.shape[1] != _SEAT_NUMBERS:
+        if seats.shape[1] != _SEAT_NUMBERS or not np.array_equal(between, (DEEPEST, FARTHEST)):
             raise InputError(
                 f"The furniture in '{file}' was made by an earlier version; make the dataset anew "
                 "with 'dafnet prepare'."
@@ -381,4 +383,4 @@ def bank_of(pieces: Iterable[Piece], factors: Sequence[float] = FACTORS) -> Shap
     return ShapeBank(tuple(shape for piece in pieces for shape in shapes_of(piece, factors)))
 
 
-assert FARTHEST < BAND
+assert RADIUS < FARTHEST <= BAND
