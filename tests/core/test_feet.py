@@ -219,14 +219,17 @@ def test_takes_reach_feet_that_are_asked_for_and_are_kept_with_them():
 def test_weights_are_told_of_feet_only_where_training_gave_them():
     scene, controls = _sits_with_a_foot_on_a_box()
     weights = load_weights()
-    assert not weights.heeds_legs
-    nothing = generate(scene, replace(controls, foot_left=None), weights)
-    deaf = generate(scene, controls, weights)
+    deafened, hearing = (
+        replace(weights, metadata={**weights.metadata, "told": told})
+        for told in ("head hands", "head hands legs")
+    )
+    assert hearing.heeds_legs and not deafened.heeds_legs
+    nothing = generate(scene, replace(controls, foot_left=None), deafened)
+    deaf = generate(scene, controls, deafened)
     assert np.array_equal(deaf.poses, nothing.poses)
     assert sum("not trained with targets for feet" in each for each in deaf.warnings) == 1
     assert not any("for feet" in each for each in nothing.warnings)
-    hears = replace(weights, metadata={**weights.metadata, "told": "head hands legs"})
-    told = generate(scene, controls, hears)
+    told = generate(scene, controls, hearing)
     first = PREROLL + len(controls) - 46
     assert np.array_equal(told.poses[:first], nothing.poses[:first])
     assert not np.allclose(told.poses[first + 2 :], nothing.poses[first + 2 :], atol=1e-4)

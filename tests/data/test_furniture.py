@@ -9,6 +9,7 @@ from dafnet_addon.core.root import root_from_joints
 from dafnet_addon.core.rotations import rotate, yaw_matrix
 from dafnet_addon.core.skeleton import REST, SEAT_TO_PELVIS, joint
 from dafnet_addon.data.dataset.windows import at_another_desk
+from dafnet_addon.data.furnish import furniture
 from dafnet_addon.data.furnish.boxes import distances
 from dafnet_addon.data.furnish.fits import fit_report
 from dafnet_addon.data.furnish.flesh import probes
@@ -135,7 +136,9 @@ MOTIONS = {
 
 @pytest.mark.parametrize("name", MOTIONS)
 @pytest.mark.parametrize("yaw", [0.0, 2.1])
-def test_no_piece_cuts_the_swept_body(name, yaw):
+def test_no_piece_cuts_the_swept_body(name, yaw, monkeypatch):
+    """But for a table that one sits down at closely, which is looked at below."""
+    monkeypatch.setattr(furniture, "_CLOSE", 0.0)
     joints, rooms = _turned(MOTIONS[name](), yaw), 0
     for seed in range(12):
         boxes, reason = _furnished(seed, joints)
@@ -333,6 +336,24 @@ def test_who_sits_on_the_edge_and_lies_down_has_one_bed():
             assert all(kind != "seat" for kind, _ in pieces)
             assert distances(bed.boxes, (place - (0, 0, SEAT_TO_PELVIS))[None]).min() < 0.1
     assert found >= 4
+
+
+def test_a_table_stands_close_to_some_who_sit_and_no_root_goes_through_it():
+    """Who came along the lane between table and chair has no room to stand, but his root has."""
+    joints = _seated(frames=150, down=60)
+    aside = np.maximum(1.0 - np.arange(150) / 40.0, 0.0)  # a metre, from the right
+    joints[..., 0] += aside[:, None]
+    path, near = root_from_joints(joints), []
+    (rest,) = resting(joints, path)
+    for seed in range(60):
+        pieces, _ = fitted(np.random.default_rng(seed), joints, path, probes(joints))
+        for kind, desk in pieces:
+            if kind == "spare desk" and desk is not None:
+                top = desk.boxes[:1]
+                at = np.c_[path.position[:, :2], np.full(len(path), top[0, 2])]
+                assert distances(top, at).min() > -0.13
+                near.append(distances(top, np.array([[*rest.position[:2], top[0, 2]]])).min())
+    assert 3 <= sum(gap < 0.4 for gap in near) < len(near)
 
 
 def test_motion_cut_off_half_way_down_is_not_used():

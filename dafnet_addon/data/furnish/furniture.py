@@ -29,7 +29,8 @@ _HALF_DOWN = 0.80  # metres; a pelvis that is lower is on its way to a seat
 _NEAR_BY = 0.8  # metres from a seat, within which one is on the way to it
 _REAL = 0.7  # of what carries a body, where there are real pieces
 _REAL_STRAY = 0.5  # of what stands about
-_LIKELY = {"desk": 0.95, "board": 0.8, "shelf": 0.6, "spare desk": 0.35}
+_LIKELY = {"desk": 0.95, "board": 0.8, "shelf": 0.6, "spare desk": 0.45}
+_CLOSE = 0.6  # of the spare desks that somebody sits at
 _STANDS_BEFORE = 0.2  # metres a second: a slower body may have a desk before it, too
 
 
@@ -80,7 +81,9 @@ def fitted(
     that a chair is drawn up to it or pushed back, which nobody's motion shows. Where a ``bank`` of
     real pieces is given, most of what carries a body is one of them. Hands may as well work in the
     air: now and then theirs is not tried, and not in the list. A "spare desk" stands before some
-    who sit or stand, and nobody uses it: a desk alone is no reason to sit down.
+    who sit or stand, and nobody uses it: a desk alone is no reason to sit down. As one goes to a
+    table along the lane between it and its chairs, it is as often as not so near that only who
+    sits, and a root, have room.
     """
     beds, rests = lying(joints), resting(joints, path)
     if _cut_off(joints, beds, rests):
@@ -115,7 +118,9 @@ def fitted(
         place = places[0] if places else _standing_place(path)
         bare = all(kind not in ("desk", "bed") or found is None for kind, found in pieces)
         if place is not None and bare and rng.random() < _LIKELY["spare desk"]:
-            pieces.append(("spare desk", _furnishing(spare_desk(rng, place, points))))
+            sits_close = len(places) > 0 and rng.random() < _CLOSE
+            room = probes(joints[place.start : place.end]) if sits_close else points
+            pieces.append(("spare desk", _furnishing(spare_desk(rng, place, room, path))))
 
     return pieces, missing
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from ...core.root import forward_of
+from ...core.root import RootPath, forward_of
 from ..motion.interactions import Interaction, across
 from ..motion.rests import Rest
-from .boxes import box, placed
+from .boxes import box, distances, placed
 from .carriers import STYLES, carrier
 from .flesh import box_clearance, pressed
 from .real_pieces import ON_DESK
@@ -13,6 +13,7 @@ from .real_pieces import ON_DESK
 __all__ = ["board_for", "desk_for", "shelf_for", "spare_desk"]
 
 _TRIES = 16
+_OVER_THE_EDGE = 0.12  # metres; a chair is drawn up as one sits down
 
 # A stretched wrist would carry the hand's probe; on a board, as on a top, the wrist bends.
 _ON_BOARD = pressed(0.0, wrist=0.01, hand=0.12)
@@ -110,9 +111,12 @@ def shelf_for(rng: np.random.Generator, use: Interaction, points: np.ndarray) ->
     return None
 
 
-def spare_desk(rng: np.random.Generator, rest: Rest, points: np.ndarray) -> np.ndarray | None:
-    """A desk before a body that rests and leaves it alone, drawn up until it would touch the body
-    on its way there.
+def spare_desk(
+    rng: np.random.Generator, rest: Rest, points: np.ndarray, path: RootPath
+) -> np.ndarray | None:
+    """A desk before a body that rests and leaves it alone, drawn up until it would touch the body's
+    ``points``, or until a root on this ``path`` would go through its top and not only over its
+    edge.
     """
     top, x, depth, thick = (
         rng.uniform(0.6, 0.85),
@@ -131,7 +135,9 @@ def spare_desk(rng: np.random.Generator, rest: Rest, points: np.ndarray) -> np.n
     gap = rng.uniform(0.01, 0.08)
     for distance in np.arange(0.2, 1.0, 0.08):
         candidate = placed(desk, rest.position[:2] + distance * forward, rest.yaw)
-        if box_clearance(candidate, points) >= gap:
+        at_top = np.c_[path.position[:, :2], np.full(len(path), candidate[0, 2])]
+        crossed = distances(candidate[:1], at_top).min() < -_OVER_THE_EDGE
+        if not crossed and box_clearance(candidate, points) >= gap:
             return candidate
 
     return None
