@@ -218,7 +218,7 @@ def test_two_runs_share_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(making, "_WAITS", 0.5)
     of = batch(tmp_path, shot("slow", seconds=5.0) + shot("b"))
     running = driver(of)
-    wait_until(lambda: alive(str(tmp_path)) and (of.output / "b").exists())
+    wait_until(lambda: (of.output / "b").exists() and alive("slow.json"))
     found = made(of)
     assert found["slow"].state == "busy" and "Another run" in found["slow"].sentence
     assert running.communicate()[0].split() == ["made", "made"]
