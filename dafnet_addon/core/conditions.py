@@ -78,7 +78,7 @@ _AROUND = 6  # spheres of the sensor's innermost ring
 _UNDER = (
     (np.hypot(SPHERES[:, 0], SPHERES[:, 1]) < 0.2) & (SPHERES[:, 2] > 0.2) & (SPHERES[:, 2] < 0.9)
 )
-_SOLID = 0.65
+_SOLID = 0.65  # the same at 5 cm
 
 
 @dataclass(frozen=True)

@@ -82,8 +82,8 @@ def fitted(
     real pieces is given, most of what carries a body is one of them. Hands may as well work in the
     air: now and then theirs is not tried, and not in the list. A "spare desk" stands before some
     who sit or stand, and nobody uses it: a desk alone is no reason to sit down. As one goes to a
-    table along the lane between it and its chairs, it is as often as not so near that only who
-    sits, and a root, have room.
+    table along the lane between it and its chairs, it is before most who sit so near that only
+    who sits, and a root, have room.
     """
     beds, rests = lying(joints), resting(joints, path)
     if _cut_off(joints, beds, rests):
@@ -118,7 +118,7 @@ def fitted(
         place = places[0] if places else _standing_place(path)
         bare = all(kind not in ("desk", "bed") or found is None for kind, found in pieces)
         if place is not None and bare and rng.random() < _LIKELY["spare desk"]:
-            sits_close = len(places) > 0 and rng.random() < _CLOSE
+            sits_close = bool(places) and rng.random() < _CLOSE
             room = probes(joints[place.start : place.end]) if sits_close else points
             pieces.append(("spare desk", _furnishing(spare_desk(rng, place, room, path))))
 
