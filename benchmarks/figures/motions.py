@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dafnet_addon import Controls, generate
-from dafnet_addon.core.conditions import PREROLL, shot_steps
+from dafnet_addon.core.beginning import PREROLL
+from dafnet_addon.core.conditions import shot_steps
 from dafnet_addon.core.kinematics import fit, forward_kinematics
 from dafnet_addon.core.paths import Route
 from dafnet_addon.core.progress import run_to_end

@@ -17,7 +17,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from ..core.conditions import PREROLL, Shot
+from ..core.beginning import PREROLL
+from ..core.conditions import Shot
 from ..core.inputs import velocities_up_to
 from ..core.kinematics import on_bones
 from ..core.root import RootPath, to_world

@@ -681,9 +681,9 @@ TOOLTIPS = {
         "legen"
     ),
     "Replace files that are there already": ("Dateien ersetzen, die schon da sind"),
-    "The character stands at the root before the first frame": (
-        "Die Figur steht vor dem ersten Bild an der Wurzel"
-    ),
+    (
+        "The character stands at the root before the first frame; over a seat it has sat down there"
+    ): ("Die Figur steht vor dem ersten Bild an der Wurzel; auf einem Sitz hat sie sich gesetzt"),
     "The hips move through the room": ("Die Hüfte bewegt sich durch den Raum"),
     "What takes begin with": ("Womit Takes beginnen"),
     (

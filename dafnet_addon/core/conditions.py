@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .beginning import PREROLL, beginning_at
 from .checks import in_frames
 from .distance import prepared, rigid_split, scaled
 from .errors import InputError
@@ -27,7 +28,6 @@ from .resampling import (
 from .root import RootPath, ahead, root_from_matrices, smoothed, to_root, to_world, velocities
 from .rotations import frame_from, normalised, rotate, transpose
 from .sampler import Conditions
-from .sensor import SPHERES
 from .series import MODEL_FPS, smoothstep
 from .skeleton import FEET_ASKED, LOWER, MODEL_ORDER, OFFSETS, PARENTS, PELVIS, TARGETS, UPPER
 from .solids import Box, Mesh, Scene
@@ -37,20 +37,13 @@ __all__ = [
     "Change",
     "Shot",
     "Request",
-    "over_a_seat",
     "rolled",
     "shot_steps",
     "foot_targets",
     "targets_of",
     "turns_of",
-    "PREROLL",
     "STAYS",
 ]
-
-PREROLL = 70
-"""Frames for which the root stands still before the first one, so that the model's memory has
-settled.
-"""
 
 _SLOTS = {name: MODEL_ORDER.index(j) for name, j in TARGETS.items()}
 _TOES = {name: PARENTS.index(j) for name, j in FEET_ASKED.items()}
@@ -74,11 +67,6 @@ _STILL = 0.02  # metres or radians in the whole shot, under which a root does no
 _FAR_FROM_ROOT = 1.0  # metres that a pelvis may be beside its root where the character begins
 _CROWDED = 0.35  # share of the sensor that furniture fills, above which the user is told
 _FILLED = 0.75  # occupancy of a sphere whose centre is 4 cm from a solid
-_AROUND = 6  # spheres of the sensor's innermost ring
-_UNDER = (
-    (np.hypot(SPHERES[:, 0], SPHERES[:, 1]) < 0.2) & (SPHERES[:, 2] > 0.2) & (SPHERES[:, 2] < 0.9)
-)
-_SOLID = 0.65  # the same at 5 cm
 
 
 @dataclass(frozen=True)
@@ -136,9 +124,9 @@ class Shot:
 
 def _path_of(
     controls: Controls, times: np.ndarray, target: np.ndarray, warnings: list[str]
-) -> tuple[RootPath, RootPath]:
+) -> tuple[RootPath, RootPath | None]:
     """R^τ: the root flattened, at 30 fps, smoothed once; and that of the ``PREROLL`` frames before
-    it, in which it stands unless it is said how it moved.
+    it, where it is said how it moved.
     """
     raw, tilt = root_from_matrices(np.asarray(controls.root, float))
     if tilt > _TILT:
@@ -174,8 +162,7 @@ def _path_of(
     position = resample_positions(raw.position / controls.scale, times, target)
     path = smoothed(RootPath(position, resample_positions(raw.yaw, times, target)))
     if not earlier:
-        held = RootPath(rolled(path.position)[:PREROLL], rolled(path.yaw)[:PREROLL])
-        return path, held
+        return path, None
     return (
         RootPath(path.position[earlier:], path.yaw[earlier:]),
         RootPath(path.position[:earlier], path.yaw[:earlier]),
@@ -195,18 +182,17 @@ def _model_times_before(controls: Controls) -> np.ndarray:
     return np.maximum(-frame_times(PREROLL + 1, MODEL_FPS)[::-1], _times_before(controls)[0])
 
 
-def _poses_before(controls: Controls, path: RootPath, lead: RootPath) -> np.ndarray | None:
-    """The body's poses (PREROLL + 1, 66) before the first frame and in it; None where nothing is
-    said of them. Raises InputError where the body is far from its root.
+def _poses_before(controls: Controls, whole: RootPath) -> np.ndarray | None:
+    """The body's poses (PREROLL + 1, 66) before the first frame and in it, on a path that begins
+    as long before; None where nothing is said of them. Raises InputError where the body is far from
+    its root.
     """
     if controls.before is None:
         return None
     joints = resample_positions(
         controls.before / controls.scale, _times_before(controls), _model_times_before(controls)
     )
-    there = RootPath(
-        np.concatenate([lead.position, path.position[:1]]), np.concatenate([lead.yaw, path.yaw[:1]])
-    )
+    there = RootPath(whole.position[: PREROLL + 1], whole.yaw[: PREROLL + 1])
     poses = to_root(there, joints)
     away = float(np.linalg.norm(poses[-1, PELVIS, :2]))
     if away > _FAR_FROM_ROOT:
@@ -505,14 +491,6 @@ def _look_around(scene: Scene, path: RootPath, occupied: np.ndarray, warnings: l
         )
 
 
-def over_a_seat(occupancy: np.ndarray) -> bool:
-    """Whether a root that sees this (2640,) is over a seat or bed, not beside one: at a seat's
-    height all around is solid.
-    """
-    around = occupancy[_UNDER].reshape(-1, _AROUND)
-    return bool(((around > _SOLID).sum(axis=1) >= _AROUND - 1).any())
-
-
 def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]:
     """Everything that the model is given; yields progress in [0, 1], solid by solid. Raises
     InputError for bad controls.
@@ -553,18 +531,20 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     occupied = yield from within(occupancy.steps(scene, path), 0.5, 1.0)
     _look_around(scene, path, occupied, warnings)
 
-    # Before the first frame nothing but a seat under the root is there, so that who starts beside
-    # furniture starts standing.
-    before = occupied[:1] if over_a_seat(occupied[0]) else np.zeros_like(occupied[:1])
+    start = RootPath(path.position[:1], path.yaw[:1])
+    begun = beginning_at(scene, start, occupied[0], lead)
     whole = RootPath(
-        np.concatenate([lead.position, path.position]), np.concatenate([lead.yaw, path.yaw])
+        np.concatenate([begun.path.position, path.position]),
+        np.concatenate([begun.path.yaw, path.yaw]),
     )
+    given = rolled(request.share > 0.0).astype(float)
+    given[: begun.arrives] = 0.0
     conditions = Conditions(
         velocity=velocities(whole),
         ahead=ahead(whole),
-        occupancy=np.concatenate([np.repeat(before, PREROLL, axis=0), occupied]),
+        occupancy=np.concatenate([begun.occupancy, occupied]),
         observation=rolled(request.observation),
-        given=rolled(request.share > 0.0).astype(float),
+        given=given,
     )
     own_path = resample_path(path, MODEL_FPS, controls.fps, len(controls))
     return Shot(
@@ -576,7 +556,7 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
         own_request=_request(controls, own_path, controls.fps, []),
         own_scene=_with_grids(own_scene, scene),
         warnings=tuple(warnings),
-        before=_poses_before(controls, path, lead),
+        before=_poses_before(controls, whole),
     )
 
 

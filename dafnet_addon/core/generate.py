@@ -9,9 +9,10 @@ from time import perf_counter
 
 import numpy as np
 
+from .beginning import PREROLL
 from .checks import MAX_SEED, number, whole
 from .cleanup import CleanUp, cleaned, reach_targets
-from .conditions import PREROLL, Change, Shot, rolled, shot_steps, targets_of, turns_of
+from .conditions import Change, Shot, rolled, shot_steps, targets_of, turns_of
 from .errors import InputError
 from .kinematics import Bent, Turn, come_over, global_from_local, local_from_global, turned
 from .leaning import lean_findings, lean_of, with_lean
@@ -416,7 +417,7 @@ def _wanted(
         ],
         axis=1,
     )
-    share = rolled(_told(shot.request.share, weights))
+    share = rolled(_told(shot.request.share, weights)) * shot.conditions.given
     return _Wanted(
         shot=shot,
         conditions=replace(shot.conditions, given=(share > 0.0).astype(float)),

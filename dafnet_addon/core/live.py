@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from .beginning import PREROLL, beginning_at
 from .cleanup import CleanUp
-from .conditions import PREROLL, over_a_seat
 from .distance import prepared, scaled
 from .errors import InputError
 from .following import PointFollower, RootFollower, Seat
@@ -211,11 +211,11 @@ class LiveBody:
         self._signs: np.ndarray | None = None
 
         sampler.forget()
-        seen = self._seen()
-        if not over_a_seat(seen):
-            seen = np.zeros_like(seen)
-        for _ in range(PREROLL):
-            self._make(Lead(start.position, start.yaw), 0.0, seen)
+        here = self._here()
+        begun = beginning_at(surroundings.near(here.position[0]), here, self._seen(here))
+        for k in range(PREROLL):
+            place = RootPath(begun.path.position[k, None], begun.path.yaw[k, None])
+            self._make(Lead(start.position, start.yaw), 0.0, begun.occupancy[k], place)
 
     @property
     def frame(self) -> LiveFrame:
@@ -230,22 +230,25 @@ class LiveBody:
     def step(self, lead: Lead, temperature: float) -> LiveFrame:
         """The next frame, led by ``lead``; at ``temperature`` 0 with a little life as well."""
         self._root.step(lead.position / self.scale, lead.yaw, self._scaled_seats())
-        return self._make(lead, temperature or _LIVELY, self._seen())
+        here = self._here()
+        return self._make(lead, temperature or _LIVELY, self._seen(here), here)
 
     def _scaled_seats(self) -> list[Seat]:
         return [Seat(s.position / self.scale, s.yaw, s.aside / self.scale) for s in self.seats]
 
-    def _seen(self) -> np.ndarray:
-        """What the sensor sees from the root (2640,)."""
-        here = RootPath(self._root.position[None], np.array([self._root.yaw]))
-        near = self.surroundings.near(self._root.position)
+    def _here(self) -> RootPath:
+        """Where the root is now, one frame."""
+        return RootPath(self._root.position[None].copy(), np.array([self._root.yaw]))
+
+    def _seen(self, here: RootPath) -> np.ndarray:
+        """What the sensor sees from there (2640,)."""
+        near = self.surroundings.near(here.position[0])
         if not near.solids:
             return np.zeros(len(SPHERES), np.float32)
         return occupancy(near, here)[0]
 
-    def _make(self, lead: Lead, temperature: float, seen: np.ndarray) -> LiveFrame:
-        self._path.append((self._root.position.copy(), self._root.yaw))
-        here = RootPath(self._root.position[None].copy(), np.array([self._root.yaw]))
+    def _make(self, lead: Lead, temperature: float, seen: np.ndarray, here: RootPath) -> LiveFrame:
+        self._path.append((here.position[0], float(here.yaw[0])))
         self._occupancy.append(seen)
         self._ask(lead, here)
 

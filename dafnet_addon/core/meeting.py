@@ -9,7 +9,7 @@ from collections.abc import Generator
 
 import numpy as np
 
-from .conditions import PREROLL
+from .beginning import PREROLL
 from .errors import InputError
 from .kinematics import (
     Bent,

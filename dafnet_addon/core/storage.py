@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from .beginning import PREROLL
 from .checks import FARTHEST, MAX_FRAMES, inside, number, shaped, whole
-from .conditions import PREROLL
 from .errors import InputError
 from .network import MAX_ACTIONS
 from .resampling import covering_frames

@@ -49,7 +49,8 @@ class Controls:
     ``lean`` (T,), or one number: degrees that the trunk leans back, more than by itself, while one
     sits; forward below 0; within ``LEANS``. The network is not told.
     ``before`` (K, 22, 3), ``before_root`` (K, 4, 4): the joints and the root in the frames before
-    the first one and, last of all, in it: the take begins with that motion, else from standing.
+    the first one and, last of all, in it: the take begins with that motion, else from standing, or
+    from having sat down where the root is over a seat.
     Of more than 70 / 30 seconds the last count; before the first of them it is taken to be still.
 
     Lists will do for arrays. Raises InputError, which names the field, for what cannot be used:

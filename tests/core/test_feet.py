@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from dafnet_addon import Box, CleanUp, Controls, InputError, Scene, generate, load_weights
+from dafnet_addon.core.beginning import PREROLL
 from dafnet_addon.core.cleanup import cleared, planted, reach_targets
-from dafnet_addon.core.conditions import PREROLL, shot_steps, targets_of
+from dafnet_addon.core.conditions import shot_steps, targets_of
 from dafnet_addon.core.kinematics import (
     Turn,
     forward_kinematics,

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from dafnet_addon.core.conditions import PREROLL, shot_steps
+from dafnet_addon.core.beginning import PREROLL
+from dafnet_addon.core.conditions import shot_steps
 from dafnet_addon.core.distance import prepared, scaled
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.grid import BAND

@@ -382,7 +382,12 @@ class CharacterSettings(bpy.types.PropertyGroup):
         options=set(),
         description="What takes begin with",
         items=[
-            (STANDING, "Standing", "The character stands at the root before the first frame"),
+            (
+                STANDING,
+                "Standing",
+                "The character stands at the root before the first frame; over a seat it has sat "
+                "down there",
+            ),
             (
                 AS_IT_IS,
                 "As It Is",

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ...core.conditions import PREROLL
+from ...core.beginning import PREROLL
 from ...core.errors import InputError
 from ...core.progress import stepwise, within
 from ...core.resampling import covering_frames

@@ -6,14 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from ...core.conditions import PREROLL
+from ...core.beginning import PREROLL
+from ...core.conditions import shot_steps
 from ...core.metrics import action_information, mutual_information
+from ...core.progress import run_to_end
 from ...core.root import to_root
 from ...core.sampler import Sampler
+from ...core.series import MODEL_FPS
+from ...core.take import Controls
 from ...core.weights import Weights
 from ...data.held_out.captured import ACTIVITIES, HeldClip
 from ..batches import NOISE
-from .clips import Figures, map_clips, pooled_row, shot_of
+from .clips import Figures, map_clips, pooled_row
 
 __all__ = ["FollowedClip", "actions_and_likelihood", "follow"]
 
@@ -37,7 +41,9 @@ def follow(sampler: Sampler, task: tuple[HeldClip, np.ndarray | None]) -> Follow
     of other actions if given.
     """
     clip, other = task
-    shot = shot_of(clip, "FREE")
+    root = clip.path.matrices()
+    held = Controls(MODEL_FPS, root, before=clip.joints[:1], before_root=root[:1])
+    shot = run_to_end(shot_steps(clip.scene, held))
 
     rng = np.random.default_rng(len(clip.joints))
     poses = to_root(shot.path, clip.joints).reshape(-1, 66)

@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 
 from ...core import liveliness
+from ...core.beginning import PREROLL
 from ...core.cleanup import CleanUp
-from ...core.conditions import PREROLL, Shot, shot_steps
+from ...core.conditions import Shot, shot_steps
 from ...core.generate import cleaned_up
 from ...core.kinematics import on_bones
 from ...core.metrics import (
