@@ -19,7 +19,8 @@ import numpy as np
 
 from benchmarks.seats import seat
 from dafnet_addon import Controls, Scene, Take, generate, load_weights
-from dafnet_addon.core.generate import Draw, takes_steps
+from dafnet_addon.core.draws import Draw
+from dafnet_addon.core.generate import takes_steps
 from dafnet_addon.core.liveliness import BANDS, LIVELY, band_speeds, descent, sway
 from dafnet_addon.core.paths import Route, Stop, facing, route
 from dafnet_addon.core.progress import run_to_end

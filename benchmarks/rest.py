@@ -18,7 +18,8 @@ import numpy as np
 from dafnet_addon import Box, CleanUp, Controls, InputError, Mesh, Scene, load_weights
 from dafnet_addon.core.conditions import shot_steps
 from dafnet_addon.core.distance import grid_of
-from dafnet_addon.core.generate import Draw, cleaned_up, takes_steps
+from dafnet_addon.core.draws import Draw
+from dafnet_addon.core.generate import cleaned_up, takes_steps
 from dafnet_addon.core.metrics import jerk
 from dafnet_addon.core.occupancy import distance
 from dafnet_addon.core.paths import Stop

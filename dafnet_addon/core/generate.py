@@ -10,9 +10,9 @@ from time import perf_counter
 import numpy as np
 
 from .beginning import PREROLL
-from .checks import MAX_SEED, number, whole
 from .cleanup import CleanUp, cleaned, reach_targets
 from .conditions import Change, Shot, rolled, shot_steps, targets_of, turns_of
+from .draws import Asked, Draw
 from .errors import InputError
 from .kinematics import Bent, Turn, come_over, global_from_local, local_from_global, turned
 from .leaning import lean_findings, lean_of, with_lean
@@ -32,13 +32,11 @@ from .softness import Support, support_under
 from .solids import Scene
 from .take import Controls, Take
 from .touching import touches
-from .verdict import verdict
+from .verdict import STANDS, verdict
 from .weights import Weights
 
 __all__ = [
     "RAW",
-    "Asked",
-    "Draw",
     "clean_again_steps",
     "cleaned_up",
     "crowd_steps",
@@ -50,48 +48,21 @@ __all__ = [
 
 RAW = CleanUp()
 """The model's own motion."""
-_HOTTEST = 10.0
 _HAIR = 1e-3  # metres, radians, fractions: what comes back from single precision is the same
 _LEAD = 30  # frames before a change of mode that tell how straight limbs were twisted
 _CONDITIONED = 0.15  # progress when the conditions are known
 _FRAMES_AT_ONCE = 12_000  # of all people who are made side by side
 _SAMPLED = 0.85  # progress when the poses are made
-_STRIDE = 7919  # from the seed of one try to the next one's
+_DRAWN = 0.95  # progress when all takes are drawn once
+_AGAIN = 3  # times that one who stays standing before his seat is drawn anew
+_DRAWN_ANEW = (
+    "With seed {first} the character stays standing before a seat, so it was drawn with {other}."
+)
 _LEGS = slice(len(UPPER), None)  # joints in the model's order
 _LEGS_UNHEARD = (
     "These weights were not trained with targets for feet and legs; only Reach Targets brings the "
     "feet there, after the motion is made."
 )
-
-
-@dataclass(frozen=True)
-class Draw:
-    """What one take is drawn with: ``seed`` and ``temperature``; the legs may have their own, None
-    goes with the body's. ``held``: only the noise that lasts all along a take, as in the paper;
-    else what comes and goes in real motion as well, where the weights know it.
-
-    Seeds are whole numbers from 0 to ``MAX_SEED``, temperatures from 0 to 10. Raises InputError
-    for others.
-    """
-
-    seed: int = 0
-    lower_seed: int | None = None
-    temperature: float = 0.0
-    lower_temperature: float | None = None
-    held: bool = False
-
-    def __post_init__(self) -> None:
-        hold = partial(object.__setattr__, self)
-        hold("seed", whole(self.seed, "The seed", 0, MAX_SEED))
-        hold("temperature", number(self.temperature, "The temperature", 0.0, _HOTTEST))
-        if self.lower_seed is not None:
-            hold("lower_seed", whole(self.lower_seed, "The seed of the legs", 0, MAX_SEED))
-
-        if self.lower_temperature is not None:
-            hold(
-                "lower_temperature",
-                number(self.lower_temperature, "The temperature of the legs", 0.0, _HOTTEST),
-            )
 
 
 @dataclass(frozen=True)
@@ -347,14 +318,6 @@ def _finished_steps(
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What is asked of one person: his ``controls``, and what each of his takes is drawn with."""
-
-    controls: Controls
-    draws: tuple[Draw, ...]
-
-
-@dataclass(frozen=True)
 class _Wanted:
     """A shot that is to be sampled, and what it is to be sampled from: ``conditions``, ``changes``
     of mode with what counts of them for the weights, ``share`` (PREROLL + N, 22) of the joints that
@@ -465,17 +428,23 @@ def takes_steps(
             watch(frame - PREROLL, to_world(at, pose.reshape(1, 22, 3))[0] * controls.scale)
 
     yield 0.0
+    asked, sampler = [Asked(controls, tuple(draws))], Sampler(weights, device)
     job = _together(
         scene,
-        [Asked(controls, tuple(draws))],
+        asked,
         weights,
-        Sampler(weights, device),
+        sampler,
         clean_up=clean_up,
         kept=kept,
         tries=TRIES if resume_until is not None else 1,
         shown=shown if watch is not None else None,
     )
-    return (yield from job)[0]
+    if resume is not None and resume_frame > 0:
+        return (yield from job)[0]
+
+    found = yield from within(job, 0.0, _DRAWN)
+    job = _seated(found, scene, asked, weights, sampler, clean_up=clean_up, kept=kept)
+    return (yield from within(job, _DRAWN, 1.0))[0]
 
 
 def crowd_steps(
@@ -498,7 +467,11 @@ def crowd_steps(
         group = people[len(found) : len(found) + _at_once(people[len(found) :])]
         done = len(found) / len(people), (len(found) + len(group)) / len(people)
         job = _together(scene, group, weights, sampler, clean_up=clean_up)
-        found += yield from within(job, *done)
+        begin, end = done
+        middle = begin + _DRAWN * (end - begin)
+        takes = yield from within(job, begin, middle)
+        job = _seated(takes, scene, group, weights, sampler, clean_up=clean_up)
+        found += yield from within(job, middle, end)
     return found
 
 
@@ -527,7 +500,7 @@ def _together(
     started, count = perf_counter(), len(people)
     wanted: list[_Wanted] = []
     for k, asked in enumerate(people):
-        job = _wanted(scene, _tried(asked, tries), weights, sampler)
+        job = _wanted(scene, asked.tried(tries), weights, sampler)
         low, high = _CONDITIONED * k / count, _CONDITIONED * (k + 1) / count
         wanted.append((yield from within(job, low, high)))
     conditioned, sampling = perf_counter(), _CONDITIONED
@@ -565,22 +538,47 @@ def _together(
     return found
 
 
-def _tried(asked: Asked, tries: int) -> Asked:
-    """The same with so many draws for each of his, if they can differ."""
-    if tries == 1:
-        return asked
-    draws = [
-        replace(
-            draw,
-            seed=(draw.seed + k * _STRIDE) % (MAX_SEED + 1),
-            lower_seed=None
-            if draw.lower_seed is None
-            else (draw.lower_seed + k * _STRIDE) % (MAX_SEED + 1),
-        )
-        for draw in asked.draws
-        for k in range(tries)
+def _seated(
+    found: list[list[Take]],
+    scene: Scene,
+    people: Sequence[Asked],
+    weights: Weights,
+    sampler: Sampler,
+    *,
+    clean_up: CleanUp,
+    kept: Callable[[Shot], _Kept | None] = lambda shot: None,
+) -> Generator[float, None, list[list[Take]]]:
+    """The takes ``found`` of people, those drawn anew, with other seeds, that stay standing before
+    a seat on which their root rests: with some noise one does. Those that stand however they are
+    drawn are as they were.
+    """
+    missed = [
+        (k, b)
+        for k, takes in enumerate(found)
+        for b, take in enumerate(takes)
+        if people[k].draws[b].temperature > 0.0 and _stands(take)
     ]
-    return replace(asked, draws=tuple(draws))
+    for again in range(1, _AGAIN + 1):
+        standing = sorted({person for person, _ in missed})
+        for i, k in enumerate(standing):
+            which = [b for person, b in missed if person == k]
+            others = tuple(people[k].draws[b].other(again) for b in which)
+            asked = replace(people[k], draws=others)
+            job = _together(scene, [asked], weights, sampler, clean_up=clean_up, kept=kept)
+            done = again - 1 + i / len(standing), again - 1 + (i + 1) / len(standing)
+            made = yield from within(job, done[0] / _AGAIN, done[1] / _AGAIN)
+            for b, draw, take in zip(which, others, made[0], strict=True):
+                if not _stands(take):
+                    told = _DRAWN_ANEW.format(first=people[k].draws[b].seed, other=draw.seed)
+                    found[k][b] = replace(take, warnings=(*take.warnings, told))
+                    missed.remove((k, b))
+
+    yield 1.0
+    return found
+
+
+def _stands(take: Take) -> bool:
+    return any(each.word == STANDS for each in take.verdict)
 
 
 def _meeting(

@@ -21,7 +21,10 @@ from .softness import Support, guessed
 from .solids import Scene
 from .take import Finding
 
-__all__ = ["verdict"]
+__all__ = ["STANDS", "verdict"]
+
+STANDS = "stands"
+"""The word of a finding: who rests over a seat does not sit down."""
 
 _OFF_SEAT = 0.04  # metres from where a seat carries a pelvis, from where on it is seen
 _STANDS = 0.80  # metres of a pelvis over the floor, of one who did not sit down
@@ -87,9 +90,9 @@ def _seats(
         amount, when = f"{100 * abs(over):.0f} cm", f"at {middle / fps:.1f} s"
         if episode.pelvis_height > _STANDS and over > 2 * _OFF_SEAT:
             yield Finding(
-                "stands",
-                f"Stands in '{name}' {when} and does not sit down; where the root rests on the "
-                "level part of a seat, make other takes at temperature 1",
+                STANDS,
+                f"Stands in '{name}' {when} and does not sit down; rest the root on the level part "
+                "of a seat, or make other takes",
                 good=False,
             )
         elif abs(over) <= _OFF_SEAT:

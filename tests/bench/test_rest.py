@@ -6,7 +6,7 @@ import runpy
 
 import pytest
 
-from dafnet_addon.core.generate import Draw
+from dafnet_addon.core.draws import Draw
 from kit.places import LIBRARY, ROOT
 
 REST = runpy.run_path(str(ROOT / "benchmarks" / "rest.py"))

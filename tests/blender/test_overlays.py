@@ -18,7 +18,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay import (
 )
 from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.cache import cache
 from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.drawing import compose
-from bl_ext.user_default.dafnet.dafnet_addon.core.generate import Draw
+from bl_ext.user_default.dafnet.dafnet_addon.core.draws import Draw
 from bl_ext.user_default.dafnet.dafnet_addon.core.root import RootPath
 from bl_ext.user_default.dafnet.dafnet_addon.core.sensor import RADIUS, SPHERES
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import REST

@@ -16,7 +16,8 @@ from bl_ext.user_default.dafnet.dafnet_addon import load_weights
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import create_character
 from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import job
-from bl_ext.user_default.dafnet.dafnet_addon.core.generate import Draw, takes_steps
+from bl_ext.user_default.dafnet.dafnet_addon.core.draws import Draw
+from bl_ext.user_default.dafnet.dafnet_addon.core.generate import takes_steps
 from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end
 from bl_ext.user_default.dafnet.dafnet_addon.core.solids import Scene
 from bl_ext.user_default.dafnet.dafnet_addon.core.take import Controls

@@ -5,7 +5,8 @@ import pytest
 
 from dafnet_addon import Box, CleanUp, Controls, Scene, load_weights
 from dafnet_addon.core import generate
-from dafnet_addon.core.generate import Asked, Draw, crowd_steps, takes_steps
+from dafnet_addon.core.draws import Asked, Draw
+from dafnet_addon.core.generate import crowd_steps, takes_steps
 from dafnet_addon.core.paths import Stop, route
 from dafnet_addon.core.progress import run_to_end
 

@@ -20,7 +20,8 @@ from dafnet_addon import (
     load_weights,
 )
 from dafnet_addon.core.checks import MAX_SEED
-from dafnet_addon.core.generate import Draw, takes_steps
+from dafnet_addon.core.draws import Draw
+from dafnet_addon.core.generate import takes_steps
 from dafnet_addon.core.metrics import bone_length_variation, end_effector_distance
 from dafnet_addon.core.paths import Stop, route
 from dafnet_addon.core.progress import run_to_end

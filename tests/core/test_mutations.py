@@ -31,7 +31,8 @@ from dafnet_addon import (
     load_weights,
 )
 from dafnet_addon.core import distance, storage
-from dafnet_addon.core.generate import Draw, clean_again_steps, takes_steps
+from dafnet_addon.core.draws import Draw
+from dafnet_addon.core.generate import clean_again_steps, takes_steps
 from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.sampler import Sampler
 from dafnet_addon.core.skeleton import END_EFFECTORS, OFFSETS, UPPER

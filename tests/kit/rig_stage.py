@@ -9,7 +9,8 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.character.takes import add_
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, detection, maps
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig.sizing import size_as_rig
-from bl_ext.user_default.dafnet.dafnet_addon.core.generate import Draw, generate
+from bl_ext.user_default.dafnet.dafnet_addon.core.draws import Draw
+from bl_ext.user_default.dafnet.dafnet_addon.core.generate import generate
 from bl_ext.user_default.dafnet.dafnet_addon.core.paths import Route, Stop, route
 from bl_ext.user_default.dafnet.dafnet_addon.core.solids import Box, Scene
 from bl_ext.user_default.dafnet.dafnet_addon.core.take import Controls, Take

@@ -8,8 +8,8 @@ to another file keeps them.
 
 import bpy
 
+from ...core.draws import Draw
 from ...core.errors import InputError
-from ...core.generate import Draw
 from ...core.storage import packed, unpacked
 from ...core.take import Controls, Take
 from ..compat import assign_action

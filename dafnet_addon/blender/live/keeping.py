@@ -7,8 +7,9 @@ from collections.abc import Generator
 import bpy
 import numpy as np
 
+from ...core.draws import Draw
 from ...core.errors import InputError
-from ...core.generate import Draw, played_take_steps
+from ...core.generate import played_take_steps
 from ...core.live import controls_of
 from ...core.progress import within
 from ...core.root import yaw_of

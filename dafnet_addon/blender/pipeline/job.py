@@ -15,8 +15,9 @@ import numpy as np
 
 from ... import load_weights
 from ...core.cleanup import CleanUp
+from ...core.draws import Draw
 from ...core.errors import InputError
-from ...core.generate import Draw, clean_again_steps, takes_steps
+from ...core.generate import clean_again_steps, takes_steps
 from ...core.progress import run_to_end, stepwise, within
 from ...core.take import Controls, Take
 from ..character.armature import metres_per_unit

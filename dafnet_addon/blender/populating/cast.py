@@ -7,8 +7,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core.draws import Draw
 from ...core.errors import InputError
-from ...core.generate import Draw
 from ...core.skeleton import STATURE
 from ...core.take import Controls, Take
 from ...director.plans import Plan

@@ -14,8 +14,9 @@ from ... import load_weights
 from ...core.cleanup import CleanUp
 from ...core.conditions import STAYS
 from ...core.distance import prepared
+from ...core.draws import Asked, Draw
 from ...core.files import require_replaceable, whole_folder
-from ...core.generate import Asked, Draw, crowd_steps
+from ...core.generate import crowd_steps
 from ...core.manifest import MANIFEST, Manifest, content_hash, words_hash
 from ...core.progress import run_to_end
 from ...core.root import root_from_matrices

@@ -12,8 +12,9 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, detection
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig.eyes import eyes_of
 from bl_ext.user_default.dafnet.dafnet_addon.core.cleanup import CleanUp
+from bl_ext.user_default.dafnet.dafnet_addon.core.draws import Draw
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
-from bl_ext.user_default.dafnet.dafnet_addon.core.generate import Draw, generate
+from bl_ext.user_default.dafnet.dafnet_addon.core.generate import generate
 from bl_ext.user_default.dafnet.dafnet_addon.core.solids import Scene
 from bl_ext.user_default.dafnet.dafnet_addon.core.take import Controls
 from bl_ext.user_default.dafnet.dafnet_addon.core.weights import load_weights
