@@ -3,6 +3,7 @@ and survive everything.
 """
 
 import ast
+import json
 from pathlib import Path
 
 import bpy
@@ -24,6 +25,12 @@ from bl_ext.user_default.dafnet.dafnet_addon.core.sensor import RADIUS, SPHERES
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import REST
 from bl_ext.user_default.dafnet.dafnet_addon.core.solids import box_distance
 from bl_ext.user_default.dafnet.dafnet_addon.core.take import Controls, Take
+from bl_ext.user_default.dafnet.dafnet_addon.core.weights import (
+    load_weights,
+    read_safetensors,
+    shipped_weights,
+    write_safetensors,
+)
 from bl_ext.user_default.dafnet.panels.overlays import DAFNET_PT_overlays
 
 from kit.panels import drawn_by
@@ -173,16 +180,34 @@ def test_a_box_occupies_the_spheres_that_it_covers(shot: Shot, unit: float) -> N
         shot = Shot(unit)
     (drawn,) = shot.drawn("spheres")
     centre = np.array((-0.4, 0.0, 0.3))
-    occupied = np.clip(1.0 - box_distance(SPHERES - centre, np.full(3, 0.2)) / RADIUS, 0.0, 1.0)
+    radius = load_weights().sphere_radius
+    occupied = np.clip(1.0 - box_distance(SPHERES - centre, np.full(3, 0.2)) / radius, 0.0, 1.0)
     known = SPHERES[occupied > 0.15]
     apart = np.linalg.norm(known[:, None] - unit * drawn.beads[None], axis=-1).min(axis=1)
     assert len(known) > 30 and apart.max() < 1e-3
-    assert (box_distance(unit * drawn.beads - centre, np.full(3, 0.2)) < RADIUS).all(), (
+    assert (box_distance(unit * drawn.beads - centre, np.full(3, 0.2)) < radius).all(), (
         "and no others"
     )
     inside = box_distance(unit * drawn.beads - centre, np.full(3, 0.2)) < -0.02
     assert drawn.bead_colours[inside, 0].min() > 0.95, "red where it is full"
     assert np.allclose(unit * drawn.radii[inside], 0.036, atol=1e-4)
+
+
+def test_spheres_see_as_far_as_those_of_the_weights_in_use(
+    shot: Shot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    count = {}
+    for radius in (RADIUS / 2.0, RADIUS):
+        file = tmp_path / f"{radius:.3f}.safetensors"
+        tensors, words = read_safetensors(shipped_weights())
+        config = {**json.loads(words["config"]), "sphere_radius": radius}
+        write_safetensors(file, tensors, {**words, "config": json.dumps(config)})
+        monkeypatch.setattr(contents, "weights_path", lambda _, file=file: str(file))
+        count[radius] = len(shot.drawn("spheres")[0].beads)
+    assert count[RADIUS] > 1.5 * count[RADIUS / 2.0]
+
+    monkeypatch.setattr(contents, "weights_path", lambda _: str(tmp_path / "missing.safetensors"))
+    assert len(shot.drawn("spheres")[0].beads) == count[RADIUS]
 
 
 def test_spheres_go_with_the_root_and_the_furniture(shot: Shot) -> None:

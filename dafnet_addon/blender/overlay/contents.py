@@ -11,15 +11,17 @@ from collections.abc import Callable, Collection
 import bpy
 import numpy as np
 
-from ...core.errors import DafnetError
+from ...core.errors import DafnetError, WeightsError
 from ...core.metrics import BAD_COLLISION_JOINTS, bad_collisions
 from ...core.occupancy import distance, occupancy
 from ...core.root import RootPath, root_from_matrices, to_world
-from ...core.sensor import SPHERES
+from ...core.sensor import RADIUS, SPHERES, narrowed
 from ...core.skeleton import END_EFFECTORS, FEET
 from ...core.take import Controls
+from ...core.weights import load_weights
 from ..character.armature import character_scale, metres_per_unit
 from ..character.takes import played_take, takes_of
+from ..preferences import weights_path
 from .cache import cache
 from .drawing import (
     ABOVE_FLOOR,
@@ -171,6 +173,21 @@ def _floor_of(context: bpy.types.Context, armature: bpy.types.Object, place: np.
     return float(place[2] if played is None else np.median(played.take.root[:, 2, 3]))
 
 
+def _sphere_radius(context: bpy.types.Context) -> float:
+    """How far the spheres of the weights in use see, canonical metres; of weights that cannot be
+    read as far as any: *Generate* says what is wrong with them.
+    """
+    file = weights_path(context)
+
+    def read() -> float:
+        try:
+            return load_weights(file).sphere_radius
+        except WeightsError:
+            return RADIUS
+
+    return cache.recall("sphere radius", file, read)
+
+
 def _spheres(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Drawing, ...]:
     """The sensor's spheres that the furniture occupies, in the root's frame, both as they are
     now.
@@ -179,8 +196,8 @@ def _spheres(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Dr
     if root is None:
         return ()
 
-    frame = scene.frame_current, scene.frame_subframe
-    key = cache.edits, cache.furniture, scene.session_uid, armature.session_uid, frame
+    frame, radius = (scene.frame_current, scene.frame_subframe), _sphere_radius(context)
+    key = cache.edits, cache.furniture, scene.session_uid, armature.session_uid, frame, radius
 
     def draw() -> tuple[Drawing, ...]:
         unit = metres_per_unit(scene)
@@ -194,7 +211,7 @@ def _spheres(context: bpy.types.Context, armature: bpy.types.Object) -> tuple[Dr
         floor = _floor_of(context, armature, place)
         solids = furniture_near(context, armature, place=place, size=size, floor=floor)
         path = RootPath(here.position * unit / size, here.yaw)
-        occupied = occupancy(solids, path)[0]
+        occupied = narrowed(occupancy(solids, path)[0], radius)
 
         shown = occupied > _OCCUPIED
         share = occupied[shown].astype(float)
