@@ -5,15 +5,15 @@ The network knows how high a seat is from having come to it. Whoever is on it fr
 empty memory rests 8 cm off in the mean, and half as far after he has sat down.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from .occupancy import distance, occupancy, tops_under
+from .drawn_up import in_frames_of, under
+from .occupancy import occupancy, tops_under
 from .root import RootPath, forward_of, smoothed
-from .rotations import rotate
 from .sensor import SPHERES
-from .solids import Box, Mesh, Scene
+from .solids import Scene
 
 __all__ = ["PREROLL", "Beginning", "beginning_at"]
 
@@ -23,11 +23,6 @@ PREROLL = 70
 _WAY = 0.3  # metres in front of a seat from which one came to it
 _COMES = 40  # frames in which
 _RESTS = 16  # frames for which one had sat by the first one
-_COLUMNS = np.stack(
-    np.meshgrid((-0.08, 0.0, 0.08), (-0.08, 0.0, 0.08), np.arange(0.2, 0.9, 0.05)), axis=-1
-).reshape(-1, 3)
-"""Places under the hips of who sits, in the root's frame, metres."""
-_TOUCHES = 0.02  # metres from a solid
 _UPRIGHT = (
     (np.hypot(SPHERES[:, 0], SPHERES[:, 1]) < 0.2)
     & (SPHERES[:, 1] > -0.01)
@@ -63,7 +58,7 @@ def beginning_at(
     does, he has always sat there.
     """
     still = RootPath(np.repeat(start.position, PREROLL, axis=0), np.repeat(start.yaw, PREROLL))
-    there = Scene(tuple(_in_first_frame(solid) for solid in scene.solids))
+    there = Scene(tuple(in_frames_of(solid, 0) for solid in scene.solids))
     over = bool(np.isfinite(tops_under(there, start))[0])
     held = np.repeat(seen[None] if over else np.zeros_like(seen[None]), PREROLL, axis=0)
     if lead is not None or not over:
@@ -73,31 +68,7 @@ def beginning_at(
     way = _WAY * left[:, None] * np.append(forward_of(start.yaw[0]), 0.0)
     came = smoothed(RootPath(still.position + way, still.yaw))
 
-    seen_coming = occupancy(_under(there, start), came)
+    seen_coming = occupancy(Scene(under(there, start)), came)
     if seen_coming[0, _UPRIGHT].max() > _SOLID:
         return Beginning(still, held)
     return Beginning(came, seen_coming, PREROLL - _RESTS)
-
-
-def _under(scene: Scene, start: RootPath) -> Scene:
-    """The solids that reach to under the hips of who sits there."""
-    columns = start.position[:, None] + rotate(start.rotation[:, None], _COLUMNS)
-    floor = start.position[:, 2]
-    return Scene(
-        tuple(
-            solid
-            for solid in scene.solids
-            if distance(Scene((solid,)), columns, floor).min() < _TOUCHES
-        )
-    )
-
-
-def _in_first_frame(solid: Box | Mesh) -> Box | Mesh:
-    """A solid that stays where it is in the first frame."""
-    matrices = solid.matrices() if isinstance(solid, Box) else solid.matrix
-    if matrices.ndim == 2:
-        return solid
-    first = matrices[0]
-    if isinstance(solid, Box):
-        return replace(solid, center=first[:3, 3], rotation=first[:3, :3])
-    return replace(solid, matrix=first)

@@ -2,7 +2,7 @@
 and on the canonical body.
 """
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,12 +10,13 @@ import numpy as np
 from .beginning import PREROLL, beginning_at
 from .checks import in_frames
 from .distance import prepared, rigid_split, scaled
+from .drawn_up import seen_while_sitting_down
 from .errors import InputError
 from .grid import BAND
 from .kinematics import Turn
 from .nearby import REACH_OF_A_BODY, solids_near
 from .occupancy import occupancy
-from .passage import listed, passages, seats_along
+from .passage import SatOn, listed, passages, seats_along
 from .progress import within
 from .resampling import (
     covering_frames,
@@ -468,8 +469,14 @@ def _at_model_rate(scene: Scene, times: np.ndarray, target: np.ndarray) -> Scene
     return Scene(tuple(solids))
 
 
-def _look_around(scene: Scene, path: RootPath, occupied: np.ndarray, warnings: list[str]) -> None:
-    met = passages(scene, path, MODEL_FPS, seats_along(scene, path, MODEL_FPS))
+def _look_around(
+    scene: Scene,
+    path: RootPath,
+    seats: Sequence[SatOn],
+    occupied: np.ndarray,
+    warnings: list[str],
+) -> None:
+    met = passages(scene, path, MODEL_FPS, seats)
     if met:
         places = listed(
             met,
@@ -529,10 +536,11 @@ def shot_steps(scene: Scene, controls: Controls) -> Generator[float, None, Shot]
     )
     warnings += said
     occupied = yield from within(occupancy.steps(scene, path), 0.5, 1.0)
-    _look_around(scene, path, occupied, warnings)
-
+    seats = seats_along(scene, path, MODEL_FPS)
+    _look_around(scene, path, seats, occupied, warnings)
     start = RootPath(path.position[:1], path.yaw[:1])
     begun = beginning_at(scene, start, occupied[0], lead)
+    occupied = seen_while_sitting_down(scene, path, seats, occupied)
     whole = RootPath(
         np.concatenate([begun.path.position, path.position]),
         np.concatenate([begun.path.yaw, path.yaw]),
