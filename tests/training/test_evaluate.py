@@ -235,7 +235,8 @@ def test_takes_made_together_are_those_that_generate_makes():
 def test_beside_measures_all_modes_and_the_likelihood_of_real_poses():
     from dafnet_addon.training.evaluation.actions import follow
 
-    sampler, clip = Sampler(load_weights()), _clip(40, seated=0)
+    beside = box((1.0, 0.0, 0.225), (0.4, 0.4, 0.45))[None]
+    sampler, clip = Sampler(load_weights()), _clip(40, seated=0, boxes=beside)
     runs = e.measure_clip(sampler, clip, seeds=2).runs
     assert set(runs) == {
         "ground_truth",

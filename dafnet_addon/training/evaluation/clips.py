@@ -274,9 +274,12 @@ def measure_clip(
     """
     shots = {"EE": shot_of(clip, "EE")}
     known = shots["EE"].conditions
+    asked = known.given.any(axis=1, keepdims=True)
     for mode in set(modes) - {"EE"}:
+        # What stands around is looked at once; how he came to where he begins goes with it.
         other = shot_of(clip, mode, Scene())
-        conditions = replace(other.conditions, occupancy=known.occupancy)
+        told = other.conditions
+        conditions = replace(known, observation=told.observation, given=told.given * asked)
         shots[mode] = replace(shots["EE"], conditions=conditions, request=other.request)
 
     runs = {"ground_truth": measure_takes(clip, clip.joints[None])}
