@@ -231,6 +231,20 @@ def test_takes_made_together_are_those_that_generate_makes():
         assert np.abs(take - alone.joints).max() < 2e-3
 
 
+@pytest.mark.parametrize("mode", ["FREE", "FULL"])
+def test_who_begins_seated_is_measured_as_he_is_made(mode):
+    sampler, clip = Sampler(load_weights()), _clip(60, seated=60)
+    shot = e.shot_of(clip, mode)
+    takes = e.sample_takes(sampler, shot, np.zeros((1, 66)))
+    made = e.measure_takes(clip, takes, mode)
+    runs = e.measure_clip(sampler, clip, seeds=2, modes=(mode,), clean=False).runs
+    measured = runs[f"{mode.lower()}_t0"]
+    assert np.allclose(measured.seats, made.seats, atol=1e-3)
+    assert _figure(measured, "end_effector_error") == pytest.approx(
+        _figure(made, "end_effector_error"), abs=1e-3
+    )
+
+
 @pytest.mark.torch
 def test_beside_measures_all_modes_and_the_likelihood_of_real_poses():
     from dafnet_addon.training.evaluation.actions import follow
