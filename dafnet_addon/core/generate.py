@@ -48,6 +48,8 @@ __all__ = [
 
 RAW = CleanUp()
 """The model's own motion."""
+_Drawing = Generator[float, None, list[list[Take]]]
+"""Draws the takes of each of some people, and yields progress in [0, 1]."""
 _HAIR = 1e-3  # metres, radians, fractions: what comes back from single precision is the same
 _LEAD = 30  # frames before a change of mode that tell how straight limbs were twisted
 _CONDITIONED = 0.15  # progress when the conditions are known
@@ -428,23 +430,18 @@ def takes_steps(
             watch(frame - PREROLL, to_world(at, pose.reshape(1, 22, 3))[0] * controls.scale)
 
     yield 0.0
-    asked, sampler = [Asked(controls, tuple(draws))], Sampler(weights, device)
-    job = _together(
-        scene,
-        asked,
-        weights,
-        sampler,
-        clean_up=clean_up,
-        kept=kept,
+    people, sampler = [Asked(controls, tuple(draws))], Sampler(weights, device)
+    draw = partial(
+        _together, scene=scene, weights=weights, sampler=sampler, clean_up=clean_up, kept=kept
+    )
+    job = draw(
+        people,
         tries=TRIES if resume_until is not None else 1,
         shown=shown if watch is not None else None,
     )
-    if resume is not None and resume_frame > 0:
-        return (yield from job)[0]
-
-    found = yield from within(job, 0.0, _DRAWN)
-    job = _seated(found, scene, asked, weights, sampler, clean_up=clean_up, kept=kept)
-    return (yield from within(job, _DRAWN, 1.0))[0]
+    if resume is None or resume_frame == 0:
+        job = _seated(job, people, draw)
+    return (yield from job)[0]
 
 
 def crowd_steps(
@@ -461,17 +458,18 @@ def crowd_steps(
     Each is as ``takes_steps`` makes him alone, but for rounding, whatever lengths and sizes the
     others have. Raises as ``takes_steps`` does.
     """
-    sampler = Sampler(weights, device)
+    draw = partial(
+        _together,
+        scene=scene,
+        weights=weights,
+        sampler=Sampler(weights, device),
+        clean_up=clean_up,
+    )
     found: list[list[Take]] = []
     while len(found) < len(people):
         group = people[len(found) : len(found) + _at_once(people[len(found) :])]
         done = len(found) / len(people), (len(found) + len(group)) / len(people)
-        job = _together(scene, group, weights, sampler, clean_up=clean_up)
-        begin, end = done
-        middle = begin + _DRAWN * (end - begin)
-        takes = yield from within(job, begin, middle)
-        job = _seated(takes, scene, group, weights, sampler, clean_up=clean_up)
-        found += yield from within(job, middle, end)
+        found += yield from within(_seated(draw(group), group, draw), *done)
     return found
 
 
@@ -483,8 +481,8 @@ def _at_once(people: Sequence[Asked]) -> int:
 
 
 def _together(
-    scene: Scene,
     people: Sequence[Asked],
+    scene: Scene,
     weights: Weights,
     sampler: Sampler,
     *,
@@ -539,19 +537,13 @@ def _together(
 
 
 def _seated(
-    found: list[list[Take]],
-    scene: Scene,
-    people: Sequence[Asked],
-    weights: Weights,
-    sampler: Sampler,
-    *,
-    clean_up: CleanUp,
-    kept: Callable[[Shot], _Kept | None] = lambda shot: None,
-) -> Generator[float, None, list[list[Take]]]:
-    """The takes ``found`` of people, those drawn anew, with other seeds, that stay standing before
-    a seat on which their root rests: with some noise one does. Those that stand however they are
-    drawn are as they were.
+    job: _Drawing, people: Sequence[Asked], draw: Callable[[Sequence[Asked]], _Drawing]
+) -> _Drawing:
+    """The takes of people that a ``job`` makes, those drawn anew, with other seeds, that stay
+    standing before a seat on which their root rests: with some noise one does. Those that stand
+    however they are drawn are as they were. ``draw`` makes the takes of some people.
     """
+    found = yield from within(job, 0.0, _DRAWN)
     missed = [
         (k, b)
         for k, takes in enumerate(found)
@@ -564,12 +556,14 @@ def _seated(
             which = [b for person, b in missed if person == k]
             others = tuple(people[k].draws[b].other(again) for b in which)
             asked = replace(people[k], draws=others)
-            job = _together(scene, [asked], weights, sampler, clean_up=clean_up, kept=kept)
-            done = again - 1 + i / len(standing), again - 1 + (i + 1) / len(standing)
-            made = yield from within(job, done[0] / _AGAIN, done[1] / _AGAIN)
-            for b, draw, take in zip(which, others, made[0], strict=True):
+            low, high = (
+                _DRAWN + (1.0 - _DRAWN) * (again - 1 + j / len(standing)) / _AGAIN
+                for j in (i, i + 1)
+            )
+            made = yield from within(draw([asked]), low, high)
+            for b, other, take in zip(which, others, made[0], strict=True):
                 if not _stands(take):
-                    told = _DRAWN_ANEW.format(first=people[k].draws[b].seed, other=draw.seed)
+                    told = _DRAWN_ANEW.format(first=people[k].draws[b].seed, other=other.seed)
                     found[k][b] = replace(take, warnings=(*take.warnings, told))
                     missed.remove((k, b))
 
