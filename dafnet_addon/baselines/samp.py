@@ -27,7 +27,7 @@ from ..core.skeleton import POSE_SIZE, smpl_order
 from ..data.held_out.captured import HeldClip
 from ..model.config import SENSOR_SIZE, ModelConfig
 from ..training import precision
-from ..training.batches import Pool, Statistics, observation_for
+from ..training.batches import Pool, Statistics, given_for
 from .samp_features import FIELDS, clip_track, goals_seen, states_at, window_tracks
 from .samp_state import (
     LAST,
@@ -255,10 +255,11 @@ class SampTraining:
         net = self.network
         if self.kind == "samp-ob":
             batch = pool.batch(rows, self.statistics, _LIKE)
-            observation, given = observation_for(batch.upper)
+            given, pose = given_for(batch.upper), torch.cat([batch.upper, batch.lower], dim=-1)
+            observation = pose * given.repeat_interleave(3, dim=-1)
             frames = slice(0, self.config.frames)
             before = torch.cat([observation, given, batch.past], dim=-1)[:, frames]
-            after = torch.cat([batch.upper, batch.lower], dim=-1)[:, frames]
+            after = pose[:, frames]
             sensor = batch.occupancy[:, frames]
             known = before
 

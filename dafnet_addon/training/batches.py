@@ -36,7 +36,7 @@ __all__ = [
     "Batch",
     "past_of",
     "chance",
-    "observation_for",
+    "given_for",
     "occupancy_of",
     "seen",
 ]
@@ -355,20 +355,18 @@ def chance(shape: Sequence[int], share: float, device: torch.device) -> Tensor:
     return drawn <= least - 1 if least else torch.zeros_like(drawn, dtype=torch.bool)
 
 
-def observation_for(
-    upper: Tensor, lower: Tensor | None = None, legs: float = 0.0
-) -> tuple[Tensor, Tensor]:
-    """A random observation (B, T, 66) of the true upper bodies (B, T, 42), and its mask (B, T, 22).
+def given_for(like: Tensor, legs: float = 0.0) -> Tensor:
+    """Which joints a random observation gives, (B, T, 22) in the model's order, for windows
+    ``like`` (B, T, …).
 
     In EE any subset of head and hands is given, in FULL the upper body with or without the pelvis.
     The mode may change between four segments of a window, as the author's code has it.
 
-    In a share ``legs`` of the windows something may be given of the true ``lower`` bodies (B, T,
-    24) as well: in EE any subset of head, hands and feet, in FULL either foot, or all of it, beside
-    the upper body or alone. A foot is its ankle, in three of four windows with the toe base.
+    In a share ``legs`` of the windows something may be given of the lower bodies as well: in EE any
+    subset of head, hands and feet, in FULL either foot, or all of it, beside the upper body or
+    alone. A foot is its ankle, in three of four windows with the toe base.
     """
-    windows, frames, _ = upper.shape
-    device = upper.device
+    windows, frames, device = *like.shape[:2], like.device
     modes = _modes(windows, device)
     chosen = torch.rand(windows, _SEGMENTS, 3, device=device) < 0.6
     chosen |= torch.rand(windows, _SEGMENTS, 3, device=device).argsort(-1) == 0
@@ -384,14 +382,11 @@ def observation_for(
     body[..., _PELVIS] = with_pelvis.float()
     given[..., : len(UPPER)] = torch.where(full, body, given[..., : len(UPPER)])
     segment = torch.arange(frames, device=device) * _SEGMENTS // frames
-    if lower is None or not legs:
-        mask = given[:, segment]
-        whole = torch.nn.functional.pad(upper, (0, 24))
-    else:
-        some = torch.rand(windows, 1, 1, device=device) < legs
-        mask = torch.where(some, _with_legs(given, modes, lasts), given)[:, segment]
-        whole = torch.cat([upper, lower], dim=-1)
-    return whole * mask.repeat_interleave(3, dim=-1), mask
+    if not legs:
+        return given[:, segment]
+
+    some = torch.rand(windows, 1, 1, device=device) < legs
+    return torch.where(some, _with_legs(given, modes, lasts), given)[:, segment]
 
 
 def _with_legs(given: Tensor, modes: Tensor, lasts: Tensor) -> Tensor:

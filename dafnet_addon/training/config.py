@@ -60,6 +60,10 @@ class TrainingConfig:
     """Share of windows in which the way ahead is hidden, as it is from a live root."""
     legs_given: float = 0.0
     """Share of windows in which feet, or the whole lower body, may be given (see ``batches``)."""
+    feet_elsewhere: float = 0.0
+    """Share of the feet given all along a window that stand elsewhere than they were captured (see
+    ``asked_feet``).
+    """
 
     free_run: float = 0.0
     """Weight of the losses of motion that the flow makes by itself (see ``free_run``; 0 as in the

@@ -17,7 +17,8 @@ from ..model.config import AHEAD_SIZE, VELOCITY_SIZE, ModelConfig
 from ..model.flow import BodyFlow, Coupling, EnvironmentEncoder
 from ..model.predictor import GMVAE, ActionPredictor, gumbel_temperature
 from ..model.systems import system_named
-from .batches import Batch, Pool, Statistics, observation_for
+from .asked_feet import feet_elsewhere
+from .batches import Batch, Pool, Statistics, given_for
 from .checkpoints import BEFORE_COOLING, Checkpoint, checkpoint_file
 from .config import TrainingConfig
 from .export import adopt_part, adopt_predictor
@@ -147,11 +148,16 @@ class FlowRun(Run):
         """
         wide = torch.bfloat16 if self.config.mixed else torch.float32
         occupancy = self.dropped_out(batch.seen, wide)
-        legs = self.config.legs_given
-        observation, given = observation_for(batch.upper, batch.lower, legs)
+        given = given_for(batch.upper, self.config.legs_given)
         base = self._base(batch, occupancy)
 
-        pose = torch.cat([batch.upper, batch.lower], dim=-1)
+        lower = batch.lower
+        if self.config.legs_given and self.config.feet_elsewhere:
+            share = self.config.feet_elsewhere
+            lower = feet_elsewhere(lower, given, batch.step, share, self.statistics)
+
+        pose = torch.cat([batch.upper, lower], dim=-1)
+        observation = pose * given.repeat_interleave(3, dim=-1)
         x = pose[..., self.flow.partition[self.part]]
         condition = self.flow.condition(self.part, base, observation, given, pose)
 

@@ -44,7 +44,7 @@ from dafnet_addon.training.batches import (  # noqa: E402
     Pool,
     Statistics,
     chance,
-    observation_for,
+    given_for,
     occupancy_of,
     past_of,
 )
@@ -116,13 +116,8 @@ def test_pasts_hold_ten_poses_and_eleven_velocities():
     assert past[0, 3, 0] == 3 and past[0, 3, 692] == 113
 
 
-def test_observations_show_only_what_a_mode_gives():
-    upper = torch.randn(200, 20, 42)
-    observation, given = observation_for(upper)
-    mask = given.repeat_interleave(3, -1)
-    assert (observation[mask == 0] == 0).all()
-    shown = mask[..., :42] == 1
-    assert (observation[..., :42][shown] == upper[shown]).all()
+def test_a_mode_gives_only_what_it_may():
+    given = given_for(torch.randn(200, 20, 42))
     assert (given[..., 14:] == 0).all(), "the lower body is never given"
     effectors = [MODEL_ORDER.index(j) for j in (15, 20, 21)]
     counts = {tuple(row) for row in given[:, 0].numpy().astype(int).tolist()}
@@ -131,16 +126,14 @@ def test_observations_show_only_what_a_mode_gives():
     assert {row.index(1) for row in alone} == set(effectors), "one hand alone is a valid request"
 
 
-def test_observations_may_show_feet_and_legs():
-    upper, lower = torch.randn(4000, 4, 42), torch.randn(4000, 4, 24)
+def test_feet_and_legs_may_be_given():
+    like = torch.randn(4000, 4, 42)
     torch.manual_seed(3)
-    without = observation_for(upper)
+    without = given_for(like)
     torch.manual_seed(3)
-    assert all(map(torch.equal, observation_for(upper, lower, 0.0), without)), "off, to the bit"
+    assert torch.equal(given_for(like, 0.0), without), "off, to the bit"
 
-    observation, given = observation_for(upper, lower, 1.0)
-    mask = given.repeat_interleave(3, -1)
-    assert torch.equal(observation, torch.cat([upper, lower], dim=-1) * mask)
+    given = given_for(like, 1.0)
     rows = {tuple(row) for row in given[:, 0].numpy().astype(int).tolist()}
     legs = {row[14:] for row in rows}
     assert {row for row in legs if sum(row) == 8} == {(1,) * 8}
@@ -156,7 +149,7 @@ def test_observations_may_show_feet_and_legs():
     assert any(sum(row[:14]) == 0 and row[14:] == (0, 0, 0, 0, 1, 0, 1, 0) for row in rows)
     assert any(sum(row[:14]) == 0 and sum(row[14:]) == 0 for row in rows), "nothing at all is FREE"
 
-    few = observation_for(upper, lower, 0.3)[1][:, :, 14:].any(-1).any(-1).float().mean()
+    few = given_for(like, 0.3)[:, :, 14:].any(-1).any(-1).float().mean()
     assert 0.05 < float(few) < 0.3
 
 
