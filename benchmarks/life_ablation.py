@@ -102,7 +102,7 @@ def _measured(weights: Weights, file: Path, clips: Sequence[HeldClip]) -> dict[s
         **report,
         "feet": {
             run: round(float(np.mean([each[run] for each in feet])), 2)
-            for run in ("asked", "not asked")
+            for run in ("asked", "asked aside", "not asked")
         },
     }
 
@@ -117,7 +117,7 @@ def _table(results: dict[str, dict[str, Any]]) -> str:
         "life at temperature 1, slow / middle / quick, of real",
         "sway, cm; with the foot",
         *(f"descent of {asked:g} s" for asked in life.ASKED),
-        "feet asked for / not, cm off",
+        "feet asked for / 10 cm aside / not, cm off",
         "skate, cm a frame",
     )
     rows = []
@@ -141,7 +141,7 @@ def _table(results: dict[str, dict[str, Any]]) -> str:
                 f"{np.nanmean([each['sway'] for each in walks]):.1f}; "
                 f"{np.median([each['led'] for each in walks]):.2f}",
                 *(f"{took:.2f}" for took in descents),
-                f"{found['feet']['asked']:.1f} / {found['feet']['not asked']:.1f}",
+                " / ".join(f"{off:.1f}" for off in found["feet"].values()),
                 f"{free['skate_cm']:.2f}",
             )
         )
