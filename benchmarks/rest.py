@@ -19,7 +19,8 @@ from dafnet_addon import Box, CleanUp, Controls, InputError, Mesh, Scene, load_w
 from dafnet_addon.core.conditions import shot_steps
 from dafnet_addon.core.distance import grid_of
 from dafnet_addon.core.draws import Draw
-from dafnet_addon.core.generate import cleaned_up, takes_steps
+from dafnet_addon.core.finishing import cleaned_up
+from dafnet_addon.core.generate import takes_steps
 from dafnet_addon.core.metrics import jerk
 from dafnet_addon.core.occupancy import distance
 from dafnet_addon.core.paths import Stop

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dafnet_addon import Box, Controls, Scene, Take, load_weights
-from dafnet_addon.core import generate as generating
+from dafnet_addon.core import drawing, generate
 from dafnet_addon.core.draws import Asked, Draw
 from dafnet_addon.core.generate import crowd_steps, takes_steps
 from dafnet_addon.core.paths import Stop, route
@@ -43,7 +43,7 @@ def _other_seed(take: Take) -> int | None:
 def once(weights):
     """The takes as they are drawn first."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(generating, "_AGAIN", 0)
+        patch.setattr(drawing, "_AGAIN", 0)
         return _takes(weights)
 
 
@@ -78,15 +78,15 @@ def test_in_a_crowd_as_alone(weights, made):
 
 
 def test_without_noise_nothing_is_drawn_anew(weights, monkeypatch):
-    drawn, together = [], generating._together
+    drawn, together = [], drawing.together
 
     def counted(*given, **more):
         drawn.append(1)
         return together(*given, **more)
 
-    monkeypatch.setattr(generating, "_together", counted)
-    monkeypatch.setattr(generating, "_stands", lambda take: True)
-    for temperature, times in ((0.0, 1), (1.0, 1 + generating._AGAIN)):
+    monkeypatch.setattr(generate, "together", counted)
+    monkeypatch.setattr(drawing, "_stands", lambda take: True)
+    for temperature, times in ((0.0, 1), (1.0, 1 + drawing._AGAIN)):
         drawn.clear()
         _takes(weights, (Draw(temperature=temperature),))
         assert len(drawn) == times

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dafnet_addon import Box, Controls, Scene, load_weights
-from dafnet_addon.core import generate as generating
+from dafnet_addon.core import drawing
 from dafnet_addon.core.beginning import PREROLL
 from dafnet_addon.core.conditions import shot_steps
 from dafnet_addon.core.drawn_up import in_frames_of, seen_while_sitting_down
@@ -97,7 +97,7 @@ def test_a_solid_in_some_of_its_frames():
 @pytest.mark.parametrize("temperature", [0.0, 1.0])
 def test_he_sits_down_at_a_table(temperature, monkeypatch):
     """Drawn once, with any seed."""
-    monkeypatch.setattr(generating, "_AGAIN", 0)
+    monkeypatch.setattr(drawing, "_AGAIN", 0)
     scene = Scene((SEAT, BACK, _table(0.35)))
     draws = [Draw(seed, temperature=temperature) for seed in range(4 if temperature else 1)]
     controls = Controls(fps=30, root=CAME.path.matrices())

@@ -19,7 +19,7 @@ from ...core import liveliness
 from ...core.beginning import PREROLL
 from ...core.cleanup import CleanUp
 from ...core.conditions import Shot, shot_steps
-from ...core.generate import cleaned_up
+from ...core.finishing import cleaned_up
 from ...core.kinematics import on_bones
 from ...core.metrics import (
     BAD_COLLISION_JOINTS,

@@ -1,0 +1,175 @@
+"""How takes are drawn: people go through the network side by side, and who stays standing before a
+seat is drawn anew.
+"""
+
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import replace
+from functools import partial
+from time import perf_counter
+
+import numpy as np
+
+from .beginning import PREROLL
+from .cleanup import CleanUp
+from .conditions import Shot
+from .draws import Asked
+from .finishing import finished_steps
+from .kept_motion import Kept
+from .meeting import led_to, met, nearest
+from .progress import within
+from .resampling import frame_times, resample_positions
+from .root import RootPath
+from .sampler import Run, Sampler, Samples
+from .series import MODEL_FPS
+from .skeleton import model_order
+from .solids import Scene
+from .take import Take
+from .verdict import STANDS
+from .wanted import Wanted, wanted_steps
+from .weights import Weights
+
+__all__ = ["Drawing", "seated", "together"]
+
+Drawing = Generator[float, None, list[list[Take]]]
+"""Draws the takes of each of some people, and yields progress in [0, 1]."""
+_CONDITIONED = 0.15  # progress when the conditions are known
+_SAMPLED = 0.85  # progress when the poses are made
+_DRAWN = 0.95  # progress when all takes are drawn once
+_AGAIN = 3  # times that one who stays standing before his seat is drawn anew
+_DRAWN_ANEW = (
+    "With seed {first} the character stays standing before a seat, so it was drawn with {other}."
+)
+
+
+def together(
+    people: Sequence[Asked],
+    scene: Scene,
+    weights: Weights,
+    sampler: Sampler,
+    *,
+    clean_up: CleanUp,
+    kept: Callable[[Shot], Kept | None] = lambda shot: None,
+    tries: int = 1,
+    shown: Callable[[RootPath, int, np.ndarray], None] | None = None,
+) -> Drawing:
+    """The takes of people who go through the network side by side. ``kept``, ``tries``, ``shown``:
+    of one who is alone: what stays of a motion, how often a part in its middle is tried, and what
+    is shown each frame.
+    """
+    started, count = perf_counter(), len(people)
+    wanted: list[Wanted] = []
+    for k, asked in enumerate(people):
+        job = wanted_steps(scene, asked.tried(tries), weights, sampler)
+        low, high = _CONDITIONED * k / count, _CONDITIONED * (k + 1) / count
+        wanted.append((yield from within(job, low, high)))
+    conditioned, sampling = perf_counter(), _CONDITIONED
+
+    if partly := [k for k, each in enumerate(wanted) if each.in_part]:
+        # Where a target counts in part, the calm take tells where the joint would be without it.
+        sampling = (_CONDITIONED + _SAMPLED) / 2
+        runs = [Run(wanted[k].without(), np.zeros((1, 66))) for k in partly]
+        calm = yield from within(sampler.run_several(runs), _CONDITIONED, sampling)
+        for k, each in zip(partly, calm, strict=True):
+            wanted[k] = wanted[k].led_from(model_order(each.poses[:, 0]))
+
+    path, stays = wanted[0].shot.path, kept(wanted[0].shot)
+    if stays is not None and stays.middle is not None:
+        leading = led_to(sampler, wanted[0].conditions, stays.poses, stays.middle[1], wanted[0].z)
+        before, sampling = sampling, (sampling + _SAMPLED) / 2
+        wanted[0] = replace(wanted[0], z=(yield from within(leading, before, sampling)))
+    watch = None if shown is None else partial(shown, path)
+    runs = [each.run() for each in wanted]
+    poses = None if stays is None else stays.of_takes(runs[0].z.shape[1])
+    made = yield from within(sampler.run_several(runs, poses, watch), sampling, _SAMPLED)
+    if stays is not None and stays.middle is not None:
+        made = [_meeting(made[0], stays.poses, path, stays.middle, len(people[0].draws))]
+    now = perf_counter()
+    seconds = {
+        "conditions": (conditioned - started) / count,
+        "sampling": (now - conditioned) / count,
+    }
+
+    found: list[list[Take]] = []
+    for k, samples in enumerate(made):
+        low, one = _SAMPLED + (1.0 - _SAMPLED) * k / count, (1.0 - _SAMPLED) / count
+        finishing = _finished(people[k], wanted[k].shot, samples, clean_up, seconds)
+        found.append((yield from within(finishing, low, low + one)))
+    return found
+
+
+def seated(
+    job: Drawing, people: Sequence[Asked], drawn: Callable[[Sequence[Asked]], Drawing]
+) -> Drawing:
+    """The takes of people that a ``job`` makes, those drawn anew, with other seeds, that stay
+    standing before a seat on which their root rests: with some noise one does. Those that stand
+    however they are drawn are as they were. ``drawn`` makes the takes of some people.
+    """
+    if all(draw.temperature == 0.0 for asked in people for draw in asked.draws):
+        return (yield from job)
+
+    found = yield from within(job, 0.0, _DRAWN)
+    missed = [
+        (k, b)
+        for k, takes in enumerate(found)
+        for b, take in enumerate(takes)
+        if people[k].draws[b].temperature > 0.0 and _stands(take)
+    ]
+    for again in range(1, _AGAIN + 1):
+        standing = sorted({person for person, _ in missed})
+        for i, k in enumerate(standing):
+            which = [b for person, b in missed if person == k]
+            others = tuple(people[k].draws[b].other(again) for b in which)
+            asked = replace(people[k], draws=others)
+            low, high = (
+                _DRAWN + (1.0 - _DRAWN) * (again - 1 + j / len(standing)) / _AGAIN
+                for j in (i, i + 1)
+            )
+            made = yield from within(drawn([asked]), low, high)
+            for b, other, take in zip(which, others, made[0], strict=True):
+                if not _stands(take):
+                    told = _DRAWN_ANEW.format(first=people[k].draws[b].seed, other=other.seed)
+                    found[k][b] = replace(take, warnings=(*take.warnings, told))
+                    missed.remove((k, b))
+
+    yield 1.0
+    return found
+
+
+def _stands(take: Take) -> bool:
+    return any(each.word == STANDS for each in take.verdict)
+
+
+def _meeting(
+    made: Samples, kept: np.ndarray, path: RootPath, middle: tuple[int, int], takes: int
+) -> Samples:
+    """Of the tries for each of the takes the one that comes nearest to what is ``kept`` (PREROLL +
+    N, 66) after the middle, led to it.
+    """
+    count = made.poses.shape[1] // takes
+    tried = made.poses.reshape(len(made.poses), takes, count, 66)
+    chosen = np.arange(takes) * count + nearest(tried, kept, path, middle)
+    made = Samples(*(each[:, chosen] for each in made))
+    poses = [met(made.poses[:, k], kept, path, middle) for k in range(takes)]
+    return made._replace(poses=np.stack(poses, axis=1))
+
+
+def _finished(
+    asked: Asked, shot: Shot, made: Samples, clean_up: CleanUp, seconds: dict[str, float]
+) -> Generator[float, None, list[Take]]:
+    """The takes of one person; ``seconds``: that were spent on him before."""
+    controls, count = asked.controls, len(asked.draws)
+    source, target = (
+        frame_times(len(shot.path), MODEL_FPS),
+        frame_times(len(controls), controls.fps),
+    )
+    takes = []
+    for b in range(count):
+        action = resample_positions(made.actions[PREROLL:, b], source, target)
+        density = float(made.log_likelihood[PREROLL:, b].mean())
+        job = finished_steps(
+            made.poses[:, b], made.unchanged[:, b], action, shot, controls, clean_up, density
+        )
+        take = yield from within(job, b / count, (b + 1) / count)
+        takes.append(replace(take, seconds=seconds | take.seconds))
+
+    return takes
