@@ -20,6 +20,10 @@ __all__ = ["PREROLL", "Beginning", "beginning_at"]
 PREROLL = 70
 """Frames before the first one, in which the model's memory settles."""
 
+_EDGE = 0.05
+"""Metres that a seat goes on at least before whoever sits on it; whoever stands with the calves
+against it has its edge under the hips.
+"""
 _WAY = 0.3  # metres in front of a seat from which one came to it
 _COMES = 40  # frames in which
 _RESTS = 16  # frames for which one had sat by the first one
@@ -59,7 +63,7 @@ def beginning_at(
     """
     still = RootPath(np.repeat(start.position, PREROLL, axis=0), np.repeat(start.yaw, PREROLL))
     there = Scene(tuple(in_frames_of(solid, 0) for solid in scene.solids))
-    over = bool(np.isfinite(tops_under(there, start))[0])
+    over = _is_over_seat(there, start)
     held = np.repeat(seen[None] if over else np.zeros_like(seen[None]), PREROLL, axis=0)
     if lead is not None or not over:
         return Beginning(still if lead is None else lead, held)
@@ -72,3 +76,8 @@ def beginning_at(
     if seen_coming[0, _UPRIGHT].max() > _SOLID:
         return Beginning(still, held)
     return Beginning(came, seen_coming, PREROLL - _RESTS)
+
+
+def _is_over_seat(scene: Scene, start: RootPath) -> bool:
+    ahead = RootPath(start.position + _EDGE * np.append(forward_of(start.yaw[0]), 0.0), start.yaw)
+    return all(bool(np.isfinite(tops_under(scene, each))[0]) for each in (start, ahead))

@@ -73,6 +73,13 @@ def test_a_table_was_drawn_up_afterwards():
     assert np.array_equal(alone.occupancy, at_table.occupancy)
 
 
+def test_who_stands_with_the_calves_against_a_seat_stood_there():
+    behind = _box((-0.22, -0.46, 0.0), (0.22, -0.02, 0.45))
+    assert not _came(_begun(behind)) and not _begun(behind).occupancy.any()
+    deeper = _box((-0.22, -0.38, 0.0), (0.22, 0.08, 0.45))
+    assert _came(_begun(deeper)), "on its edge"
+
+
 @pytest.mark.parametrize("top", np.arange(0.25, 0.9, 0.03))
 def test_seats_of_every_height_are_seats_however_thin(top):
     assert _came(_begun(_seat(top, bottom=top - 0.04)))
