@@ -35,6 +35,13 @@ _ROOM = np.stack(np.meshgrid((-0.12, 0.0, 0.12), 0.4, np.arange(0.65, 1.3, 0.1))
 """Places of the thighs to the chest of who stands before his seat, in the frame of the root that
 rests on it; within ``BAND`` of them there has to be nothing.
 """
+_SHINS = np.stack(
+    np.meshgrid((-0.12, 0.12), (0.35, 0.42), np.arange(0.15, 0.4, 0.08)), axis=-1
+).reshape(-1, 3)
+"""Places of the shins of who sits: what most of them meet is a wall to him, a bar that is solid to
+the floor, which nobody draws up.
+"""
+_MEETS = 0.08  # metres from a solid: half of a shin, and of how far it may be elsewhere
 
 
 def seen_while_sitting_down(
@@ -52,10 +59,13 @@ def seen_while_sitting_down(
         there = RootPath(path.position[at, None], path.yaw[at, None])
         seat = {id(solid) for solid in under(scene, there, at)}
         places = to_world(there, _ROOM[None])
+        shins = to_world(there, _SHINS[None])
         left = [
             solid
             for solid in scene.solids
-            if id(solid) in seat or _away(in_frames_of(solid, at), places, there) >= BAND
+            if id(solid) in seat
+            or _near(in_frames_of(solid, at), places, there) == 0.0
+            or _near(in_frames_of(solid, at), shins, there, _MEETS) > 0.5
         ]
         if len(left) < len(scene.solids):
             during = Scene(tuple(in_frames_of(solid, stretch) for solid in left))
@@ -74,7 +84,7 @@ def under(scene: Scene, there: RootPath, frame: int = 0) -> tuple[Box | Mesh, ..
     return tuple(
         solid
         for solid in scene.solids
-        if _away(in_frames_of(solid, frame), places, there) < _TOUCHES
+        if _near(in_frames_of(solid, frame), places, there, _TOUCHES) > 0.0
     )
 
 
@@ -101,6 +111,6 @@ def _comings_and_goings(path: RootPath, seats: Sequence[SatOn]) -> Iterator[tupl
                 yield stop - 1, slice(max(start, stop - _LEANS), min(frames, stop + _AFTER))
 
 
-def _away(solid: Box | Mesh, places: np.ndarray, there: RootPath) -> float:
-    """Metres from places (1, N, 3) to a solid where it is nearest."""
-    return float(distance(Scene((solid,)), places, there.position[:, 2]).min())
+def _near(solid: Box | Mesh, places: np.ndarray, there: RootPath, within: float = BAND) -> float:
+    """Share of places (1, N, 3) that are nearer to a solid than so many metres."""
+    return float((distance(Scene((solid,)), places, there.position[:, 2]) < within).mean())

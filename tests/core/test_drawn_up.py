@@ -69,6 +69,14 @@ def test_a_table_that_leaves_room_is_there_all_along():
     assert seen_while_sitting_down(scene, CAME.path, seats, everything) is everything
 
 
+def test_a_bar_that_is_solid_to_the_floor_is_there_all_along():
+    bar = _box((-0.8, 0.35, 0.0), (0.8, 1.15, 0.74), "Bar")
+    scene = Scene((SEAT, BACK, bar))
+    everything = occupancy(scene, CAME.path)
+    seats = seats_along(scene, CAME.path, 30.0)
+    assert seen_while_sitting_down(scene, CAME.path, seats, everything) is everything
+
+
 def test_who_walks_by_without_sitting_sees_all():
     past = route(Stop((-2.0, 0.6), -np.pi / 2, 0.5), Stop((2.0, 0.6), -np.pi / 2, 0.5)).path
     scene = Scene((SEAT, BACK, _table(0.35)))
