@@ -1,4 +1,4 @@
-# make demo: a character walks to a chair and sits, from nothing.   make test: everything, on each Blender that has a module.
+# make demo: a character walks to a chair and sits, from nothing.   make test: the linters and all tests.
 # make quick: the tests of a minute.
 # The bpy modules of Blender 4.2 to 5.0 need Python 3.11, that of 5.2 needs 3.13 and is left out where there is none.
 
@@ -22,9 +22,10 @@ test: lint $(BLENDERS:%=%/.test)
 	@$(if $(PYTHON_5_2),,echo "Not on Blender 5.2: its module needs Python 3.13 (PYTHON_5_2=path/to/python3.13).")
 	$(MAKE) --jobs=2 --output-sync=target --keep-going $(BLENDERS:%=tests-in-%)
 
-# Two suites run at once, on one core each.
+# Two suites run at once, on one core each. On 4.5 and 4.2, with either NumPy, all tests; on the others those that touch Blender.
+tests-in-.venv-5.0 tests-in-.venv-5.2: TESTS = tests/blender tests/project/test_extension.py tests/test_cli.py tests/test_examples.py
 tests-in-%:
-	OMP_NUM_THREADS=1 $*/bin/python -m pytest -q
+	OMP_NUM_THREADS=1 $*/bin/python -m pytest -q $(TESTS)
 
 # What needs neither Blender, nor torch, nor data beside the repository; under a minute.
 quick: .venv/.test
@@ -71,7 +72,7 @@ system:
 	.venv/$(PIP) '$(TORCH)' 'numpy>=1.26,<2' matplotlib pytest trimesh rtree scipy safetensors tensorboard ruff mypy hypothesis distributed openjd-cli pyyaml 'mkdocs-material==9.*'
 	@touch $@
 
-# Both generations of NumPy are in use: 4.2 takes either.
+# Both generations of NumPy are in use, and 4.2 takes either.
 .venv-4.2/.test: HOST = 'bpy==4.2.*' 'numpy>=2,<3'
 .venv-5.0/.test: HOST = 'bpy==5.0.*' 'numpy>=1.26,<2'
 .venv-5.2/.test: HOST = 'bpy==5.2.*' 'numpy>=2,<3'

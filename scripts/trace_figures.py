@@ -429,7 +429,7 @@ CLAIMS: tuple[tuple[Path, str, tuple[Value, ...]], ...] = (
     ),
     (
         CARD,
-        r"it is led \(EE (\d+) %, EED (0\.\d+)\), and mostly stays seated in FREE \((\d+) %\)",
+        r"it is led \(EE (\d+) %, EED (0\.\d+)\), and in FREE less often \((\d+) %\)",
         (
             _row("ee_t0_on_beds", "sits_within_6cm", 100.0),
             _row("ee_t0_on_beds", "end_effector_error"),

@@ -49,6 +49,7 @@ _RESEARCH = {
     "rerun": "rerun",
     "scale": "scale",
     "tables": "experiments",
+    "wanted": "wanted",
 }
 """What docs/training.md, docs/experiments.md and docs/batch.md were made with, and the scripts that
 do it.
@@ -64,6 +65,7 @@ _NEEDS = {
     "scale": ("bpy",),
     "speed": ("torch",),
     "tables": ("torch",),
+    "wanted": ("torch",),
 }
 
 
@@ -122,7 +124,8 @@ COMMAND = Command(
         f"measure: {'; '.join(f'{name!r}: {does}' for name, does in _MEASURES.items())}; "
         "'baked' puts takes onto a real rig; 'canonical' fits bodies to the skeleton; 'ablation', "
         "'life-ablation' and 'tables' train and compare; 'rerun' makes figures of the weights' "
-        "report again; 'scale' makes batches and kills them, 'farm' says what many shots take"
+        "report again, 'wanted' says what they miss of what is wanted; 'scale' makes batches and "
+        "kills them, 'farm' says what many shots take"
     ),
     add_arguments=_add_arguments,
     run=_run,

@@ -10,7 +10,18 @@ pytestmark = pytest.mark.torch
 
 
 @pytest.mark.parametrize(
-    "name", ["ablation", "canonical", "life-ablation", "tables", "life", "rest", "seats", "speed"]
+    "name",
+    [
+        "ablation",
+        "canonical",
+        "life-ablation",
+        "tables",
+        "wanted",
+        "life",
+        "rest",
+        "seats",
+        "speed",
+    ],
 )
 def test_each_says_what_it_wants(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", name, "--", "--help"]) == 0
