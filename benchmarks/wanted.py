@@ -4,9 +4,10 @@
 
 ``FOLDER`` holds the motion files, ``LIBRARY`` the real pieces (docs/data.md). One table says, of
 each thing that is wanted, what is found, with the 95 % of a bootstrap over clips where it is a mean
-over them; what is missed comes first. Two more say it body by body, and piece by piece. Writes
-``wanted.json`` and ``.md`` into ``OUT``; what is finished is kept, so that the same command goes on
-where it was stopped. Half an hour of one core.
+over them; what is missed comes first. Three more say it body by body, maker by maker, and by kind
+of piece. Of the reports that it is of ``OUT`` may hold some already (``evaluate --furniture``,
+``bench sitting``, ``bench life``), of the same weights; those that it lacks are made there, so that
+the same command goes on where it was stopped. All of it takes half an hour of one core.
 """
 
 import argparse
@@ -42,7 +43,7 @@ from dafnet_addon.training.evaluation.clips import (
 from dafnet_addon.training.evaluation.markdown import markdown_table
 from dafnet_addon.training.evaluation.real_report import real_report
 
-__all__ = ["Wanted", "main", "postures", "wanted"]
+__all__ = ["Wanted", "main", "postures", "wanted", "wanted_text"]
 
 _PIECES = 4  # clips of a kind from which on it is judged by itself
 _LEVEL = 25.0  # degrees between the trunk of who lies and the floor
@@ -171,22 +172,25 @@ def _of_feet(walking: dict[str, dict[str, Any]]) -> Iterator[Wanted]:
 
 
 def wanted(found: dict[str, Any]) -> list[Wanted]:
-    """All that is wanted, of the parts that ``main`` measures; what is missed first."""
-    trunks, sits = np.array(found["trunks of who lies"]), found["postures"]
+    """All that is wanted, of the reports that ``main`` makes, by their names; what is missed
+    first.
+    """
+    own, real = found["wanted"], found["real-tell"]
+    trunks, sits = np.array(own["trunks of who lies"]), own["postures"]
     level = 100.0 * float((np.abs(trunks) <= _LEVEL).mean())
     sent = found["sitting"]["all"]
     rows = [
-        *_of_seats(found["real"]),
+        *_of_seats(real),
         Wanted(
             f"FREE, raw: trunk of who lies within {_LEVEL:g} degrees of level, %",
             level,
             f"{len(trunks)} clips",
             least=75.0,
         ),
-        *_of_targets(found["real"]),
+        *_of_targets(real),
         Wanted("Sit on, by default: right in all, %", sent["right"], f"{sent['sent']} sent", 97.0),
-        *_of_life(found["real"], found["life"]),
-        *_of_feet(found["walking"]),
+        *_of_life(real, found["life"]),
+        *_of_feet(own["walking"]),
         Wanted(
             f"postures of {len(_SEEDS)} seeds of one sit, in the median sit",
             float(np.median(sits)),
@@ -256,11 +260,13 @@ def _walking(clips: Sequence[HeldClip], weights: Weights) -> dict[str, dict[str,
     }
 
 
-def _text(found: dict[str, Any]) -> str:
+def wanted_text(found: dict[str, Any]) -> str:
+    """The tables of the reports that ``main`` makes, by their names, in Markdown."""
     rows = wanted(found)
     missed = sum(not each.met for each in rows)
     head = ("", "found", "95 %", "wanted", "met", "of")
     parts = [
+        "## What is wanted, and what is found",
         f"{missed} of {len(rows)} are missed.",
         markdown_table(head, [each.cells() for each in rows]),
     ]
@@ -276,11 +282,11 @@ def _text(found: dict[str, Any]) -> str:
                 ),
                 f"{runs['ee_t0']['end_effector_error']:.4f}",
             )
-            for name, runs in found["real"][f"by {group}"].items()
+            for name, runs in found["real-tell"][f"by {group}"].items()
         ]
         columns = [f"{run}, within {cm} cm, %" for run in ("FREE", "clean", "EE") for cm in (4, 8)]
-        parts.append(markdown_table((group, "clips", *columns, "EED in EE"), own))
-    return "\n\n".join(parts)
+        parts += [f"### By {group}", markdown_table((group, "clips", *columns, "EED in EE"), own)]
+    return "\n\n".join(parts) + "\n"
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -299,30 +305,34 @@ def _parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str]) -> str:
     """Run what the arguments ask for; the tables as text."""
     options = _parser().parse_args(arguments)
-    weights, folder, library = load_weights(options.weights), options.folder, options.furniture
-    record = options.output / "wanted.json"
-    found: dict[str, Any] = (
-        json.loads(record.read_text(encoding="utf-8")) if record.exists() else {}
-    )
+    file, folder, library = options.weights, options.folder, options.furniture
+    weights = load_weights(file)
+    told, walks = real_test(folder, library, "tell"), real_walks(library, "tell")
 
-    def silent(share: float) -> None:
-        pass
+    def own() -> dict[str, Any]:
+        return {
+            "trunks of who lies": _trunks_lying([c for c in told if c.room == "bed"], weights),
+            "walking": _walking(held_out(folder), weights),
+            "postures": _postures(walks.clips[::_SITS], weights),
+        }
 
-    told = real_test(folder, library, "tell")
-    walks = real_walks(library, "tell")
     parts: dict[str, Callable[[], Any]] = {
-        "real": lambda: real_report(weights, told, walks=walks),
-        "trunks of who lies": lambda: _trunks_lying([c for c in told if c.room == "bed"], weights),
-        "sitting": lambda: sitting.measure(options.weights, silent, library)[0],
-        "life": lambda: life.measure(options.weights, silent, folder)[0],
-        "walking": lambda: _walking(held_out(folder), weights),
-        "postures": lambda: _postures(walks.clips[::_SITS], weights),
+        "real-tell": lambda: real_report(weights, told, walks=walks),
+        "sitting": lambda: sitting.measure(file, _silent, library)[0],
+        "life": lambda: life.measure(file, _silent, folder)[0],
+        "wanted": own,
     }
+    found = {}
     for name, measure in parts.items():
-        if name not in found:
-            found[name] = measure()
-            save_text(record, json.dumps(found, indent=1))
+        record = options.output / f"{name}.json"
+        if not record.exists():
+            save_text(record, json.dumps(measure(), indent=2))
+        found[name] = json.loads(record.read_text(encoding="utf-8"))
 
-    text = _text(found)
-    save_text(record.with_suffix(".md"), text + "\n")
+    text = wanted_text(found)
+    save_text(options.output / "wanted.md", text)
     return text
+
+
+def _silent(share: float) -> None:
+    """Progress that nobody looks at."""

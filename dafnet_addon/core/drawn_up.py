@@ -14,7 +14,8 @@ import numpy as np
 from .grid import BAND
 from .occupancy import distance, occupancy
 from .passage import SatOn
-from .root import RootPath, to_world
+from .root import RootPath, to_root, to_world
+from .sensor import SPHERES
 from .series import runs
 from .solids import Box, Mesh, Scene
 
@@ -42,6 +43,7 @@ _SHINS = np.stack(
 the floor, which nobody draws up.
 """
 _MEETS = 0.08  # metres from a solid: half of a shin, and of how far it may be elsewhere
+_BEFORE_SEAT, _BESIDE = 0.25, 1.0  # metres before the hips, and to either side
 
 
 def seen_while_sitting_down(
@@ -49,7 +51,8 @@ def seen_while_sitting_down(
 ) -> np.ndarray:
     """Occupancy (T, 2640) of a path at 30 fps, of which all that stands there is ``occupied``,
     without what leaves nobody room to stand before a seat: from two seconds before somebody rests
-    on it until he sits, and from his getting up until one and a half seconds after.
+    on it until he sits, and from his getting up until one and a half seconds after. Where the
+    seat's own mesh leaves no room, as a room in one piece does, what of it is before the seat.
 
     ``seats``: those that the path rests on (``passage.seats_along``). Canonical metres, solids
     static or with a matrix for each frame of the path.
@@ -60,20 +63,36 @@ def seen_while_sitting_down(
         seat = {id(solid) for solid in under(scene, there, at)}
         places = to_world(there, _ROOM[None])
         shins = to_world(there, _SHINS[None])
-        left = [
-            solid
+        drawn = {
+            id(solid)
             for solid in scene.solids
-            if id(solid) in seat
-            or _near(in_frames_of(solid, at), places, there) == 0.0
-            or _near(in_frames_of(solid, at), shins, there, _MEETS) > 0.5
-        ]
-        if len(left) < len(scene.solids):
-            during = Scene(tuple(in_frames_of(solid, stretch) for solid in left))
-            out = out.copy() if out is occupied else out
-            meanwhile = RootPath(path.position[stretch], path.yaw[stretch])
-            out[stretch] = occupancy(during, meanwhile)
+            if _near(in_frames_of(solid, at), places, there) > 0.0
+            and _near(in_frames_of(solid, at), shins, there, _MEETS) <= 0.5
+        }
+        if not drawn:
+            continue
+
+        meanwhile = RootPath(path.position[stretch], path.yaw[stretch])
+        shown, own = (
+            Scene(tuple(in_frames_of(s, stretch) for s in scene.solids if id(s) in chosen))
+            for chosen in ({id(s) for s in scene.solids} - drawn, seat & drawn)
+        )
+        out = out.copy() if out is occupied else out
+        out[stretch] = occupancy(shown, meanwhile)
+        if own.solids:
+            kept = np.where(_ahead(meanwhile, there), 0.0, occupancy(own, meanwhile))
+            out[stretch] = np.maximum(out[stretch], kept)
 
     return out
+
+
+def _ahead(path: RootPath, there: RootPath) -> np.ndarray:
+    """Which spheres of the sensor along a path (T, 2640) are before one who sits where his root
+    is ``there``.
+    """
+    spheres = to_world(path, np.broadcast_to(SPHERES, (len(path), *SPHERES.shape)))
+    places = to_root(there, spheres.reshape(1, -1, 3)).reshape(spheres.shape)
+    return (places[..., 1] > _BEFORE_SEAT) & (np.abs(places[..., 0]) < _BESIDE)
 
 
 def under(scene: Scene, there: RootPath, frame: int = 0) -> tuple[Box | Mesh, ...]:

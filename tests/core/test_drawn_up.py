@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dafnet_addon import Box, Controls, Scene, load_weights
+from dafnet_addon import Box, Controls, Mesh, Scene, load_weights
 from dafnet_addon.core import drawing
 from dafnet_addon.core.beginning import PREROLL
 from dafnet_addon.core.conditions import shot_steps
@@ -17,6 +17,7 @@ from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.root import RootPath
 from dafnet_addon.core.sensor import SPHERES
 from dafnet_addon.core.skeleton import PELVIS
+from dafnet_addon.core.solids import BOX_CORNERS, BOX_TRIANGLES
 
 AHEAD = (SPHERES[:, 1] > 0.2) & (SPHERES[:, 1] < 0.6) & (np.abs(SPHERES[:, 0]) < 0.3)
 AT_TOP = AHEAD & (np.abs(SPHERES[:, 2] - 0.71) < 0.05)
@@ -67,6 +68,19 @@ def test_a_table_that_leaves_room_is_there_all_along():
     everything = occupancy(scene, CAME.path)
     seats = seats_along(scene, CAME.path, 30.0)
     assert seen_while_sitting_down(scene, CAME.path, seats, everything) is everything
+
+
+def test_of_a_room_in_one_mesh_what_is_before_the_seat_is_drawn_up():
+    solids = (SEAT, BACK, _table(0.35))
+    corners = np.concatenate([s.center + BOX_CORNERS * s.half_size for s in solids])
+    triangles = np.concatenate([BOX_TRIANGLES + 8 * k for k in range(len(solids))])
+    room = Mesh(vertices=corners, triangles=triangles, name="Room")
+    seen, apart = (_seen(*each)[: REST.stop + 30] for each in ((room,), solids))
+    before = slice(REST.start - 40, REST.start)
+    everything = occupancy(Scene((room,)), CAME.path)
+    assert seen[before, AT_TOP].sum() < 0.2 * everything[before, AT_TOP].sum()
+    assert (seen[REST.start + 30 : REST.stop - 30, AT_TOP].max(axis=1) > 0.5).all()
+    assert np.abs(seen - apart)[REST.start : REST.stop].mean() < 0.02, "the chair stays"
 
 
 def test_a_bar_that_is_solid_to_the_floor_is_there_all_along():
