@@ -64,6 +64,9 @@ _MENDS = 3  # frames of the longest gap in one
 _SLIPS = 0.12  # metres from its place at which a foot is let go, while the pelvis moves
 _CREEPS = 0.30  # metres at which it is let go though the pelvis rests
 _RESTS = 0.1  # metres a second of a pelvis that rests
+_CLEAR = 0.015  # metres that a toe base clears the floor by while its foot is put elsewhere
+_STRIDES = 0.15, 0.45  # metres a second of a foot that begins to be, and that is
+_LIFTS = 5  # frames in which it is lifted and let down
 _FADE = 1 / 3  # seconds in which what is added dies away
 _SMOOTHING = 2.5  # frames; deviation of the Gaussian at full strength
 _SKIN = 0.03  # metres between a wrist or ankle and the surface that it must not sink into
@@ -205,8 +208,8 @@ def planted(
     strength: float = 1.0,
     targets: Mapping[str, np.ndarray] = MappingProxyType({}),
 ) -> np.ndarray:
-    """Joints (T, 22, 3) with every standing foot held at one place, legs and, where they do not
-    reach, the pelvis following.
+    """Joints (T, 22, 3) with every standing foot held at one place, and those that are put
+    elsewhere off the floor meanwhile; legs and, where they do not reach, the pelvis follow.
 
     Metres, world, 30 frames a second; ``floor``: its height, one or one for each frame. A foot that
     has a target (``reach_targets``) is left to it.
@@ -225,12 +228,32 @@ def planted(
         held[start:end, foot] = True
 
     for foot, name in enumerate(FEET_ASKED):
-        held[_asked(targets, name, len(joints)), foot] = False
+        asked = _asked(targets, name, len(joints))
+        held[asked, foot] = False
         moved[:, foot] = _between(moved[:, foot], held[:, foot])
+        toe = joints[:, FEET[foot]] + moved[:, foot] - heights[:, None] * (0.0, 0.0, 1.0)
+        moved[:, foot, 2] += strength * _lifted(toe, held[:, foot]) * ~asked
 
     ankles = joints[:, ANKLES] + moved
     down = _lowered(joints[:, HIPS], ankles, held)
     return on_legs(joints, -down, ankles, joints[:, KNEES] + moved / 2)
+
+
+def _lifted(toe: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """How much higher (T,) a toe base over its floor (T, 3) has to be not to scrape it on the way
+    from one place where it is ``held`` (T,) to the next.
+    """
+    if not held.any():
+        return np.zeros(len(toe))
+
+    speed = np.linalg.norm(np.gradient(toe[:, :2], axis=0), axis=-1) * MODEL_FPS
+    slow, fast = _STRIDES
+    strides = smoothstep((speed - slow) / (fast - slow))
+    stands, frames = np.flatnonzero(held), np.arange(len(toe))
+    after = np.searchsorted(stands, frames).clip(max=len(stands) - 1)
+    away = np.abs(stands[[after, (after - 1).clip(min=0)]] - frames).min(axis=0)
+    short = np.clip(TOE_HEIGHT + _CLEAR - toe[:, 2], 0.0, 2.0 * _CLEAR)
+    return np.asarray(short * strides * smoothstep(away / _LIFTS))
 
 
 def _asked(targets: Mapping[str, np.ndarray], name: str, frames: int) -> np.ndarray:

@@ -117,7 +117,7 @@ def test_what_a_change_of_mode_asks_is_come_to_and_left_without_a_pop(weights, c
         entering = replace(asked, mode=_modes(controls, at, "FREE", "EE"))
         reached = generate(Scene(), entering, weights, clean_up=clean_up).joints
         gap = np.linalg.norm(reached[:, 20] - target, axis=-1)
-        assert np.abs((reached - free.joints)[:at, [15, 20, 21]]).max() < 0.005, (
+        assert np.abs((reached - free.joints)[:at, [15, 20, 21]]).max() < 0.01, (
             "it begins where the mode changes"
         )
         assert gap[at + 12 :].mean() < (0.03 if clean_up is not ALL else 0.0005)
@@ -143,7 +143,7 @@ def test_targets_that_end_with_the_mode_are_left_as_softly(weights):
             for blend in (0.0, 1 / 3)
         ]
         # A network may let go softly by itself; a blend makes it no harder.
-        assert jump[1] < 0.06 and jump[1] < jump[0] + 0.005
+        assert jump[1] < 0.06 and jump[1] < jump[0] + 0.01
 
 
 def _turned_by(take: Take, reference: Take) -> np.ndarray:

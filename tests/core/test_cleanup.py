@@ -28,6 +28,7 @@ from dafnet_addon.core.skeleton import (
     TOE_HEIGHT,
     joint,
 )
+from dafnet_addon.core.sliding import slides
 from dafnet_addon.core.solids import box_distance
 from dafnet_addon.core.storage import packed, unpacked
 
@@ -92,6 +93,23 @@ def test_a_foot_that_creeps_under_a_body_that_rests_stays_and_under_one_that_lea
     out = on_bones(joints)
     assert np.ptp(planted(out)[:, TOES[0], 1]) < 0.005
     assert np.ptp(planted(out + creeps)[:, TOES[0], 1]) > 0.1
+
+
+def test_a_foot_that_is_drawn_over_the_floor_to_its_next_place_is_lifted():
+    joints = np.repeat(_hanging()[None], 60, axis=0)
+    joints[..., 2] -= joints[0, TOES, 2].min() - TOE_HEIGHT + 0.05
+    joints[:, [joint("right_ankle"), TOES[1]], 2] += 0.05
+    joints[:, [joint("left_ankle"), TOES[0]], 2] += 0.05
+    way = 0.4 * np.clip((np.arange(60) - 20) / 15, 0.0, 1.0)
+    joints[:, [joint("right_knee"), joint("right_ankle"), TOES[1]], 1] += way[:, None] - 0.2
+    joints = on_bones(joints)
+    scrapes = slides(joints, 30.0)[:, 1].max()
+    made = planted(joints)
+    height = made[:, TOES[1], 2] - TOE_HEIGHT
+    assert scrapes > 0.2 and slides(made, 30.0)[:, 1].max() == 0.0
+    assert 0.012 < height.max() < 0.03 and np.abs(height[[10, 50]]).max() < 1e-6
+    assert np.abs(np.diff(height)).max() < 0.008, "softly"
+    assert np.abs(made[:, TOES[0], 2] - TOE_HEIGHT).max() < 1e-6, "the other one stands"
 
 
 def test_the_pelvis_comes_down_where_legs_are_too_short():

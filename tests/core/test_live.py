@@ -179,11 +179,13 @@ def test_what_leads_along_a_way_waits_for_the_body() -> None:
 @pytest.mark.slow
 def test_it_walks_and_stops_and_lives_with_its_feet_on_the_floor() -> None:
     live = body()
-    frames = led(live, 4.0, (0.0, 2.5)) + led(live, 3.0, (0.0, 2.5))
+    frames = led(live, 4.0, (0.0, 2.5)) + led(live, 4.0, (0.0, 2.5))
     joints = np.array([frame.joints for frame in frames])
     assert np.linalg.norm(joints[-1, PELVIS, :2] - (0.0, 2.5)) < 0.1
     rest = joints[-60:]
-    assert rest[:, PELVIS, 2].min() > 0.85 and np.abs(rest[:, FEET, 2]).max() < 0.05
+    assert rest[:, PELVIS, 2].min() > 0.85
+    heights = rest[:, FEET, 2]
+    assert heights.min(axis=1).max() < 0.03 and heights.max() < 0.15, "one may be put elsewhere"
     assert 0.002 < np.ptp(rest[:, WRISTS], axis=0).max() < 0.3, "it lives"
     feet = np.linalg.norm(np.diff(rest[:, FEET, :2], axis=0), axis=-1)
     assert np.median(feet) < 5e-4, "its feet stand"

@@ -74,4 +74,4 @@ def test_a_take_knows_what_it_touches() -> None:
         load_weights(),
     )
     assert take.touches.shape == (len(take), 4)
-    assert (take.touches[:, 1] == 1.0).all() and take.touches[:10, 0].max() < 0.5
+    assert (take.touches[:, 1] == 1.0).all() and take.touches[:, 0].mean() < 0.2

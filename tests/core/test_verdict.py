@@ -56,7 +56,8 @@ def test_what_is_gone_through_is_named_with_the_part_of_the_body() -> None:
 
 
 def test_a_board_too_thin_to_be_deep_in_is_gone_through_all_the_same() -> None:
-    joints = _take().joints
+    joints = _take().joints.copy()
+    joints[-40:] = joints[-40]  # who moves is not across a board for long
     neck = joints[-1, JOINTS.index("neck")] - (0.0, 0.0, 0.04)
 
     def said(thick: float, *, aside: float = 0.0, over: float = 0.0) -> list[str]:
@@ -66,8 +67,11 @@ def test_a_board_too_thin_to_be_deep_in_is_gone_through_all_the_same() -> None:
         return [each.text for each in found if "Board" in each.text]
 
     for thick in (0.02, 0.04):
-        (told,) = said(thick)
-        assert re.match("The (trunk|head) goes through 'Board' at .* move it", told), told
+        found = said(thick)
+        assert found and all(
+            re.match("The .* goes through 'Board' at .* move it", told) for told in found
+        )
+        assert any("trunk" in told or "head" in told for told in found), found
     assert not said(0.04, aside=0.9), "beside it"
     assert not said(0.04, over=0.5), "over the head"
     knee = joints[-1, JOINTS.index("left_knee")]

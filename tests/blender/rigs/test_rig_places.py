@@ -125,7 +125,9 @@ def test_a_small_rig_plays_the_motion_at_its_size(stage: RigStage) -> None:
     source = root + baked.ratio * (stage.take.joints - root)
     source[:, [7, 8], :2] = stage.take.joints[:, [7, 8], :2]
     errors = stage.errors("mixamo", rig, source)
-    assert max(errors[part].mean() for part in ("wrists", "head", "pelvis")) < CENTIMETRE
+    judged = errors.keys() & {"wrists", "head", "pelvis"}
+    assert judged >= {"head", "pelvis"}, "hands only where they hold on to something"
+    assert max(errors[part].mean() for part in judged) < CENTIMETRE
     assert np.allclose(
         stage.heads(rig, ["mixamorig:Hips"], 1)[0, :2], stage.take.root[0, :2, 3], atol=0.06
     )
