@@ -117,7 +117,9 @@ def test_what_a_change_of_mode_asks_is_come_to_and_left_without_a_pop(weights, c
         entering = replace(asked, mode=_modes(controls, at, "FREE", "EE"))
         reached = generate(Scene(), entering, weights, clean_up=clean_up).joints
         gap = np.linalg.norm(reached[:, 20] - target, axis=-1)
-        assert np.abs((reached - free.joints)[:at, [15, 20, 21]]).max() < 0.01, (
+        # The clean-up looks ahead, and lowers the pelvis a little before it has to.
+        before = 0.02 if clean_up is ALL else 0.005
+        assert np.abs((reached - free.joints)[:at, [15, 20, 21]]).max() < before, (
             "it begins where the mode changes"
         )
         assert gap[at + 12 :].mean() < (0.03 if clean_up is not ALL else 0.0005)
