@@ -57,7 +57,7 @@ def test_what_is_gone_through_is_named_with_the_part_of_the_body() -> None:
 
 def test_a_board_too_thin_to_be_deep_in_is_gone_through_all_the_same() -> None:
     joints = _take().joints.copy()
-    joints[-40:] = joints[-40]  # who moves is not across a board for long
+    joints[-60:] = joints[-20]  # who moves is not across a board for long
     neck = joints[-1, JOINTS.index("neck")] - (0.0, 0.0, 0.04)
 
     def said(thick: float, *, aside: float = 0.0, over: float = 0.0) -> list[str]:
