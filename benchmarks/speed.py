@@ -25,7 +25,7 @@ from dafnet_addon.core.series import MODEL_FPS
 from dafnet_addon.core.skeleton import OFFSETS
 from dafnet_addon.core.threads import one_thread
 from dafnet_addon.core.weights import FORMAT, Weights, load_weights
-from dafnet_addon.model.config import PAPER, ModelConfig
+from dafnet_addon.model.config import AHEAD_SIZE, PAPER, ModelConfig
 from dafnet_addon.model.flow import BodyFlow
 from dafnet_addon.model.predictor import ActionPredictor
 from dafnet_addon.model.systems import sampler_of
@@ -53,7 +53,14 @@ def random_weights(config: ModelConfig) -> Weights:
     """Weights of these sizes that were never trained."""
     torch.manual_seed(0)
     flow = BodyFlow(config)
-    unit = Statistics(np.zeros(66), np.ones(66), np.zeros(3), np.ones(3), np.zeros(18), np.ones(18))
+    unit = Statistics(
+        np.zeros(66),
+        np.ones(66),
+        np.zeros(3),
+        np.ones(3),
+        np.zeros(AHEAD_SIZE),
+        np.ones(AHEAD_SIZE),
+    )
     tensors = tensors_of(flow, ActionPredictor(config) if config.predicts else None, unit)
     description = {"model": config.as_dict(), "fps": round(MODEL_FPS), "offsets": OFFSETS.tolist()}
     return Weights(tensors, description, {"format": FORMAT}, Path("random"))
@@ -97,7 +104,13 @@ def time_per_pose(sampler: Sampler, batch: int, frames: int) -> float:
     """Milliseconds a pose, frame by frame, what is known in advance not counted; the best of a
     few.
     """
-    nothing = {"velocity": 3, "ahead": 18, "occupancy": 2640, "observation": 66, "given": 22}
+    nothing = {
+        "velocity": 3,
+        "ahead": AHEAD_SIZE,
+        "occupancy": 2640,
+        "observation": 66,
+        "given": 22,
+    }
     conditions = Conditions(**{name: np.zeros((frames, size)) for name, size in nothing.items()})
     noise = sampler.backend.array(np.zeros((batch, 66)))
     best = np.inf
