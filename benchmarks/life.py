@@ -26,7 +26,16 @@ from dafnet_addon.core.paths import Route, Stop, facing, route
 from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.root import gaussian
 from dafnet_addon.core.series import MODEL_FPS, runs
-from dafnet_addon.core.skeleton import ANKLES, FEET, HIPS, KNEES, OFFSETS, PELVIS, TARGETS
+from dafnet_addon.core.skeleton import (
+    ANKLES,
+    FEET,
+    FEET_ASKED,
+    HIPS,
+    KNEES,
+    OFFSETS,
+    PELVIS,
+    TARGETS,
+)
 from dafnet_addon.core.weights import Weights
 from dafnet_addon.data.held_out.captured import HeldClip, held_out
 
@@ -207,7 +216,7 @@ def feet(
         angles = np.random.default_rng(done).uniform(0.0, 2.0 * np.pi, 2)
         aside = {
             name: _ASIDE * np.array([np.cos(angle), np.sin(angle), 0.0])
-            for name, angle in zip(("foot_left", "foot_right"), angles, strict=True)
+            for name, angle in zip(FEET_ASKED, angles, strict=True)
         }
         free = {name: at for name, at in targets.items() if name not in aside}
         put_aside = {name: targets[name] + way for name, way in aside.items()}

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import life, sitting
-from dafnet_addon import Controls, Take, load_weights
+from dafnet_addon import Controls, generate, load_weights
 from dafnet_addon.core.draws import Draw
 from dafnet_addon.core.files import save_text
 from dafnet_addon.core.generate import takes_steps
@@ -201,11 +201,6 @@ def wanted(found: dict[str, Any]) -> list[Wanted]:
     return sorted(rows, key=lambda each: each.met)
 
 
-def _calm(clip: HeldClip, weights: Weights) -> Take:
-    controls = Controls(fps=MODEL_FPS, root=clip.path.matrices())
-    return run_to_end(takes_steps(clip.scene, controls, weights, [Draw()]))[0]
-
-
 def _trunk(joints: np.ndarray) -> np.ndarray:
     """Degrees (T,) by which trunks of joints (T, 22, 3) rise over level."""
     way = joints[:, NECK] - joints[:, PELVIS]
@@ -215,7 +210,8 @@ def _trunk(joints: np.ndarray) -> np.ndarray:
 def _trunks_lying(clips: Sequence[HeldClip], weights: Weights) -> list[float]:
     found = []
     for clip in clips:
-        joints = _calm(clip, weights).joints
+        controls = Controls(fps=MODEL_FPS, root=clip.path.matrices())
+        joints = generate(clip.scene, controls, weights).joints
         for rest in clip.rests:
             found.append(float(np.median(_trunk(joints[rest.start : rest.end]))))
     return found

@@ -54,17 +54,21 @@ def feet_elsewhere(
     for side, joint in enumerate(_GIVEN):
         chosen = given[..., joint].bool().all(1) & (torch.rand(windows, device=device) < share)
         way = _in_root(_drawn_way(windows, device), turned)
-        apart = (legs[:, :, _ANKLES[0], :2] - legs[:, :, _ANKLES[1], :2]).norm(dim=-1)
-        least = apart.amin(1).clamp_max(_APART)
+        least = _nearest(legs).clamp_max(_APART)
         for tried in _TRIED:
             made, reaches = _leg_moved(legs, side, tried * way)
-            apart = (made[:, :, _ANKLES[0], :2] - made[:, :, _ANKLES[1], :2]).norm(dim=-1)
-            taken = chosen & reaches & (apart.amin(1) >= least)
+            taken = chosen & reaches & (_nearest(made) >= least)
             legs = torch.where(taken[:, None, None, None], made, legs)
             chosen, moved = chosen & ~taken, moved | taken
 
     # What stays where it was does so to the bit.
     return torch.where(moved[:, None, None], (legs.flatten(-2) - mean) / std, lower)
+
+
+def _nearest(legs: Tensor) -> Tensor:
+    """How near the ankles of legs (B, T, 8, 3) come to each other over the floor (B,)."""
+    left, right = (legs[:, :, ankle, :2] for ankle in _ANKLES)
+    return (left - right).norm(dim=-1).amin(1)
 
 
 def _drawn_way(windows: int, device: torch.device) -> Tensor:
