@@ -22,8 +22,11 @@ test: lint $(BLENDERS:%=%/.test)
 	@$(if $(PYTHON_5_2),,echo "Not on Blender 5.2: its module needs Python 3.13 (PYTHON_5_2=path/to/python3.13).")
 	$(MAKE) --jobs=2 --output-sync=target --keep-going $(BLENDERS:%=tests-in-%)
 
-# Two suites run at once, on one core each. On 4.5 and 4.2, with either NumPy, all tests; on the others those that touch Blender.
-tests-in-.venv-5.0 tests-in-.venv-5.2: TESTS = tests/blender tests/project/test_extension.py tests/test_cli.py tests/test_examples.py
+# Two suites run at once, on one core each. On 4.5 all tests; on the others those that touch Blender, on 4.2 with the newer NumPy those of
+# the core as well.
+TOUCH_BLENDER := tests/blender tests/project/test_extension.py tests/test_cli.py tests/test_examples.py
+tests-in-.venv-4.2: TESTS = $(TOUCH_BLENDER) tests/core tests/model
+tests-in-.venv-5.0 tests-in-.venv-5.2: TESTS = $(TOUCH_BLENDER)
 tests-in-%:
 	OMP_NUM_THREADS=1 $*/bin/python -m pytest -q $(TESTS)
 

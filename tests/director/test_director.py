@@ -198,16 +198,20 @@ def test_a_hard_search_is_a_job_of_short_steps():
         for (x, y), (w, d) in zip(places, sizes, strict=True)
         if min(np.hypot(x, y), np.hypot(x - 97.0, y - 97.0)) > 2.5
     ]
-    job = walk_to.steps(room, Stop((0.0, 0.0), 0.0), Stop((97.0, 97.0), 0.0, 1.0))
-    shares, seconds, found = [], [process_time()], None
-    while found is None:
-        try:
-            shares.append(next(job))
-        except StopIteration as done:
-            found = done.value
-        seconds.append(process_time())
-    assert shares == sorted(shares) and shares[0] >= 0.0 and shares[-1] <= 1.0
-    assert np.diff(seconds).max() < 0.1 * (seconds[-1] - seconds[0]), "no step is a tenth of it"
+    runs = []
+    for _ in range(2):  # a pause of the collector's or the machine's hits no step twice
+        job = walk_to.steps(room, Stop((0.0, 0.0), 0.0), Stop((97.0, 97.0), 0.0, 1.0))
+        shares, seconds, found = [], [process_time()], None
+        while found is None:
+            try:
+                shares.append(next(job))
+            except StopIteration as done:
+                found = done.value
+            seconds.append(process_time())
+        assert shares == sorted(shares) and shares[0] >= 0.0 and shares[-1] <= 1.0
+        runs.append(np.diff(seconds))
+    steps = np.minimum(*runs)
+    assert steps.max() < 0.1 * steps.sum(), "no step is a tenth of it"
     at_once = walk_to(room, Stop((0.0, 0.0), 0.0), Stop((97.0, 97.0), 0.0, 1.0))
     assert np.array_equal(found.path.position, at_once.path.position)
 
