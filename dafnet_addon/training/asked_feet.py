@@ -13,11 +13,11 @@ from .batches import Statistics
 
 __all__ = ["FARTHEST", "feet_elsewhere"]
 
-FARTHEST = 0.25
-"""Metres that a foot is put aside at most."""
+FARTHEST = 0.4
+"""Metres that a foot is put aside at most: far enough that seated ankles cross, in one of six."""
 _RAISED, _HIGHEST = 0.3, 0.12
 """Share of the feet that are raised as well, and by how many metres at most."""
-_TRIED = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25)
+_TRIED = (1.0, -1.0, 0.6, -0.6, 0.3, -0.3, 0.15, -0.15)
 """Shares of the way aside that are tried, until the leg reaches and the feet are apart."""
 _STRETCHED = 0.995
 """Share of a leg's length that it is stretched to at most: farther than most captured legs."""

@@ -79,7 +79,10 @@ def test_feet_are_put_aside_and_stay_planted_on_legs_as_long():
         assert torch.allclose(*lengths, atol=1e-5)
 
     assert torch.equal(_of(made, HIPS), _of(lower, HIPS))
-    assert (_of(made, KNEES)[..., 1] > 0.05).all(), "knees bend to the front"
+    hips, knees, ankles, toes = (_of(made, each) for each in (HIPS, KNEES, ANKLES, FEET))
+    axis = torch.nn.functional.normalize(ankles - hips, dim=-1)
+    bend = (knees - hips) - ((knees - hips) * axis).sum(-1, keepdim=True) * axis
+    assert ((bend * (toes - ankles)).sum(-1) > 0.0).all(), "knees bend to where toes point"
     apart = (_of(made, ANKLES[:1]) - _of(made, ANKLES[1:]))[..., :2].norm(dim=-1)
     assert (apart > 0.08).all(), "no foot stands in the other"
 
