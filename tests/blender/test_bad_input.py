@@ -155,7 +155,10 @@ ERRORS: dict[str, tuple[Change, str]] = {
         "'Chair'.*not a number",
     ),
     "NaN in a target": (
-        lambda s: setattr(s.own.hand_left, "location", (0, NAN, 0)),
+        lambda s: [
+            setattr(s.own, "mode", "EE"),
+            setattr(s.own.hand_left, "location", (0, NAN, 0)),
+        ],
         "left hand target.*not a number",
     ),
     "root scaled to zero": (
@@ -180,6 +183,7 @@ ERRORS: dict[str, tuple[Change, str]] = {
     ),
     "hand on what follows the character": (
         lambda s: [
+            setattr(s.own, "mode", "EE"),
             setattr(s.own.hand_left, "parent", s.chair),
             setattr(s.chair.constraints.new("COPY_LOCATION"), "target", s.ann),
         ],

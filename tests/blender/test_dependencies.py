@@ -22,8 +22,9 @@ from kit.stage import Stage
 
 @pytest.fixture
 def stage(blender: ModuleType) -> Stage:
-    """A character with a root before a chair."""
+    """A character with a root before a chair, whose targets count."""
     made = Stage()
+    made.own.mode = "EE"
     made.chair = made.seat("Chair", location=(0, 2, 0))
     made.scene.frame_set(4)
     return made

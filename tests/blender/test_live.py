@@ -211,8 +211,15 @@ def test_what_ends_it(shot: Stage, ended: object, tmp_path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
     assert live_state() is None and "saved" in str(played.state.why)
     assert shot.state() == before
+    for collection in shot.head.users_collection:
+        collection.objects.unlink(shot.head)
+    shot.own.mode = "EE"
+    with pytest.raises(InputError, match="head' 'Ann Head' is not in the scene"):
+        LiveSession(bpy.context, shot.ann)
+    shot.own.mode = "FREE"
 
     played = Played(shot)
+    assert "head" not in played.session.targets
     played.run(0.2, (1.0, 0.0))
     bpy.ops.object.mode_set(mode="OBJECT")
     shot.select(bpy.data.objects["Chair"])

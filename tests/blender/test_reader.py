@@ -17,6 +17,7 @@ from kit.stage import Stage, box_corners, key
 @pytest.fixture
 def stage(blender: ModuleType) -> Stage:
     made = Stage(frames=(1, 10))
+    made.own.mode = "EE"
     made.scene.frame_set(4)
     return made
 
@@ -128,7 +129,7 @@ def test_units(stage: Stage) -> None:
     stage.scene.unit_settings.system = "METRIC"
     stage.scene.unit_settings.scale_length = 0.01
     bob = create_character(bpy.context, "Bob", 1.75)
-    bob.dafnet.furniture, stage.ann = stage.furniture, bob
+    bob.dafnet.furniture, bob.dafnet.mode, stage.ann = stage.furniture, "EE", bob
     bob.dafnet.root.location = (100, 200, 0)
     bob.dafnet.head.location = (0, 0, 150)
     stage.box("Chair", location=(300, 0, 0), scale=(50, 50, 50))
@@ -222,6 +223,7 @@ def test_furniture_says_how_soft_it_is(stage: Stage) -> None:
 
 def test_the_mode_of_each_frame(stage: Stage) -> None:
     stage.box("Chair")
+    stage.own.mode = "FREE"
     assert stage.read().controls.mode == "FREE"
     stage.ann.dafnet.mode = "EE"
     assert stage.read().controls.mode == "EE"
@@ -405,8 +407,30 @@ def test_bad_input_is_refused_in_one_sentence(stage: Stage) -> None:
     bpy.ops.object.delete()
     assert own.head is not None, "the property still holds the deleted object"
     stage.cannot_be_read("head target.*is not in the scene")
+    assert len(stage.read(mode="FREE").scene.solids) == 1, "nothing asks for her head there"
     own.head = None
     assert len(stage.read().scene.solids) == 1
+
+
+def test_what_no_mode_that_plays_asks_for_is_not_missed(stage: Stage) -> None:
+    """A head that is gone and a rig whose bones nobody knows, left over from other modes."""
+    stage.box("Chair")
+    own, rig = stage.own, stage.put(bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig")))
+    bpy.data.objects.remove(own.hand_left)
+    for collection in own.head.users_collection:
+        collection.objects.unlink(own.head)
+    own.upper_body_source = rig
+
+    stage.cannot_be_read("head target.*is not in the scene", mode="EE")
+    stage.cannot_be_read("'Rig'", mode="FULL")
+    assert stage.read(mode="FREE").controls.head is None
+
+    own.mode = "FREE"
+    assert stage.read().controls.mode == "FREE"
+    key(own, "mode", (1, "FREE"))
+    assert stage.read().controls.mode == "FREE", "keyed, but to nothing else"
+    key(own, "mode", (5, "EE"))
+    stage.cannot_be_read("head target.*is not in the scene")
 
 
 def test_the_frame_is_kept_while_reading(stage: Stage) -> None:

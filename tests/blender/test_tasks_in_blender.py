@@ -12,6 +12,7 @@ import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.tasks import Assignment, direct
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.root import yaw_of
+from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import TARGETS
 from bl_ext.user_default.dafnet.dafnet_addon.director.tasks import (
     LookAt,
     Reach,
@@ -74,10 +75,36 @@ def test_a_lean_is_keyed_for_as_long_as_one_sits_so(stage: Stage) -> None:
     assert np.allclose(read.lean, done.plan.controls().lean, atol=1e-3)
     assert np.allclose(read.lean[first.start : second.start], 15.0, atol=1e-3)
     assert not read.lean[second.there :].any()
+    # Planned anew without one, from frames in which she leant.
+    stage.scene.frame_set(stage.scene.frame_start + first.there + 5)
+    assert stage.own.lean != 0.0
     direct(bpy.context, [Assignment(stage.ann, [SitOn("Stool")])])
-    assert ("dafnet.lean", 0) not in keys_of(stage.ann) or not len(
-        keys_of(stage.ann)[("dafnet.lean", 0)]
-    ), "planned anew without one"
+    assert ("dafnet.lean", 0) not in keys_of(stage.ann)
+    assert stage.read().controls.lean is None
+
+
+def test_a_plan_without_hands_leaves_them_as_free_as_they_were(stage: Stage) -> None:
+    """Of an earlier plan that led them no influence stays, which would hold later ones back."""
+    direct(bpy.context, [Assignment(stage.ann, TASKS)])
+    assert ("dafnet.hand_left_influence", 0) in keys_of(stage.ann)
+    stage.scene.frame_set(stage.scene.frame_end)
+    direct(bpy.context, [Assignment(stage.ann, [SitOn("Stool", seconds=2)])])
+    assert {path for path, _ in keys_of(stage.ann)} == {"dafnet.mode"}
+    assert [getattr(stage.own, f"{role}_influence") for role in TARGETS] == [1.0] * len(TARGETS)
+
+
+def test_who_cannot_be_keyed_leaves_the_others_as_they_were(stage: Stage) -> None:
+    """Of two the second's head is parented, so that it takes no keys; the first has no root."""
+    assert bpy.ops.dafnet.add_character(name="Bob") == {"FINISHED"}
+    bob = bpy.context.object
+    bob.dafnet.root.location.x = 2.0
+    bob.dafnet.head.parent = stage.empty("Holder")
+    bpy.data.objects.remove(stage.own.root)
+    before = stage.state()
+    people = [Assignment(each, [LookAt("Lamp", seconds=2)]) for each in (stage.ann, bob)]
+    with pytest.raises(InputError, match="parent"):
+        direct(bpy.context, people)
+    assert stage.state() == before and not keys_of(stage.ann) and not stage.own.planned
 
 
 def test_keys_are_few_enough_to_edit(stage: Stage) -> None:

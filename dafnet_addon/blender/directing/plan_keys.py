@@ -6,7 +6,7 @@ action is kept.
 """
 
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from hashlib import sha256
 
 import bpy
@@ -19,8 +19,8 @@ from ...core.series import runs
 from ...core.skeleton import TARGETS
 from ...director.plans import Plan
 from ..character.targets import add_targets, missing_targets
-from ..compat import action_curves
-from .made_walks import forget_walks
+from ..compat import action_curves, remove_curves
+from .made_walks import forget_walks, walks_kept_on_failure
 from .root_keys import (
     MOVES,
     keep_copy,
@@ -30,7 +30,7 @@ from .root_keys import (
     unchanged_on_failure,
 )
 
-__all__ = ["key_plan", "plan_edited"]
+__all__ = ["plan_edited", "plan_keyed"]
 
 _A_SECOND = 10
 """How many keys a second what moves gets."""
@@ -40,18 +40,20 @@ _TAIL = " before tasks"
 """What the names of actions that are kept end with."""
 
 
-def key_plan(
+@contextmanager
+def plan_keyed(
     context: bpy.types.Context,
     armature: bpy.types.Object,
     plan: Plan,
     *,
     first: int,
     unit: float,
-) -> tuple[str, ...]:
-    """Key a plan from frame ``first`` on, in place of all keys there of the root, of the targets
-    that it uses, of the influences, the lean and the mode. ``unit``: metres of a Blender unit.
+) -> Iterator[tuple[str, ...]]:
+    """A block before which a plan is keyed from frame ``first`` on, in place of all keys there of
+    the root, of the targets that it uses, of the influences, the lean and the mode; if the block
+    fails, all is as it was before. ``unit``: metres of a Blender unit.
 
-    Targets that are missing are added. Returns the names of the actions in which keys are kept that
+    Targets that are missing are added. Yields the names of the actions in which keys are kept that
     the user had made or edited. ``InputError``: something cannot be keyed; nothing is changed then.
     """
     own = armature.dafnet
@@ -60,6 +62,8 @@ def key_plan(
     made: list[bpy.types.Object] = []
     copies: list[bpy.types.Action] = []
     with ExitStack() as undo:
+        undo.enter_context(walks_kept_on_failure(context.scene, armature))
+        undo.enter_context(_settings_kept_on_failure(armature))
         undo.callback(_remove, made, armature)
         if missing := missing_targets(context, armature, used):
             made += add_targets(context, armature, missing)
@@ -75,7 +79,7 @@ def key_plan(
 
         for owner in owners.values():
             _clear(owner, MOVES, first)
-        _clear(armature, _settings(armature), first)
+        _clear_settings(armature, first)
 
         route = Route(plan.path, ())
         key_route(context, own.root, route, first=first, scale=1.0 / unit, fps=fps)
@@ -84,10 +88,9 @@ def key_plan(
         _key_settings(armature, plan, first)
         own.planned = _digest(armature, first)
         forget_walks(armature, first)
-        kept = tuple(copy.name for copy in copies)
+        yield tuple(copy.name for copy in copies)
         made.clear()
         copies.clear()
-    return kept
 
 
 def plan_edited(armature: bpy.types.Object, first: int) -> bool:
@@ -95,6 +98,20 @@ def plan_edited(armature: bpy.types.Object, first: int) -> bool:
     edited.
     """
     return _digest(armature, first) not in ("", armature.dafnet.planned)
+
+
+@contextmanager
+def _settings_kept_on_failure(armature: bpy.types.Object) -> Iterator[None]:
+    """A block that keys settings: if it fails, their values are as they were."""
+    own = armature.dafnet
+    names = [*(path.removeprefix("dafnet.") for path in _settings(armature)), "planned"]
+    kept = {name: getattr(own, name) for name in names}
+    try:
+        yield
+    except BaseException:
+        for name, value in kept.items():
+            setattr(own, name, value)
+        raise
 
 
 def _remove(made: list[bpy.types.Object], armature: bpy.types.Object) -> None:
@@ -131,6 +148,19 @@ def _clear(owner: bpy.types.Object, paths: Sequence[str], first: int) -> None:
                 if points[k].co[0] >= first:
                     points.remove(points[k], fast=True)
             curve.update()
+
+
+def _clear_settings(armature: bpy.types.Object, first: int) -> None:
+    """Remove the keys of the settings that a plan keys; one that has none left is as at first, so
+    that nothing goes on with what was asked before.
+    """
+    keyed = {curve.data_path for curve in action_curves(armature)} & {*_settings(armature)}
+    _clear(armature, [*keyed], first)
+    for path in keyed:
+        curves = [curve for curve in action_curves(armature) if curve.data_path == path]
+        if not any(len(curve.keyframe_points) for curve in curves):
+            remove_curves(armature, path)
+            armature.dafnet.property_unset(path.removeprefix("dafnet."))
 
 
 def _digest(armature: bpy.types.Object, first: int) -> str:

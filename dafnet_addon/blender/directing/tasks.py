@@ -1,7 +1,7 @@
 """Characters with tasks: what they are to do is planned in the scene, and keyed."""
 
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 
 import bpy
@@ -25,7 +25,7 @@ from ..character.targets import add_root, lacks_root
 from ..populating.surroundings import room_of
 from ..scene.lookup import find_object
 from ..scene.playback import frame_kept, play_steps
-from .plan_keys import key_plan
+from .plan_keys import plan_keyed
 from .root_keys import keyable_root
 from .surroundings import find_furniture
 from .walking import extend_range
@@ -77,7 +77,7 @@ def direct(
     They begin where their bodies stand, if those alone were moved by hand (``standing``). A root is
     added where a character has none. Who has no furniture gets what is near her path. A
     job that yields its progress. ``InputError``, with the character's name: something cannot be
-    done or keyed; what was keyed for those before stays only if all of them could be planned.
+    done or keyed; nothing is changed then, of nobody.
     """
     armatures = [assigned.armature for assigned in people]
     with (
@@ -125,27 +125,24 @@ def _direct(
         job = _plan(context, assigned, own, first=first, unit=unit, fps=fps, others=before)
         plans.append((yield from within(job, _READ + k * share, _READ + (k + 1) * share)))
 
+    armatures = [find_object(own, own.armature, "character") for own in settings]
+    # All at once, so that whoever cannot be keyed leaves the others as they were.
+    kept = []
+    with ExitStack() as undo:
+        for armature, own, plan in zip(armatures, settings, plans, strict=True):
+            keyed = plan_keyed(context, armature, plan, first=own.frame_start, unit=unit)
+            kept.append(undo.enter_context(keyed))
+
     directed = []
-    for own, plan in zip(settings, plans, strict=True):
-        armature = find_object(own, own.armature, "character")
-        kept = key_plan(context, armature, plan, first=own.frame_start, unit=unit)
-        last = own.frame_start + len(plan) - 1
+    for k, (armature, plan) in enumerate(zip(armatures, plans, strict=True)):
+        first = settings[k].frame_start
+        last = first + len(plan) - 1
         extended = extend_range(scene, armature, last)
         directed.append(
-            Directed(
-                name=armature.name,
-                plan=plan,
-                first=own.frame_start,
-                last=last,
-                kept=kept,
-                extended=extended,
-                warnings=plan.warnings,
-            )
+            Directed(armature.name, plan, first, last, kept[k], extended, plan.warnings)
         )
-        yield _PLANNED + (1.0 - _PLANNED) * len(directed) / len(people)
 
-    for own in settings:
-        armature = find_object(own, own.armature, "character")
+    for armature in armatures:
         if armature.dafnet.furniture is None:
             _furnish(context, armature)
     return tuple(directed)

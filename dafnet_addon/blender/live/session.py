@@ -35,7 +35,7 @@ from ..pipeline.job import clean_up_of
 from ..pipeline.rollback import place_restorer, state_restorer
 from ..preferences import weights_path
 from ..scene.furniture import array
-from ..scene.lookup import find_object
+from ..scene.lookup import find_object, object_named
 from .around import LiveFurniture
 
 __all__ = ["Clip", "LiveSession", "Over"]
@@ -101,6 +101,8 @@ class LiveSession:
             role: find_object(self.settings, name, f"target of '{role.replace('_', ' ')}'")
             for role in TARGETS
             if (name := getattr(self.settings, role))
+            # Only EE misses a target that is gone.
+            and (armature.dafnet.mode == "EE" or object_named(self.scene, name))
         }
         self._at_first = {role: self._place(target) for role, target in self.targets.items()}
         self._last = lead = self._lead()

@@ -17,7 +17,7 @@ from ..character.armature import create_character, is_character, metres_per_unit
 from ..character.mannequin import body_material
 from ..character.takes import add_take, play_take
 from ..compat import assign_action
-from ..directing.plan_keys import key_plan
+from ..directing.plan_keys import plan_keyed
 from ..pipeline.baker import bake, require_bakeable
 from ..rig.baker import bake_onto_rig
 from ..rig.detection import detect_map
@@ -117,7 +117,8 @@ def embodied(
         armature.dafnet.furniture = furniture
     if plan is not None and is_character(armature):
         first, unit = context.scene.frame_start, metres_per_unit(context.scene)
-        key_plan(context, armature, plan, first=first, unit=unit)
+        with plan_keyed(context, armature, plan, first=first, unit=unit):
+            pass
     return replace(player, armature=armature)
 
 

@@ -19,12 +19,12 @@ from ...core.errors import InputError
 from ...core.progress import stepwise, within
 from ...core.resampling import covering_frames
 from ...core.series import MODEL_FPS
-from ...core.skeleton import JOINTS
+from ...core.skeleton import FEET_ASKED, JOINTS, TARGETS
 from ...core.solids import Scene
 from ...core.take import Controls
 from ..character.armature import is_character, metres_per_unit
 from ..character.settings import AS_IT_IS, Settings
-from ..compat import action_curves
+from ..compat import action_curves, animated_paths
 from ..pipeline.baker import has_bone_overrides, require_bakeable
 from ..rig.reading import pose_matrices
 from .dependencies import Dependencies, Simulation
@@ -74,6 +74,9 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
 
     What is looked at: the face of another character, else the middle of an object.
 
+    Only what counts in a mode that may play is read, or missed: targets in EE, those of the feet in
+    FULL as well, sources in FULL.
+
     Targets: the empties' places. Their rotations count where they are keyed, or where a target was
     ever turned in its parent's space; a target that was only moved leaves head, hands and
     feet free to turn.
@@ -97,12 +100,15 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
         )
 
     root = find_object(settings, settings.root, "root")
-    names = {role: name for role in _TARGETS if (name := getattr(settings, role))}
+    played = {settings.mode} if settings.mode else _modes_played(armature)
+    asked = TARGETS if "EE" in played else FEET_ASKED if "FULL" in played else ()
+    names = {role: name for role in asked if (name := getattr(settings, role))}
     targets = {role: find_object(settings, name, _TARGETS[role]) for role, name in names.items()}
 
     frames = range(settings.frame_start, settings.frame_end + 1)
+    parts = PARTS if "FULL" in played else ()
     copied = [
-        each for part in PARTS if (each := source_of(settings, part, armature, frames)) is not None
+        each for part in parts if (each := source_of(settings, part, armature, frames)) is not None
     ]
 
     dependencies = Dependencies(scene)
@@ -226,6 +232,24 @@ def _require_scene(context: bpy.types.Context, settings: Settings) -> bpy.types.
         )
 
     return scene
+
+
+def _modes_played(armature: bpy.types.Object) -> set[str]:
+    """The modes that a character's own settings may come to: the one that is set, those that are
+    keyed, and all of them where drivers or NLA strips change it.
+    """
+    own, path = armature.dafnet, "dafnet.mode"
+    if path not in animated_paths(armature):
+        return {own.mode}
+
+    named = {item.value: item.identifier for item in own.bl_rna.properties["mode"].enum_items}
+    curves = [curve for curve in action_curves(armature) if curve.data_path == path]
+    keyed = {round(point.co[1]) for curve in curves for point in curve.keyframe_points}
+    data = armature.animation_data
+    changed = data.drivers or data.nla_tracks or any(each.mute or each.modifiers for each in curves)
+    if changed or not keyed or not keyed <= named.keys():
+        return {*named.values()}
+    return {named[value] for value in keyed}
 
 
 class _Tracks:
