@@ -1,12 +1,14 @@
 """What fitting to the canonical body does to each source of motion: a table of distances and a
 picture of poses.
 
-    dafnet bench canonical FOLDER PICTURE.png
+    dafnet bench canonical FOLDER -o FOLDER
 
-``FOLDER`` holds motion capture, as ``dafnet_addon.data.capture.mocap`` reads it.
+The first holds motion capture, as ``dafnet_addon.data.capture.mocap`` reads it; into the other go
+``canonical.json`` and ``canonical.png``.
 """
 
 import argparse
+import json
 from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from dafnet_addon.core.errors import InputError
+from dafnet_addon.core.files import save_text
 from dafnet_addon.core.root import root_from_joints
 from dafnet_addon.core.rotations import rotate, transpose
 from dafnet_addon.core.series import MODEL_FPS, runs
@@ -21,6 +24,7 @@ from dafnet_addon.core.skeleton import FEET, JOINTS, PARENTS, PELVIS, TOE_HEIGHT
 from dafnet_addon.data.capture.cuts import bad_frames
 from dafnet_addon.data.capture.mocap import Clip, read_clips
 from dafnet_addon.data.motion.canonical import Calibration, calibrate, canonical
+from dafnet_addon.training.evaluation.markdown import markdown_table
 
 _PLANTED = 0.25
 """Metres a second of a toe on the floor, under which it stands."""
@@ -34,6 +38,14 @@ _SLIDE, _TOE, _ANKLE, _WRIST, _SEAT = (
     "ankle moved",
     "wrist wander",
     "seat wander",
+)
+
+_HEADS = (
+    "toe slides, a frame",
+    "toe moved",
+    "ankle moved",
+    "resting hand wanders",
+    "seated pelvis wanders",
 )
 
 Pair = tuple[np.ndarray, np.ndarray]
@@ -121,37 +133,27 @@ def measure(found: list[Pair]) -> dict[str, tuple[float, float, int]]:
     }
 
 
-def table(sources: dict[str, list[Pair]]) -> str:
-    """The figures of each source as text, "before → after" in millimetres, episodes in brackets."""
-    names = (_SLIDE, _TOE, _ANKLE, _WRIST, _SEAT)
-    heads = (
-        "source",
-        "toe slide, mm/frame",
-        "toe moved",
-        "ankle moved",
-        "resting hand wanders",
-        "seated pelvis wanders",
-    )
-    rows: list[tuple[str, ...]] = [heads]
-    for source, found in sources.items():
-        figures = measure(found)
-        cells = [source]
-        for name in names:
-            if name not in figures:
-                cells.append("-")
-                continue
+def canonical_page(sources: dict[str, dict[str, tuple[float, float, int]]]) -> str:
+    """The section of docs/data.md about fitting, of what ``measure`` says of each source."""
 
-            before, after, count = figures[name]
-            text = f"{after:.1f}" if name in (_TOE, _ANKLE) else f"{before:.2f} → {after:.2f}"
-            cells.append(f"{text} ({count})" if name in (_WRIST, _SEAT) else text)
+    def cell(figures: dict[str, tuple[float, float, int]], name: str) -> str:
+        if name not in figures:
+            return "–"
+        before, after, count = figures[name]
+        text = f"{after:.1f}" if name in (_TOE, _ANKLE) else f"{before:.2f} → {after:.2f}"
+        return f"{text} ({count})" if name in (_WRIST, _SEAT) else text
 
-        rows.append(tuple(cells))
+    rows = [
+        (source, *(cell(figures, name) for name in (_SLIDE, _TOE, _ANKLE, _WRIST, _SEAT)))
+        for source, figures in sources.items()
+    ]
+    return f"""## Fitted to one body
 
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join(
-        "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    )
+What fitting does to each source, by `dafnet bench canonical` (millimetres, as captured → fitted;
+in brackets how many rests). Ankles move since the sources put them elsewhere in the foot; the
+pelvis wanders more where a chair turns or rolls.
+
+{markdown_table(("source", *_HEADS), rows)}"""
 
 
 def _poses(found: list[Pair]) -> list[Pair]:
@@ -232,14 +234,14 @@ def picture(sources: dict[str, list[Pair]], file: Path) -> None:
 
 
 def main(arguments: Sequence[str]) -> str:
-    """Draw the picture of the compact sources in a folder; the table as text."""
+    """Measure and draw the compact sources in a folder; the section of docs/data.md as text."""
     parser = argparse.ArgumentParser(
         "dafnet bench canonical",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("folder", type=Path)
-    parser.add_argument("picture", type=Path)
+    parser.add_argument("-o", "--output", type=Path, required=True)
     options = parser.parse_args(arguments)
 
     clips: dict[str, list[Clip]] = defaultdict(list)
@@ -248,5 +250,7 @@ def main(arguments: Sequence[str]) -> str:
             clips[clip.source].append(clip)
 
     sources = {source: pairs(own) for source, own in clips.items()}
-    picture(sources, options.picture)
-    return table(sources)
+    figures = {source: measure(found) for source, found in sources.items()}
+    save_text(options.output / "canonical.json", json.dumps(figures, indent=2))
+    picture(sources, options.output / "canonical.png")
+    return canonical_page(figures)

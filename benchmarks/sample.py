@@ -36,7 +36,7 @@ from dafnet_addon.training.evaluation.clips import (
     table,
 )
 
-__all__ = ["FILE", "RUNS", "measure", "pack", "sample"]
+__all__ = ["FILE", "RUNS", "measure", "pack", "sample", "sample_page"]
 
 FILE = Path(__file__).with_name("held_out") / "rocketbox.xz"
 RUNS = ("ground_truth", "free_t0", "free_t0_clean", "ee_t0", "ee_t0_clean")
@@ -120,6 +120,18 @@ def measure(
     progress(1.0)
     rows = rows_by_run(measured, RUNS)
     return rows, table(rows, COLUMNS)
+
+
+def sample_page(rows: dict[str, dict[str, Any]]) -> str:
+    """The section of docs/data.md about the sample, of the report of ``measure``."""
+    return f"""## The motion that comes with the project
+
+`benchmarks/held_out/rocketbox.xz`: sixteen captured clips of the body `rocketbox/f`, which trained
+nothing, 0.1 MB, under its MIT licence beside it. They are the frozen test's own, with its
+furniture. What the shipped weights do on them, by `dafnet bench sample` (intervals of 95 % in
+brackets), which a test does again:
+
+{table(rows, COLUMNS)}"""
 
 
 def _calm_takes(sampler: Sampler, clip: HeldClip) -> Iterator[tuple[str, Figures]]:

@@ -24,7 +24,9 @@ import numpy as np
 ROOT = Path(__file__).absolute().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.wanted import wanted_text  # noqa: E402 - found only now
+from benchmarks.canonical import canonical_page  # noqa: E402 - found only now
+from benchmarks.sample import sample_page  # noqa: E402
+from benchmarks.wanted import wanted_text  # noqa: E402
 from dafnet_addon.core.weights import load_weights  # noqa: E402
 from dafnet_addon.training.evaluation.real_report import real_page  # noqa: E402
 from dafnet_addon.training.evaluation.report_text import report_text  # noqa: E402
@@ -33,7 +35,7 @@ CARD = ROOT / "weights_stub" / "README.md"
 README = ROOT / "README.md"
 REPORTS = ROOT / "docs" / "reports"
 HELD_OUT, REAL = ROOT / "docs" / "evaluation.md", ROOT / "docs" / "evaluation-real.md"
-WANTED = ROOT / "docs" / "wanted.md"
+WANTED, DATA = ROOT / "docs" / "wanted.md", ROOT / "docs" / "data.md"
 """Pages with whole sections that commands wrote."""
 
 Reports = Mapping[str, Any]
@@ -470,6 +472,8 @@ def written(of: Reports) -> Iterator[tuple[Path, str]]:
     for role in ("choose", "tell"):
         yield REAL, real_page(of[f"real-{role}"], f"Bodies and makers that {role}").strip()
     yield WANTED, wanted_text(dict(of)).strip()
+    yield DATA, sample_page(of["sample"])
+    yield DATA, canonical_page(of["canonical"])
 
 
 def with_section(text: str, section: str) -> str:
