@@ -321,6 +321,25 @@ def test_a_free_recording_takes_nothing_over_from_one_that_reached(
     assert shot.own.mode == "FREE"
 
 
+def test_a_target_keeps_how_it_was_turned(shot: Stage, ended: object) -> None:
+    hand = shot.own.hand_right
+    key(hand, "location", (1, (0.3, 0.2, 0.9)), (20, (0.3, 0.2, 1.0)))
+    key(hand, "rotation_euler", (1, (0.0, 0.0, 0.0)), (20, (0.0, 0.5, 1.0)))
+    turned = {name: keys for name, keys in keys_of(hand).items() if name[0] == "rotation_euler"}
+    played = Played(shot)
+    played.session.record()
+    played.run(0.3)
+    hand.location = 0.3, 0.35, 1.45
+    played.run(0.5)
+    end_live()
+    run_to_end(keep_clips(played.session))
+    keys = keys_of(hand)
+    assert len(keys["location", 0]) > 10, "it is keyed as it led"
+    assert len(turned) == 3
+    for name, those in turned.items():
+        assert np.array_equal(keys[name], those)
+
+
 def test_the_action_that_waits_is_not_purged_and_may_be_renamed(shot: Stage, ended: object) -> None:
     key(shot.ann, "location", (1, (0.0, 0.0, 0.0)), (20, (0.5, 0.0, 0.0)))
     own = shot.ann.animation_data.action

@@ -17,7 +17,7 @@ from ...core.skeleton import TARGETS
 from ...core.take import Controls
 from ..character.settings import HELD
 from ..compat import action_curves, assign_action, new_action, remove_curves
-from ..directing.root_keys import MOVES, require_keyable
+from ..directing.root_keys import require_keyable
 from ..directing.walking import extend_range
 from ..pipeline.baker import key_curves
 from ..pipeline.curves import copy_curve
@@ -125,7 +125,7 @@ def _key(owner: bpy.types.Object, frames: np.ndarray, channels: dict[str, np.nda
     """
     data = owner.animation_data
     previous = data.action if data else None
-    carried = [curve for curve in action_curves(owner) if curve.data_path not in MOVES]
+    carried = [curve for curve in action_curves(owner) if curve.data_path not in channels]
     action, add_curve = new_action(owner, f"{owner.name} live")
     action.use_fake_user = True
     for path, values in channels.items():
