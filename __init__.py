@@ -38,16 +38,25 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take away what ``register`` added."""
+    """End what runs, and take away what ``register`` added."""
+    from .dafnet_addon.blender.live import listening
+    from .dafnet_addon.blender.pipeline import running
+
+    try:
+        running.stop_job()
+        listening.end_live()
+    finally:
+        _take_away()
+
+
+def _take_away() -> None:
     import bpy
 
     from . import operators, panels
     from .dafnet_addon.blender import preferences, translations
     from .dafnet_addon.blender.character import choosing, properties
-    from .dafnet_addon.blender.live import listening
     from .dafnet_addon.blender.overlay import display
 
-    listening.end_live()
     while _commands:
         bpy.utils.unregister_cli_command(_commands.pop())
 

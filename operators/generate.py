@@ -165,8 +165,10 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
 
     def cancel(self, context: bpy.types.Context) -> None:
         """End the job, which leaves the scene untouched unless it has finished."""
-        super().cancel(context)
-        display.hide_live_pose()
+        try:
+            super().cancel(context)
+        finally:
+            display.hide_live_pose()
 
     def report_result(self, result: tuple[job.Result, ...]) -> None:
         """Say what was generated, and pass the warnings on."""

@@ -78,6 +78,7 @@ class LongOperator(DafnetOperator):
                 result = self._advance(seconds, max(seconds, _FIRST_READING))
                 if result is None:
                     self._listen(context)
+                    self._running.stop = lambda: self.cancel(bpy.context)
                     listens = True
             finally:
                 if not listens:
@@ -95,6 +96,8 @@ class LongOperator(DafnetOperator):
 
         Until the end only moving the view is let through, so that the scene stays as it was read.
         """
+        if running_job() is not self._running:  # ended from outside
+            return {"CANCELLED"}
         if event.type == "ESC" or self._running.cancel_requested:
             self.cancel(context)
             self.report({"INFO"}, "Cancelled; the scene is as it was")
@@ -129,15 +132,20 @@ class LongOperator(DafnetOperator):
         return {"FINISHED"}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """End the job, which leaves the scene untouched unless it has finished."""
-        self._steps.close()
-        end_job()
-        self._view.end()
-        context.window_manager.event_timer_remove(self._timer)
-        context.window_manager.progress_end()
-        if context.workspace:
-            context.workspace.status_text_set(None)
-        _redraw(context)
+        """End the job, which leaves the scene untouched unless it has finished.
+
+        Whatever goes wrong with that, no job is running afterwards.
+        """
+        try:
+            self._steps.close()
+        finally:
+            end_job()
+            self._view.end()
+            context.window_manager.event_timer_remove(self._timer)
+            context.window_manager.progress_end()
+            if context.workspace:
+                context.workspace.status_text_set(None)
+            _redraw(context)
 
     def _listen(self, context: bpy.types.Context) -> None:
         """Let ``modal`` have the user's events from now on, and a tick whenever there are none."""
@@ -195,6 +203,8 @@ def _over_sidebar(context: bpy.types.Context, event: bpy.types.Event) -> bool:
 
 
 def _redraw(context: bpy.types.Context) -> None:
-    for area in context.screen.areas:
-        if area.type == "VIEW_3D":
-            area.tag_redraw()
+    """Have the 3D views drawn again, in all windows: the context's may be the preferences'."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
