@@ -113,6 +113,33 @@ def test_rejecting_the_take_that_plays_plays_another(shot: Shot) -> None:
     )
 
 
+def test_takes_stay_as_they_are_while_a_strip_is_edited(shot: Shot) -> None:
+    own = shot.ann.dafnet
+    own.take_count = 2
+    bpy.ops.dafnet.generate()
+    one, two = shot.listed()
+    two.dafnet.accepted = True
+    own.active_take = 0
+    bpy.ops.dafnet.take_to_nla()
+    data = shot.ann.animation_data
+    data.nla_tracks.active = data.nla_tracks[0]
+    data.nla_tracks[0].strips[0].select = True
+    data.use_tweak_mode = True
+    assert data.use_tweak_mode and data.action == one
+    for change in (
+        lambda: bpy.ops.dafnet.play_take(index=1),
+        lambda: bpy.ops.dafnet.play_take(step="NEXT"),
+        bpy.ops.dafnet.reject_take,
+        bpy.ops.dafnet.keep_accepted,
+    ):
+        with pytest.raises(RuntimeError, match="'Ann' edits a strip in tweak mode"):
+            change()
+        assert shot.listed() == [one, two] and own.active_take == 0 and data.action == one
+        assert one.use_fake_user and two.dafnet.accepted
+    data.use_tweak_mode = False
+    assert bpy.ops.dafnet.play_take(index=1) == {"FINISHED"} and data.action == two
+
+
 def test_a_deleted_action_leaves_a_row_that_can_be_removed(shot: Shot) -> None:
     shot.ann.dafnet.take_count = 2
     bpy.ops.dafnet.generate()

@@ -13,6 +13,7 @@ from ...core.errors import InputError
 from ...core.storage import packed, unpacked
 from ...core.take import Controls, Take
 from ..compat import assign_action
+from .nla_modes import require_no_tweak_mode
 
 __all__ = [
     "PACKED",
@@ -133,7 +134,11 @@ def frames_of(action: bpy.types.Action) -> tuple[int, int]:
 
 
 def play_take(armature: bpy.types.Object, action: bpy.types.Action) -> None:
-    """Let the armature play one of its takes; what it plays now is kept by a fake user."""
+    """Let the armature play one of its takes; what it plays now is kept by a fake user.
+
+    ``InputError``: it edits a strip in tweak mode; nothing is changed then.
+    """
+    require_no_tweak_mode(armature)
     data = armature.animation_data
     if data and data.action and data.action != action:
         data.action.use_fake_user = True
@@ -144,7 +149,10 @@ def play_take(armature: bpy.types.Object, action: bpy.types.Action) -> None:
 def drop_take(armature: bpy.types.Object, index: int) -> None:
     """Remove a row from the list; if its take was playing, another one plays instead. Blender
     deletes the action with the file, unless something uses it.
+
+    ``InputError``: the armature edits a strip in tweak mode; nothing is changed then.
     """
+    require_no_tweak_mode(armature)
     own = armature.dafnet
     action = own.takes[index].action
     own.takes.remove(index)

@@ -3,6 +3,7 @@
 import bpy
 
 from ...core.errors import InputError
+from ..character.nla_modes import require_no_tweak_mode
 from ..compat import add_strip
 
 __all__ = ["put_into_nla"]
@@ -15,9 +16,8 @@ def put_into_nla(armature: bpy.types.Object, action: bpy.types.Action) -> bpy.ty
     ``InputError``: it has a strip with this take already, or is edited in a way that keeps it from
     getting one; nothing is changed then.
     """
+    require_no_tweak_mode(armature)
     data = armature.animation_data_create()
-    if data.use_tweak_mode:
-        raise InputError(f"'{armature.name}' edits a strip in tweak mode; leave it first (Tab).")
     if armature.library or (
         armature.override_library and armature.override_library.is_system_override
     ):

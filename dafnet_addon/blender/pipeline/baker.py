@@ -19,6 +19,7 @@ from ...core.skeleton import JOINTS, PELVIS
 from ...core.take import Take
 from ..character.armature import character_scale
 from ..character.mannequin import FACING
+from ..character.nla_modes import require_not_tweaked_nor_solo
 from ..compat import action_curves, assign_action, new_action
 from .curves import copy_curve
 
@@ -82,12 +83,7 @@ def require_bakeable(armature: bpy.types.Object, unit: float = 1.0) -> float:
             f"The armature '{armature.name}' shows its rest position; set it to Pose Position."
         )
 
-    data = armature.animation_data
-    if data and (data.use_tweak_mode or any(track.is_solo for track in data.nla_tracks)):
-        raise InputError(
-            f"The armature '{armature.name}' plays an NLA strip in tweak or solo mode; leave it "
-            "first."
-        )
+    require_not_tweaked_nor_solo(armature)
 
     return character_scale(armature, unit)
 

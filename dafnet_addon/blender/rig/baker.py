@@ -16,6 +16,7 @@ from ...core.skeleton import ANKLES, HEAD, HIPS, JOINTS, WRISTS
 from ...core.touching import touches
 from ..character.armature import character_scale, metres_per_unit
 from ..character.mannequin import FACING
+from ..character.nla_modes import require_not_tweaked_nor_solo
 from ..character.takes import played_take, stored_take
 from ..pipeline.baker import TRANSFORMS, has_drivers
 from ..pipeline.rollback import undone_on_failure
@@ -323,11 +324,7 @@ def _require_bakeable(context: bpy.types.Context, rig: bpy.types.Object, root_mo
             "H."
         )
 
-    data = rig.animation_data
-    if data and (data.use_tweak_mode or any(track.is_solo for track in data.nla_tracks)):
-        raise InputError(
-            f"The armature '{rig.name}' plays an NLA strip in tweak or solo mode; leave it first."
-        )
+    require_not_tweaked_nor_solo(rig)
     if has_drivers(rig, TRANSFORMS):
         raise InputError(f"The object '{rig.name}' is moved by drivers; mute them and bake again.")
 
