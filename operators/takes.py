@@ -78,16 +78,27 @@ class DAFNET_OT_play_take(_OfTakes, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> None:
         """Play it."""
         character = _character(context)
-        rows = [row.action for row in character.dafnet.takes]
-        index = self.index
-        if self.step != "NONE":
-            data = character.animation_data
-            playing = rows.index(data.action) if data and data.action in rows else 0
-            index = (playing + (1 if self.step == "NEXT" else -1)) % len(rows)
-        if not 0 <= index < len(rows) or rows[index] is None:
-            raise InputError("This take's action was deleted; remove its row.")
+        find = self._of_row if self.step == "NONE" else self._next
+        play_take(character, find(character))
 
-        play_take(character, rows[index])
+    def _of_row(self, character: Any) -> bpy.types.Action:
+        """The take of the row."""
+        rows = character.dafnet.takes
+        take = rows[self.index].action if 0 <= self.index < len(rows) else None
+        if take is None:
+            raise InputError("This take's action was deleted; remove its row.")
+        return take
+
+    def _next(self, character: Any) -> bpy.types.Action:
+        """The take a step from the one that plays, round and round; where none plays, the first one
+        of those to come. Rows whose action was deleted are stepped over.
+        """
+        takes = takes_of(character)
+        if self.step == "PREVIOUS":
+            takes.reverse()
+        data = character.animation_data
+        plays = data.action if data else None
+        return takes[(takes.index(plays) + 1) % len(takes)] if plays in takes else takes[0]
 
 
 class DAFNET_OT_reject_take(_OfTakes, bpy.types.Operator):

@@ -155,6 +155,34 @@ def test_a_deleted_action_leaves_a_row_that_can_be_removed(shot: Shot) -> None:
     assert len(shot.ann.dafnet.takes) == 1
 
 
+def test_next_and_previous_step_over_rows_whose_action_was_deleted(shot: Shot) -> None:
+    shot.own.take_count = 4
+    bpy.ops.dafnet.generate()
+    one, two, three, four = shot.listed()
+    for deleted in (two, four):
+        bpy.data.actions.remove(deleted)
+    data = shot.ann.animation_data
+    for step, plays in (("NEXT", three), ("NEXT", one), ("PREVIOUS", three), ("PREVIOUS", one)):
+        assert bpy.ops.dafnet.play_take(step=step) == {"FINISHED"}
+        assert data.action == plays
+    assert shot.own.active_take == 0
+
+
+def test_next_begins_with_the_first_take_where_none_plays(shot: Shot) -> None:
+    shot.own.take_count = 3
+    bpy.ops.dafnet.generate()
+    one, _, three = shot.listed()
+    data = shot.ann.animation_data
+    for nothing in (None, bpy.data.actions.new("Mine")):
+        for step, plays in (("NEXT", one), ("PREVIOUS", three)):
+            data.action = nothing
+            bpy.ops.dafnet.play_take(step=step)
+            assert data.action == plays
+    shot.ann.animation_data_clear()
+    bpy.ops.dafnet.play_take(step="NEXT")
+    assert shot.ann.animation_data.action == one
+
+
 def test_legs_vary_under_the_same_upper_body(shot: Shot) -> None:
     shot.ann.dafnet.seed, shot.ann.dafnet.temperature = 4, 0.6
     bpy.ops.dafnet.generate()
