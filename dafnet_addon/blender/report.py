@@ -10,6 +10,7 @@ import numpy as np
 from ..core.errors import DafnetError
 from ..core.manifest import content_hash, current_version
 from ..core.weights import load_weights
+from .character.armature import metres_per_unit
 from .character.settings import settings_of
 from .character.takes import draw_of, played_take, stored_take
 from .preferences import weights_path
@@ -19,7 +20,7 @@ __all__ = ["report_text", "write_report"]
 _TEXT = "DAFNet Report"
 """The name of the text block."""
 
-_WORDS = ("mode", "noise")
+_WORDS = ("mode", "begins", "noise")
 """Settings whose text is a word of the interface, not a name of the user's."""
 
 
@@ -44,7 +45,7 @@ def report_text(context: bpy.types.Context, armature: bpy.types.Object | None) -
         if value is not None and name not in ("armature", "scene")
     )
     scene = context.scene
-    unit, fps = scene.unit_settings.scale_length, scene.render.fps / scene.render.fps_base
+    unit, fps = metres_per_unit(scene), scene.render.fps / scene.render.fps_base
     lines += [
         f"Scene: {fps:g} frames a second, unit {unit:g} m",
         f"Character: mode {armature.dafnet.mode}, {said}",

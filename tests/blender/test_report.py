@@ -31,6 +31,16 @@ def test_it_says_versions_settings_and_figures_and_no_names(stage: Stage) -> Non
     assert "Secret" not in after and "Ann" not in after
 
 
+def test_it_says_what_takes_begin_with_and_how_long_a_unit_counts(stage: Stage) -> None:
+    units = stage.scene.unit_settings
+    units.scale_length = 0.01
+    said = report_text(bpy.context, stage.ann)
+    assert "begins STANDING" in said and "unit 0.01 m" in said
+    stage.own.begins, units.system = "AS_IT_IS", "NONE"
+    said = report_text(bpy.context, stage.ann)
+    assert "begins AS_IT_IS" in said and "unit 1 m" in said
+
+
 def test_it_is_given_without_a_character_and_with_weights_that_are_none(stage: Stage) -> None:
     own = bpy.context.preferences.addons["bl_ext.user_default.dafnet"].preferences
     assert "No character is selected." in report_text(bpy.context, None)
