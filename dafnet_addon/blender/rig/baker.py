@@ -2,6 +2,7 @@
 a new action.
 """
 
+from collections.abc import Generator
 from dataclasses import dataclass
 
 import bpy
@@ -10,6 +11,7 @@ import numpy as np
 from ...core.body import canonical_body
 from ...core.errors import InputError
 from ...core.limb_errors import limb_errors
+from ...core.progress import stepwise, within
 from ...core.retargeting import retarget
 from ...core.root import root_from_matrices
 from ...core.skeleton import ANKLES, HEAD, HIPS, JOINTS, WRISTS
@@ -20,7 +22,8 @@ from ..character.nla_modes import require_not_tweaked_nor_solo
 from ..character.takes import played_take, stored_take
 from ..pipeline.baker import TRANSFORMS, has_drivers
 from ..pipeline.rollback import undone_on_failure
-from ..scene.playback import frame_kept
+from ..scene.dependencies import Dependencies
+from ..scene.playback import frame_kept, play_steps
 from .controls import (
     Channels,
     Control,
@@ -39,6 +42,8 @@ from .sizing import require_rig_of_a_person
 
 __all__ = ["Baked", "bake_onto_rig", "frames_played"]
 
+_RECORDED = 0.9
+"""Progress once the motion is read."""
 _MEASURED_FRAMES = 24
 """How many frames the result is measured in."""
 _HOLDS = 0.99
@@ -83,6 +88,7 @@ def frames_played(character: bpy.types.Object, scene: bpy.types.Scene) -> range:
     return range(round(first), round(last) + 1)
 
 
+@stepwise
 def bake_onto_rig(
     context: bpy.types.Context,
     character: bpy.types.Object,
@@ -92,31 +98,29 @@ def bake_onto_rig(
     limbs: str = "FK",
     frames: range | None = None,
     name: str | None = None,
-) -> Baked:
+) -> Generator[float, None, Baked]:
     """Key on ``rig`` what ``character`` does in ``frames`` (those of its action), in a new action
     that the rig then plays.
 
     ``root_motion``: OBJECT, BONE or HIPS, what carries the rig over the floor; ``limbs``: FK or IK.
     Earlier actions are kept by a fake user. Controls that are not mapped keep their pose, except
     that those which would interfere, and those that the earlier action moves, are put at rest.
-    ``InputError``: rig, map or character cannot be used; the rig is then as it was.
+    A job, see ``playback.play_steps``: nothing is changed before its last step. ``InputError``:
+    rig, map or character cannot be used; the rig is then as it was.
     """
     frames = frames_played(character, context.scene) if frames is None else frames
     unit = metres_per_unit(context.scene)
     size = character_scale(character, 1.0)
 
-    _require_bakeable(context, rig, root_motion)
-    if character.data.pose_position == "REST":
-        raise InputError(
-            f"The character '{character.name}' shows its rest position; set it to Pose Position."
-        )
-
-    rig_map = with_bone_names_of(rig_map, rig.data.bones.keys()) if rig.mode != "EDIT" else rig_map
-    require_usable(rig, rig_map)
-    require_rig_of_a_person(context.scene, rig, rig_map)
+    _usable_map(context, character, rig, rig_map, root_motion)
+    try:
+        recording = yield from within(_record(context, character, rig, frames), 0.0, _RECORDED)
+        # Once more, since all may have changed while it was read.
+        rig_map = _usable_map(context, character, rig, rig_map, root_motion)
+    except ReferenceError as error:
+        raise InputError("Something was deleted while the motion was read; bake again.") from error
 
     controls = controls_of(rig, rig_map, limbs, root_motion == "BONE")
-    recording = _record(context, character, rig, frames)
 
     options = _BakeOptions(
         root_motion=root_motion,
@@ -303,6 +307,26 @@ def _facing(bodies: np.ndarray) -> np.ndarray:
     return frames
 
 
+def _usable_map(
+    context: bpy.types.Context,
+    character: bpy.types.Object,
+    rig: bpy.types.Object,
+    rig_map: RigMap,
+    root_motion: str,
+) -> RigMap:
+    """The map with the rig's own names of bones. ``InputError``: see ``bake_onto_rig``."""
+    _require_bakeable(context, rig, root_motion)
+    if character.data.pose_position == "REST":
+        raise InputError(
+            f"The character '{character.name}' shows its rest position; set it to Pose Position."
+        )
+
+    rig_map = with_bone_names_of(rig_map, rig.data.bones.keys()) if rig.mode != "EDIT" else rig_map
+    require_usable(rig, rig_map)
+    require_rig_of_a_person(context.scene, rig, rig_map)
+    return rig_map
+
+
 def _require_bakeable(context: bpy.types.Context, rig: bpy.types.Object, root_motion: str) -> None:
     if rig.type != "ARMATURE":
         raise InputError(f"'{rig.name}' is not an armature; choose the armature of your rig.")
@@ -338,17 +362,18 @@ def _require_bakeable(context: bpy.types.Context, rig: bpy.types.Object, root_mo
 
 def _record(
     context: bpy.types.Context, character: bpy.types.Object, rig: bpy.types.Object, frames: range
-) -> _Recording:
-    """Play the frames and note what is needed; afterwards the current frame is as it was."""
+) -> Generator[float, None, _Recording]:
+    """Play the frames and note what is needed: a job, see ``playback.play_steps``."""
     bodies, poses, above = [], [], []
-    with frame_kept(context.scene):
-        for frame in frames:
-            context.scene.frame_set(frame)
-            depsgraph = context.evaluated_depsgraph_get()
-            evaluated, own = character.evaluated_get(depsgraph), rig.evaluated_get(depsgraph)
-            bodies.append(np.array(evaluated.matrix_world, float))
-            poses.append(pose_matrices(evaluated, list(JOINTS)))
-            above.append(np.array(own.matrix_world @ own.matrix_basis.inverted_safe(), float))
+
+    def look(_frame: int, depsgraph: bpy.types.Depsgraph, _shaped: set[bpy.types.Object]) -> None:
+        evaluated, own = character.evaluated_get(depsgraph), rig.evaluated_get(depsgraph)
+        bodies.append(np.array(evaluated.matrix_world, float))
+        poses.append(pose_matrices(evaluated, list(JOINTS)))
+        above.append(np.array(own.matrix_world @ own.matrix_basis.inverted_safe(), float))
+
+    simulations = Dependencies(context.scene).simulations([character, rig])
+    yield from play_steps(context, frames, simulations, look)
 
     recording = _Recording(np.array(bodies), np.array(poses), np.array(above))
     if not all(

@@ -1,5 +1,6 @@
 """What a bake does to the rig and to the file, what it refuses, and what it reports."""
 
+from collections.abc import Generator
 from typing import Any
 
 import bpy
@@ -15,6 +16,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.core.cleanup import CleanUp
 from bl_ext.user_default.dafnet.dafnet_addon.core.draws import Draw
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.generate import generate
+from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end
 from bl_ext.user_default.dafnet.dafnet_addon.core.solids import Scene
 from bl_ext.user_default.dafnet.dafnet_addon.core.take import Controls
 from bl_ext.user_default.dafnet.dafnet_addon.core.weights import load_weights
@@ -219,6 +221,53 @@ def test_the_panel_and_the_button(stage: RigStage) -> None:
     assert bpy.ops.dafnet.bake_to_rig() == {"FINISHED"}
 
 
+def test_a_bake_that_is_stopped_anywhere_changes_nothing(stage: RigStage) -> None:
+    """Esc while the motion is read; at each step the frame is the user's."""
+    stage.play("walk")
+    rig = stage.build("mixamo")
+    stage.scene.frame_set(7)
+    before, shares = stage.state(), []
+    while True:
+        steps = baker.bake_onto_rig.steps(bpy.context, stage.ann, rig, stage.map("mixamo", rig))
+        try:
+            for _ in range(len(shares) + 1):
+                share = next(steps)
+        except StopIteration as done:
+            assert rig.animation_data.action == done.value.action
+            break
+        shares.append(share)
+        assert stage.state() == before
+        steps.close()
+        assert stage.state() == before
+    assert len(shares) > 2 and shares == sorted(shares) and shares[-1] < 1.0
+    assert stage.scene.frame_current == 7
+
+
+def test_what_changes_while_a_bake_reads_is_seen(stage: RigStage) -> None:
+    stage.play("walk")
+    rig = stage.build("mixamo")
+
+    def begun() -> Generator[float, None, Any]:
+        steps = baker.bake_onto_rig.steps(bpy.context, stage.ann, rig, stage.map("mixamo", rig))
+        next(steps)
+        return steps
+
+    steps = begun()
+    rig.data.pose_position = "REST"
+    with pytest.raises(InputError, match="shows its rest position"):
+        run_to_end(steps)
+    rig.data.pose_position = "POSE"
+    assert rig.animation_data is None or rig.animation_data.action is None
+
+    for gone in (rig, stage.ann):
+        steps, actions = begun(), len(bpy.data.actions)
+        bpy.data.objects.remove(gone)
+        with pytest.raises(InputError, match="deleted while the motion was read; bake again"):
+            run_to_end(steps)
+        assert len(bpy.data.actions) == actions
+        rig = stage.build("mixamo")
+
+
 def test_a_bake_that_is_off_is_warned_about(stage: RigStage) -> None:
     """Long arms whose hand is held at a board: it stays there, so the elbow is bent, and the report
     names the arm in degrees.
@@ -229,6 +278,8 @@ def test_a_bake_that_is_off_is_warned_about(stage: RigStage) -> None:
     messages: list[tuple[set[str], str]] = []
 
     class Reporter:
+        steps, report_result = DAFNET_OT_bake_to_rig.steps, DAFNET_OT_bake_to_rig.report_result
+
         def report(self, kind: set[str], message: str) -> None:
             messages.append((kind, message))
 
