@@ -1,5 +1,6 @@
 """Show where takes are at fault, in the timeline."""
 
+from collections.abc import Generator
 from typing import Any
 
 import bpy
@@ -8,12 +9,13 @@ from ..dafnet_addon.blender.character.armature import character_of
 from ..dafnet_addon.blender.character.takes import PACKED, played_take, takes_of
 from ..dafnet_addon.blender.overlay import display
 from ..dafnet_addon.blender.overlay.faults import faults_of
-from .base import DafnetOperator, idle
+from .base import idle
+from .long import LongOperator
 
 __all__ = ["DAFNET_OT_mark_frames"]
 
 
-class DAFNET_OT_mark_frames(DafnetOperator, bpy.types.Operator):
+class DAFNET_OT_mark_frames(LongOperator, bpy.types.Operator):
     """Show in the timeline where feet slide (yellow) and joints touch furniture (red) in the take
     that plays, or hide it
     """
@@ -30,25 +32,28 @@ class DAFNET_OT_mark_frames(DafnetOperator, bpy.types.Operator):
         character = character_of(context)
         return character is not None and played_take(character) is not None
 
-    def run(self, context: bpy.types.Context) -> None:
-        """Measure all takes of the character, or hide what was measured."""
+    def steps(self, context: bpy.types.Context) -> Generator[float, None, str]:
+        """Measure all takes of the character, or hide what was measured; what to say of the one
+        that plays.
+        """
         character: Any = character_of(context)
-        plays = played_take(character)
+        plays: Any = played_take(character)
         if display.shown_faults(plays) is not None:
             display.hide_faults()
-            return
+            return ""
 
-        takes = dict.fromkeys(
-            [plays, *(action for action in takes_of(character) if PACKED in action)]
-        )
-        found = faults_of(context, character, (action for action in takes if action is not None))
+        number = plays.session_uid
+        others = (action for action in takes_of(character) if PACKED in action)
+        takes = [*dict.fromkeys([plays, *others])]
+        found = yield from faults_of.steps(context, character, takes)
         display.show_faults(found)
-        faults = found[plays.session_uid] if plays is not None else None
-        if faults is not None:
-            sliding, touching = (
-                int((counts > 0).sum()) for counts in (faults.sliding, faults.collisions)
-            )
-            self.report(
-                {"INFO"},
-                f"Feet slide in {sliding} frames, joints touch furniture in {touching}.",
-            )
+        faults = found[number]
+        sliding, touching = (
+            int((counts > 0).sum()) for counts in (faults.sliding, faults.collisions)
+        )
+        return f"Feet slide in {sliding} frames, joints touch furniture in {touching}."
+
+    def report_result(self, result: str) -> None:
+        """Say it."""
+        if result:
+            self.report({"INFO"}, result)

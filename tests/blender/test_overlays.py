@@ -20,6 +20,8 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay import (
 from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.cache import cache
 from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.drawing import compose
 from bl_ext.user_default.dafnet.dafnet_addon.core.draws import Draw
+from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end
 from bl_ext.user_default.dafnet.dafnet_addon.core.root import RootPath
 from bl_ext.user_default.dafnet.dafnet_addon.core.sensor import RADIUS, SPHERES
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import REST
@@ -473,6 +475,36 @@ def test_faulty_frames_are_marked_and_unmarked(shot: Shot) -> None:
     assert display.shown_faults(action) is None and not display._drawers
     shot.ann.animation_data.action = None
     assert not bpy.ops.dafnet.mark_frames.poll()
+
+
+def test_marking_frames_may_be_stopped_and_sees_what_is_deleted(shot: Shot) -> None:
+    takes = [shot.add(standing(30), start=11), shot.add(standing(40), start=11)]
+    shot.scene.frame_set(17)
+    before, shares = shot.state(), []
+    while True:
+        steps = faults.faults_of.steps(bpy.context, shot.ann, takes)
+        try:
+            for _ in range(len(shares) + 1):
+                share = next(steps)
+        except StopIteration as done:
+            assert set(done.value) == {action.session_uid for action in takes}
+            break
+        shares.append(share)
+        assert shot.state() == before
+        steps.close()
+        assert shot.state() == before
+    assert len(shares) > 4 and shares == sorted(shares) and shares[-1] <= 1.0
+
+    steps = faults.faults_of.steps(bpy.context, shot.ann, takes)
+    next(steps)
+    bpy.data.actions.remove(takes[1])
+    with pytest.raises(InputError, match="deleted while takes were measured; try again"):
+        run_to_end(steps)
+    steps = faults.faults_of.steps(bpy.context, shot.ann, takes[:1])
+    next(steps)
+    bpy.data.objects.remove(shot.ann)
+    with pytest.raises(InputError, match="deleted while"):
+        run_to_end(steps)
 
 
 def test_beads_are_closed_and_lit(shot: Shot) -> None:

@@ -1,6 +1,6 @@
 """Where takes are at fault, frame by frame, and the bars that mark it in the timeline."""
 
-from collections.abc import Iterable
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -8,10 +8,13 @@ import numpy as np
 
 from ...core.conditions import foot_targets
 from ...core.distance import prepared, scaled
+from ...core.errors import InputError
 from ...core.metrics import BAD_COLLISION_JOINTS, bad_collisions
 from ...core.nearby import REACH_OF_A_BODY, solids_near
 from ...core.occupancy import distance
+from ...core.progress import stepwise, within
 from ...core.sliding import SEEN, slides
+from ...core.solids import Scene
 from ..character.settings import settings_of
 from ..character.takes import frames_of, stored_take
 from ..scene.scene_reader import read_scene
@@ -48,37 +51,57 @@ class FaultBars:
     colours: np.ndarray
 
 
+@stepwise
 def faults_of(
     context: bpy.types.Context,
     armature: bpy.types.Object,
-    actions: Iterable[bpy.types.Action],
-) -> dict[int, Faults]:
+    actions: Sequence[bpy.types.Action],
+) -> Generator[float, None, dict[int, Faults]]:
     """Faults of takes by their actions' ``session_uid``, among the furniture as the scene has it in
     each frame.
 
-    ``InputError`` as for ``read_scene``, and where an action holds no take.
+    A job, see ``read_scene``. ``InputError`` as there, where an action holds no take, and where
+    something is deleted meanwhile.
     """
-    found, scenes = {}, {}
-    for action in actions:
-        take, controls = stored_take(action)
-        first, last = frames = frames_of(action)
-        if frames not in scenes:
-            settings = settings_of(
-                armature, context.scene, frame_start=first, frame_end=last, mode="FREE"
-            )
-            scenes[frames] = read_scene(context, settings).scene
-
-        floor = take.root[:, 2, 3] / take.scale
-        joints = take.joints / take.scale
-        near = solids_near(scenes[frames], take.root[:, :3, 3], REACH_OF_A_BODY, take.scale)
-        solids, _ = prepared(scaled(near, 1.0 / take.scale), float(np.median(floor)))
-        apart = distance(solids, joints[:, list(BAD_COLLISION_JOINTS)], floor)
-        found[action.session_uid] = Faults(
-            (slides(joints, take.fps, floor, foot_targets(controls)) > SEEN).sum(axis=1),
-            bad_collisions(apart),
-        )
-
+    found: dict[int, Faults] = {}
+    scenes: dict[tuple[int, int], Scene] = {}
+    try:
+        for k, action in enumerate(actions):
+            one = _faults(context, armature, action, scenes)
+            faults = yield from within(one, k / len(actions), (k + 1) / len(actions))
+            found[action.session_uid] = faults
+    except ReferenceError as error:
+        raise InputError("Something was deleted while takes were measured; try again.") from error
     return found
+
+
+def _faults(
+    context: bpy.types.Context,
+    armature: bpy.types.Object,
+    action: bpy.types.Action,
+    scenes: dict[tuple[int, int], Scene],
+) -> Generator[float, None, Faults]:
+    """Those of one take; ``scenes``: what has been read, by frames, to which this adds."""
+    take, controls = stored_take(action)
+    first, last = frames = frames_of(action)
+    if frames not in scenes:
+        settings = settings_of(
+            armature, context.scene, frame_start=first, frame_end=last, mode="FREE"
+        )
+        read = yield from within(read_scene.steps(context, settings), 0.0, 0.5)
+        scenes[frames] = read.scene
+
+    floor = take.root[:, 2, 3] / take.scale
+    joints = take.joints / take.scale
+    near = solids_near(scenes[frames], take.root[:, :3, 3], REACH_OF_A_BODY, take.scale)
+    solids, _ = yield from within(
+        prepared.steps(scaled(near, 1.0 / take.scale), float(np.median(floor))), 0.5, 1.0
+    )
+    apart = distance(solids, joints[:, list(BAD_COLLISION_JOINTS)], floor)
+    return Faults(
+        (slides(joints, take.fps, floor, foot_targets(controls)) > SEEN).sum(axis=1),
+        bad_collisions(apart),
+    )
 
 
 def fault_bars(faults: Faults, frame_start: int) -> FaultBars:
