@@ -17,6 +17,7 @@ from bpy.props import (
 )
 
 from ...core.solids import SOFTEST
+from ..overridable import LOCALLY, ROWS_LOCALLY
 from ..rig import properties as rig_properties
 from .settings import AS_IT_IS, COMES_AND_GOES, HELD, MAX_TAKES, STANDING
 from .takes import PACKED
@@ -25,10 +26,6 @@ from .walk_rows import GROUPS as WALK_GROUPS
 from .walk_rows import MANNER, WalkRow, manner_counts, manner_of, set_manner
 
 __all__ = ["CharacterSettings", "TakeSettings", "ensure_registered", "register", "unregister"]
-
-
-_LOCALLY = {"LIBRARY_OVERRIDABLE"}
-"""What a library override of a character keeps in its own file."""
 
 
 def _is_armature(_settings: "CharacterSettings", candidate: bpy.types.Object) -> bool:
@@ -182,19 +179,19 @@ class TakeSettings(bpy.types.PropertyGroup):
 class TakeLink(bpy.types.PropertyGroup):
     """A row in a character's list of takes."""
 
-    action: PointerProperty(type=bpy.types.Action, options=set(), override=_LOCALLY)
+    action: PointerProperty(type=bpy.types.Action, options=set(), override=LOCALLY)
 
 
 class CharacterSettings(bpy.types.PropertyGroup):
     """Settings of one character."""
 
     chosen: BoolProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         options={"HIDDEN"},
         description="Whether the tab belongs to this character while no other is selected",
     )
     mode: EnumProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Mode",
         default="FREE",
         description="What drives the upper body. Keyframe it to change it during the shot",
@@ -214,7 +211,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ],
     )
     furniture: PointerProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Furniture",
         type=bpy.types.Collection,
         options=set(),
@@ -224,7 +221,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     root: PointerProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Root",
         type=bpy.types.Object,
         poll=_is_not_the_character,
@@ -232,7 +229,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         description="Animated object on the ground under the pelvis: X right, Y forward, Z up",
     )
     head: PointerProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Head",
         type=bpy.types.Object,
         poll=_is_not_the_character,
@@ -243,7 +240,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     hand_left: PointerProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Left Hand",
         type=bpy.types.Object,
         poll=_is_not_the_character,
@@ -254,7 +251,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     hand_right: PointerProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Right Hand",
         type=bpy.types.Object,
         poll=_is_not_the_character,
@@ -265,7 +262,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     foot_left: PointerProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Left Foot",
         type=bpy.types.Object,
         poll=_is_not_the_character,
@@ -276,7 +273,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     foot_right: PointerProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Right Foot",
         type=bpy.types.Object,
         poll=_is_not_the_character,
@@ -287,7 +284,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     look_at: PointerProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Look At",
         type=bpy.types.Object,
         poll=_is_not_the_character,
@@ -299,7 +296,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     look_at_influence: FloatProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Look At Influence",
         default=1.0,
         min=0.0,
@@ -311,7 +308,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     upper_body_source: PointerProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Source",
         type=bpy.types.Object,
         poll=_is_armature,
@@ -322,7 +319,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     upper_body_take: PointerProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Take",
         type=bpy.types.Action,
         poll=_is_take,
@@ -330,7 +327,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         description="Take whose upper body is copied when no source armature is chosen",
     )
     lower_body_source: PointerProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Lower Body",
         type=bpy.types.Object,
         poll=_is_armature,
@@ -341,42 +338,42 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     source_offset: IntProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Offset",
         default=0,
         options=set(),
         description="Frames by which the source plays later here than in the scene",
     )
     source_loops: BoolProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Loop",
         default=False,
         options=set(),
         description="Play the source's action over and over, from its first frame to its last",
     )
     use_scene_range: BoolProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Scene Range",
         default=True,
         options=set(),
         description="Generate the frames from the scene's start to its end",
     )
     frame_start: IntProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Start",
         default=1,
         options=set(),
         description="First frame to generate",
     )
     frame_end: IntProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="End",
         default=250,
         options=set(),
         description="Last frame to generate",
     )
     begins: EnumProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Begins",
         default=STANDING,
         options=set(),
@@ -397,7 +394,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ],
     )
     seed: IntProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Seed",
         default=0,
         min=0,
@@ -405,7 +402,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         description=("Another number gives another take, if the temperature is above zero"),
     )
     take_count: IntProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Takes",
         default=1,
         min=1,
@@ -420,29 +417,29 @@ class CharacterSettings(bpy.types.PropertyGroup):
     takes: CollectionProperty(
         type=TakeLink,
         options=set(),
-        override={*_LOCALLY, "USE_INSERTION"},
+        override=ROWS_LOCALLY,
         description="Takes of this character",
     )
     active_take: IntProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Take",
         options=set(),
         description="The take that the buttons below act on",
     )
     tasks: CollectionProperty(
-        override={*_LOCALLY, "USE_INSERTION"},
+        override=ROWS_LOCALLY,
         type=TaskRow,
         options=set(),
         description="What this character is to do, in this order",
     )
     active_task: IntProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Task",
         options=set(),
         description="The task that the buttons below act on",
     )
     already_there: BoolProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Already There",
         options=set(),
         description=(
@@ -451,36 +448,36 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     stood: FloatVectorProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         options={"HIDDEN"},
         size=4,
         description="Place and heading of the body, when it last stood at its root",
     )
-    speed: FloatProperty(override=_LOCALLY, options=set(), **MANNER["speed"])
-    seconds: FloatProperty(override=_LOCALLY, options=set(), **MANNER["seconds"])
-    sits_down: FloatProperty(override=_LOCALLY, options=set(), **MANNER["sits_down"])
-    gets_up: FloatProperty(override=_LOCALLY, options=set(), **MANNER["gets_up"])
-    lean: FloatProperty(override=_LOCALLY, **LEAN)
+    speed: FloatProperty(override=LOCALLY, options=set(), **MANNER["speed"])
+    seconds: FloatProperty(override=LOCALLY, options=set(), **MANNER["seconds"])
+    sits_down: FloatProperty(override=LOCALLY, options=set(), **MANNER["sits_down"])
+    gets_up: FloatProperty(override=LOCALLY, options=set(), **MANNER["gets_up"])
+    lean: FloatProperty(override=LOCALLY, **LEAN)
     walks: CollectionProperty(
-        override={*_LOCALLY, "USE_INSERTION"},
+        override=ROWS_LOCALLY,
         type=WalkRow,
         options=set(),
         description="The walks that the root was keyed for, in the order of time",
     )
     active_walk: IntProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Walk",
         options=set(),
         update=_walk_chosen,
         description="The walk that is made again, with those after it",
     )
     planned: StringProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         options={"HIDDEN"},
         description="What tells the keys that were planned from edited ones",
     )
     blend_frames: IntProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Blend",
         default=10,
         min=0,
@@ -489,7 +486,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         description="Number of frames over which the body blends into the new mode",
     )
     head_influence: FloatProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Head Influence",
         default=1.0,
         min=0.0,
@@ -501,7 +498,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     head_follows: EnumProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Head Follows",
         default="ALL",
         description="What of the head's target counts. Keyframe it to change it during the shot",
@@ -512,7 +509,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ],
     )
     hand_left_influence: FloatProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Left Hand Influence",
         default=1.0,
         min=0.0,
@@ -524,7 +521,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     hand_right_influence: FloatProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Right Hand Influence",
         default=1.0,
         min=0.0,
@@ -536,7 +533,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     foot_left_influence: FloatProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Left Foot Influence",
         default=1.0,
         min=0.0,
@@ -548,7 +545,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     foot_right_influence: FloatProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Right Foot Influence",
         default=1.0,
         min=0.0,
@@ -560,7 +557,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     temperature: FloatProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Temperature",
         default=0.0,
         min=0.0,
@@ -574,7 +571,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     noise: EnumProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Noise",
         default=COMES_AND_GOES,
         options=set(),
@@ -590,14 +587,14 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ],
     )
     guess_softness: BoolProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Guess Softness",
         default=True,
         options=set(),
         description="Guess how soft this piece of furniture is from its name and shape",
     )
     softness: FloatProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Softness",
         default=0.0,
         min=0.0,
@@ -612,7 +609,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     plant_feet: FloatProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Plant Feet",
         default=1.0,
         min=0.0,
@@ -625,7 +622,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     rest_on_seats: FloatProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Rest on Seats",
         default=1.0,
         min=0.0,
@@ -638,7 +635,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     reach_targets: FloatProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Reach Targets",
         default=1.0,
         min=0.0,
@@ -651,7 +648,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     clear_furniture: FloatProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Clear Furniture",
         default=0.0,
         min=0.0,
@@ -664,7 +661,7 @@ class CharacterSettings(bpy.types.PropertyGroup):
         ),
     )
     smooth: FloatProperty(
-        override=_LOCALLY,
+        override=LOCALLY,
         name="Smooth",
         default=0.0,
         min=0.0,
@@ -686,7 +683,7 @@ def register() -> None:
     for cls in _GROUPS:
         bpy.utils.register_class(cls)
     bpy.types.Object.dafnet = PointerProperty(
-        type=CharacterSettings, name="DAFNet", override=_LOCALLY
+        type=CharacterSettings, name="DAFNet", override=LOCALLY
     )
     bpy.types.Action.dafnet = PointerProperty(type=TakeSettings, name="DAFNet")
     rig_properties.register()

@@ -17,6 +17,7 @@ from ...core.errors import InputError
 from ...core.take import LEANS
 from ...director.task_lists import tasks_from
 from ...director.tasks import VERBS, Task, options
+from ..overridable import LOCALLY
 
 __all__ = ["LEAN", "TaskRow", "add_row", "fields_of", "tasks_of", "title_of"]
 
@@ -48,6 +49,7 @@ class TaskRow(bpy.types.PropertyGroup):
     """One task. Which of the properties count depends on the ``verb``: ``fields_of``."""
 
     verb: EnumProperty(
+        override=LOCALLY,
         name="Verb",
         options=set(),
         default="SIT_ON",
@@ -65,6 +67,7 @@ class TaskRow(bpy.types.PropertyGroup):
         ],
     )
     about: StringProperty(
+        override=LOCALLY,
         name="Thing",
         options=set(),
         search=_names,
@@ -74,14 +77,20 @@ class TaskRow(bpy.types.PropertyGroup):
         ),
     )
     at_place: BoolProperty(
+        override=LOCALLY,
         name="At a Place",
         options=set(),
         description="A place counts: where to go, or where on a wide seat, top or board",
     )
     place: FloatVectorProperty(
-        name="Place", options=set(), subtype="TRANSLATION", description="In the world"
+        override=LOCALLY,
+        name="Place",
+        options=set(),
+        subtype="TRANSLATION",
+        description="In the world",
     )
     seconds: FloatProperty(
+        override=LOCALLY,
         name="Seconds",
         options=set(),
         default=3.0,
@@ -90,6 +99,7 @@ class TaskRow(bpy.types.PropertyGroup):
         description="How long it takes, once one is there",
     )
     speed: FloatProperty(
+        override=LOCALLY,
         name="Speed",
         options=set(),
         default=1.1,
@@ -97,11 +107,15 @@ class TaskRow(bpy.types.PropertyGroup):
         max=2.5,
         description="Walking speed, in metres per second",
     )
-    lean: FloatProperty(options=set(), **LEAN)
+    lean: FloatProperty(override=LOCALLY, options=set(), **LEAN)
     turned: BoolProperty(
-        name="Facing", options=set(), description="Face something, or in a direction"
+        override=LOCALLY,
+        name="Facing",
+        options=set(),
+        description="Face something, or in a direction",
     )
     facing: FloatProperty(
+        override=LOCALLY,
         name="Direction",
         options=set(),
         subtype="ANGLE",
@@ -110,12 +124,14 @@ class TaskRow(bpy.types.PropertyGroup):
         description="0 looks along +Y, counter-clockwise seen from above",
     )
     faced: StringProperty(
+        override=LOCALLY,
         name="Faced",
         options=set(),
         search=_names,
         description="What is faced; leave it empty to give a direction",
     )
     choose: EnumProperty(
+        override=LOCALLY,
         name="Choose",
         options=set(),
         items=[
@@ -124,6 +140,7 @@ class TaskRow(bpy.types.PropertyGroup):
         ],
     )
     how: EnumProperty(
+        override=LOCALLY,
         name="How",
         options=set(),
         items=[
@@ -133,6 +150,7 @@ class TaskRow(bpy.types.PropertyGroup):
         ],
     )
     hand: EnumProperty(
+        override=LOCALLY,
         name="Hand",
         options=set(),
         items=[

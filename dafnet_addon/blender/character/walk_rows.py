@@ -20,6 +20,7 @@ from bpy.props import (
 
 from ...core.paths import GETS_UP, SITS_DOWN
 from ...core.trails import FASTEST, SLOWEST
+from ..overridable import LOCALLY, ROWS_LOCALLY
 
 __all__ = [
     "BED",
@@ -119,13 +120,14 @@ class Asked:
 class WalkPoint(bpy.types.PropertyGroup):
     """An empty on the way of a walk."""
 
-    point: PointerProperty(type=bpy.types.Object, options=set())
+    point: PointerProperty(override=LOCALLY, type=bpy.types.Object, options=set())
 
 
 class WalkRow(bpy.types.PropertyGroup):
     """One walk. Which of the properties count depends on the ``kind``: ``fields_of_walk``."""
 
     kind: EnumProperty(
+        override=LOCALLY,
         name="Kind",
         options={"HIDDEN"},
         items=[
@@ -138,31 +140,33 @@ class WalkRow(bpy.types.PropertyGroup):
         ],
     )
     goal: PointerProperty(
+        override=LOCALLY,
         name="Goal",
         type=bpy.types.Object,
         options=set(),
         description="The seat, the curve or the moving object that the walk was made for",
     )
-    points: CollectionProperty(type=WalkPoint, options={"HIDDEN"})
-    placed: BoolProperty(options={"HIDDEN"})
+    points: CollectionProperty(override=ROWS_LOCALLY, type=WalkPoint, options={"HIDDEN"})
+    placed: BoolProperty(override=LOCALLY, options={"HIDDEN"})
     place: FloatVectorProperty(
+        override=LOCALLY,
         name="Place",
         options=set(),
         subtype="TRANSLATION",
         description="Where the walk ends, in the world",
     )
-    speed: FloatProperty(options=set(), **MANNER["speed"])
-    seconds: FloatProperty(options=set(), **MANNER["seconds"])
-    sits_down: FloatProperty(options=set(), **MANNER["sits_down"])
-    gets_up: FloatProperty(options=set(), **MANNER["gets_up"])
-    tables: BoolProperty(options={"HIDDEN"})
-    pull_out: BoolProperty(options={"HIDDEN"})
-    by_keys: BoolProperty(options={"HIDDEN"})
-    keep_facing: BoolProperty(options={"HIDDEN"})
-    backwards: BoolProperty(options={"HIDDEN"})
-    first: IntProperty(options={"HIDDEN"})
-    last: IntProperty(options={"HIDDEN"})
-    digest: StringProperty(options={"HIDDEN"})
+    speed: FloatProperty(override=LOCALLY, options=set(), **MANNER["speed"])
+    seconds: FloatProperty(override=LOCALLY, options=set(), **MANNER["seconds"])
+    sits_down: FloatProperty(override=LOCALLY, options=set(), **MANNER["sits_down"])
+    gets_up: FloatProperty(override=LOCALLY, options=set(), **MANNER["gets_up"])
+    tables: BoolProperty(override=LOCALLY, options={"HIDDEN"})
+    pull_out: BoolProperty(override=LOCALLY, options={"HIDDEN"})
+    by_keys: BoolProperty(override=LOCALLY, options={"HIDDEN"})
+    keep_facing: BoolProperty(override=LOCALLY, options={"HIDDEN"})
+    backwards: BoolProperty(override=LOCALLY, options={"HIDDEN"})
+    first: IntProperty(override=LOCALLY, options={"HIDDEN"})
+    last: IntProperty(override=LOCALLY, options={"HIDDEN"})
+    digest: StringProperty(override=LOCALLY, options={"HIDDEN"})
 
 
 GROUPS = (WalkPoint, WalkRow)

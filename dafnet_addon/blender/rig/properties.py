@@ -10,6 +10,7 @@ from bpy.props import CollectionProperty, EnumProperty, IntProperty, PointerProp
 from ...core.errors import InputError
 from ...core.skeleton import JOINTS
 from ..character.armature import is_character
+from ..overridable import LOCALLY, ROWS_LOCALLY
 from . import maps
 from .detection import detect_map
 
@@ -24,6 +25,7 @@ class RigRow(bpy.types.PropertyGroup):
     """One joint (``name``) and the bone for it."""
 
     bone: StringProperty(
+        override=LOCALLY,
         name="Bone",
         options=set(),
         description="Bone of this joint; leave it empty where the rig has none",
@@ -33,18 +35,31 @@ class RigRow(bpy.types.PropertyGroup):
 class RigSettings(bpy.types.PropertyGroup):
     """Settings of an armature that is not a DAFNet character."""
 
-    rows: CollectionProperty(type=RigRow, options=set(), description="Bones of the joints")
-    active_row: IntProperty(name="Joint", options=set(), description="The row that is selected")
+    rows: CollectionProperty(
+        override=ROWS_LOCALLY, type=RigRow, options=set(), description="Bones of the joints"
+    )
+    active_row: IntProperty(
+        override=LOCALLY, name="Joint", options=set(), description="The row that is selected"
+    )
     convention: StringProperty(
-        name="Convention", options=set(), description="Name of the preset that the bones come from"
+        override=LOCALLY,
+        name="Convention",
+        options=set(),
+        description="Name of the preset that the bones come from",
     )
     more: StringProperty(
-        options={"HIDDEN"}, description="What else the preset knows about the rig's controls"
+        override=LOCALLY,
+        options={"HIDDEN"},
+        description="What else the preset knows about the rig's controls",
     )
     root_bone: StringProperty(
-        name="Root Bone", options=set(), description="Bone that carries the whole rig"
+        override=LOCALLY,
+        name="Root Bone",
+        options=set(),
+        description="Bone that carries the whole rig",
     )
     character: PointerProperty(
+        override=LOCALLY,
         name="Character",
         type=bpy.types.Object,
         poll=_is_character,
@@ -52,6 +67,7 @@ class RigSettings(bpy.types.PropertyGroup):
         description="DAFNet character whose motion is baked onto this armature",
     )
     root_motion: EnumProperty(
+        override=LOCALLY,
         name="Root Motion",
         default="OBJECT",
         options=set(),
@@ -71,6 +87,7 @@ class RigSettings(bpy.types.PropertyGroup):
         ],
     )
     limbs: EnumProperty(
+        override=LOCALLY,
         name="Limbs",
         default="FK",
         options=set(),
@@ -94,7 +111,9 @@ def register() -> None:
     """Add the settings to every object."""
     for cls in _GROUPS:
         bpy.utils.register_class(cls)
-    bpy.types.Object.dafnet_rig = PointerProperty(type=RigSettings, name="DAFNet Rig")
+    bpy.types.Object.dafnet_rig = PointerProperty(
+        type=RigSettings, name="DAFNet Rig", override=LOCALLY
+    )
 
 
 def unregister() -> None:
@@ -150,9 +169,9 @@ def character_for(context: bpy.types.Context, rig: bpy.types.Object) -> bpy.type
 def show_map(rig: bpy.types.Object, rig_map: maps.RigMap) -> None:
     """Put a map into the rig's settings, one row a joint."""
     own = rig.dafnet_rig
-    own.rows.clear()
     for joint in JOINTS:
-        row = own.rows.add()
+        # Rows that come from a library cannot be removed from an override, but changed.
+        row = own.rows.get(joint) or own.rows.add()
         row.name, row.bone = joint, rig_map.joints.get(joint, "")
     own.convention, own.root_bone = rig_map.name, rig_map.root or ""
     own.more = maps.as_text(rig_map)
