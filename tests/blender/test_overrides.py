@@ -11,6 +11,8 @@ import bpy
 import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.settings import settings_of
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.walk_rows import asked_in
+from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import job
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig.properties import presets
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import JOINTS
@@ -123,3 +125,79 @@ def test_a_library_override_gets_takes_of_its_own_that_the_file_keeps(
     assert action.library is None and [row.action for row in ann.dafnet.takes] == [action]
     heads = bone_heads(ann, 12)
     np.testing.assert_allclose(heads, result.take.joints[-1], atol=1e-4)
+
+
+def through(*points: Any) -> None:
+    """Send the only character through these."""
+    for each in bpy.context.scene.objects:
+        each.select_set(each in points)
+    assert bpy.ops.dafnet.walk_through_points(seconds=0.5) == {"FINISHED"}
+
+
+def point(name: str, x: float, y: float) -> Any:
+    made = bpy.data.objects.new(name, None)
+    bpy.context.scene.collection.objects.link(made)
+    made.location = (x, y, 0.0)
+    bpy.context.view_layer.update()
+    return made
+
+
+def test_walks_of_an_overridden_character_are_kept_by_the_file(
+    blender: ModuleType, tmp_path: Path
+) -> None:
+    Stage(furnished=False)
+    overridden("Ann", tmp_path / "library.blend")
+    first, second, third = point("A", 0.0, 2.0), point("B", 2.0, 2.0), point("C", 2.0, 4.0)
+    through(first, second)
+    through(third)
+    through(second, first)
+    own = the_armature().dafnet
+    asked = [(asked_in(row), row.first, row.last, row.digest) for row in own.walks]
+    assert [each[0].points for each in asked] == [("A", "B"), ("C",), ("A", "B")]
+
+    own = opened_again(tmp_path / "shot.blend").dafnet
+    assert [(asked_in(row), row.first, row.last, row.digest) for row in own.walks] == asked
+    assert bpy.context.scene.frame_end == own.walks[-1].last
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+
+
+def test_walks_of_the_library_stay_when_they_cannot_be_replaced(
+    blender: ModuleType, tmp_path: Path
+) -> None:
+    stage, first = Stage(furnished=False), point("A", 0.0, 2.0)
+    stage.ann.users_collection[0].objects.link(first)
+    through(first)
+    ann = overridden("Ann", tmp_path / "library.blend")
+    root, own = ann.dafnet.root, ann.dafnet
+    root.animation_data.action = root.animation_data.action.copy()
+    through(point("B", 2.0, 2.0))
+    through(point("C", 2.0, 4.0))
+    walks = [(asked_in(row), row.first, row.last) for row in own.walks]
+    keys = [[tuple(p.co) for p in curve.keyframe_points] for curve in action_curves(root)]
+    own.active_walk = 0
+    with pytest.raises(RuntimeError, match=r"has from its library .* make the character local"):
+        bpy.ops.dafnet.redo_walk(replace_edited=True)
+    assert [(asked_in(row), row.first, row.last) for row in own.walks] == walks
+    assert keys == [[tuple(p.co) for p in c.keyframe_points] for c in action_curves(root)]
+    assert len(walks) == 3
+
+    own.active_walk = 1
+    assert bpy.ops.dafnet.redo_walk() == {"FINISHED"}
+    assert [(asked_in(row), row.first, row.last) for row in own.walks] == walks
+
+
+def test_tasks_of_an_overridden_character_are_kept_by_the_file(
+    blender: ModuleType, tmp_path: Path
+) -> None:
+    stage = Stage(furnished=False)
+    assert bpy.ops.dafnet.add_task(verb="STAND_UP") == {"FINISHED"}
+    stage.own.tasks[0].seconds = 1.0
+    own = overridden("Ann", tmp_path / "library.blend").dafnet
+    for seconds in (2.0, 3.0, 4.0):
+        assert bpy.ops.dafnet.add_task(verb="WAIT") == {"FINISHED"}
+        own.tasks[own.active_task].seconds = seconds
+    own.tasks[0].verb = "WALK_TO"
+
+    own = opened_again(tmp_path / "shot.blend").dafnet
+    rows = [(row.verb, row.seconds) for row in own.tasks]
+    assert rows == [("WALK_TO", 1.0), ("WAIT", 2.0), ("WAIT", 3.0), ("WAIT", 4.0)]

@@ -130,6 +130,30 @@ def test_a_tucked_chair_comes_out_by_keys_before_anybody_is_near(stage) -> None:
         assert np.hypot(root[frame][0], root[frame][1] - at[frame]) > 0.9
 
 
+@pytest.mark.parametrize("by_keys", [False, True])
+def test_what_fails_once_a_chair_is_pulled_out_changes_nothing(
+    stage, monkeypatch: pytest.MonkeyPatch, by_keys: bool
+) -> None:
+    chair = _chair(stage, "Chair", 3.0)
+    stage.box("Table", (-0.7, 2.2, 0.70), (0.7, 2.95, 0.74))
+    stage.select(chair)
+
+    def fails(*_given: object) -> bool:
+        raise ZeroDivisionError
+
+    def state() -> tuple[object, ...]:
+        own = stage.own
+        kept = set(bpy.data.collections), len(own.walks), tuple(own.stood), own.furniture
+        return stage.state(), kept, [o.animation_data for o in (chair, stage.root)]
+
+    stage.ann.location.z += 1e-3
+    before = state()
+    monkeypatch.setattr(walking, "extend_range", fails)
+    with pytest.raises(ZeroDivisionError):
+        walking.walk(bpy.context, stage.ann, chair, pull_out=True, by_keys=by_keys)
+    assert state() == before
+
+
 def test_people_lie_down_on_what_is_selected(stage) -> None:
     bed = stage.box("Bed", (-0.5, 2.0, 0.0), (0.5, 4.0, 0.45))
     stage.box("Headboard", (-0.5, 4.0, 0.0), (0.5, 4.06, 0.9), parent=bed)

@@ -10,7 +10,12 @@ import bpy
 import numpy as np
 import pytest
 from bl_ext.user_default import dafnet
-from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.path_sources import along_curve
+from bl_ext.user_default.dafnet.dafnet_addon.blender.character.walk_rows import asked_in
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import path_sources
+from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.path_sources import (
+    along_curve,
+    through_points,
+)
 from bl_ext.user_default.dafnet.dafnet_addon.blender.directing.surroundings import find_furniture
 from bl_ext.user_default.dafnet.panels import CLASSES, setup
 from bl_ext.user_default.dafnet.panels.setup import add_menu
@@ -209,6 +214,30 @@ def test_what_cannot_be_walked_changes_nothing(stage: Set, tmp_path: Path) -> No
     assert (
         not bpy.ops.dafnet.walk_along_curve.poll() and not bpy.ops.dafnet.walk_through_points.poll()
     ), "no character"
+
+
+def test_what_fails_once_a_walk_is_keyed_changes_nothing(
+    stage: Set, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = stage.empty("A", (0.0, 2.0, 0.0)), stage.empty("B", (2.0, 2.0, 0.0))
+    stage.select(stage.ann, first)
+    assert bpy.ops.dafnet.walk_through_points() == {"FINISHED"}
+    stage.select(stage.ann, first, second)
+    stage.ann.location.x = 1.0
+
+    def state() -> tuple[Any, ...]:
+        own = stage.own
+        rows = [(asked_in(row), row.first, row.last, row.digest) for row in own.walks]
+        return stage.state(), rows, own.active_walk, tuple(own.stood), stage.scene.frame_end
+
+    def fails(*_given: Any) -> bool:
+        raise ZeroDivisionError
+
+    before = state()
+    monkeypatch.setattr(path_sources, "extend_range", fails)
+    with pytest.raises(ZeroDivisionError):
+        through_points(bpy.context, stage.ann, [second, first])
+    assert state() == before
 
 
 def test_a_generated_walk_keeps_to_the_curve(stage: Set) -> None:

@@ -17,7 +17,7 @@ from ...core.errors import InputError
 from ...core.take import LEANS
 from ...director.task_lists import tasks_from
 from ...director.tasks import VERBS, Task, options
-from ..overridable import LOCALLY
+from ..overridable import LOCALLY, add_named
 
 __all__ = ["LEAN", "TaskRow", "add_row", "fields_of", "tasks_of", "title_of"]
 
@@ -164,7 +164,7 @@ class TaskRow(bpy.types.PropertyGroup):
 def add_row(character: bpy.types.Object, verb: str) -> None:
     """Add a task after the chosen one, as long as such a task takes by default; it is chosen."""
     own = character.dafnet
-    row = own.tasks.add()
+    row = add_named(own.tasks)
     row.verb = verb
     defaults = {option.name: option.default for option in options(VERBS[verb.lower()])}
     row.seconds = float(defaults.get("seconds", row.seconds))

@@ -7,8 +7,10 @@ from typing import Any
 
 import bpy
 
+from ...core.errors import InputError
 from ..character.standing import note_standing
 from ..character.walk_rows import Asked, WalkRow, asked_in, manner_of, set_manner
+from ..overridable import add_named
 from ..scene.lookup import object_named
 from .root_keys import MOVES, keys_within
 
@@ -46,16 +48,16 @@ def note_walk(
             row.digest = _digest(own.root, row.first, first) if was else _EDITED
     forget_walks(character, first)
 
-    row = _add_row(scene, character, asked)
+    row = add_named(own.walks)
+    _fill(row, scene, asked)
     row.first, row.last = first, last
     row.digest = _digest(own.root, first, last)
     own.active_walk = len(own.walks) - 1
     note_standing(character)
 
 
-def _add_row(scene: bpy.types.Scene, character: bpy.types.Object, asked: Asked) -> WalkRow:
-    own: Any = character.dafnet
-    row = own.walks.add()
+def _fill(row: WalkRow, scene: bpy.types.Scene, asked: Asked) -> None:
+    """Let a row say what was asked for."""
     row.kind = asked.kind
     row.goal = object_named(scene, asked.goal)
     for name in asked.points:
@@ -65,32 +67,55 @@ def _add_row(scene: bpy.types.Scene, character: bpy.types.Object, asked: Asked) 
     set_manner(row, asked.manner)
     for name in ("tables", "pull_out", "by_keys", "keep_facing", "backwards"):
         setattr(row, name, getattr(asked, name))
-    return row
 
 
 @contextmanager
 def walks_kept_on_failure(scene: bpy.types.Scene, character: bpy.types.Object) -> Iterator[None]:
     """A block that keys walks: if it fails, the rows are as they were, and so is what is asked of
-    the next one.
+    the next one, and where the character is known to have stood.
     """
     own: Any = character.dafnet
     rows = [(asked_in(row), row.first, row.last, row.digest) for row in own.walks]
     chosen, manner = own.active_walk, manner_of(own)
+    stood = tuple(own.stood) if own.is_property_set("stood") else None
     try:
         yield
     except BaseException:
-        own.walks.clear()
-        for asked, first, last, digest in rows:
-            row = _add_row(scene, character, asked)
+        for k in reversed(range(_of_library(character), len(own.walks))):
+            own.walks.remove(k)
+        for k, (asked, first, last, digest) in enumerate(rows):
+            if k == len(own.walks):
+                _fill(add_named(own.walks), scene, asked)
+            row = own.walks[k]
             row.first, row.last, row.digest = first, last, digest
         own.active_walk = chosen
         set_manner(own, manner)
+        if stood is None:
+            own.property_unset("stood")
+        else:
+            own.stood = stood
         raise
 
 
+def _of_library(character: bpy.types.Object) -> int:
+    """How many of the rows, the first ones, come from the library of an overridden character: they
+    may be changed, but not removed.
+    """
+    override = character.override_library
+    return len(override.reference.dafnet.walks) if override and override.reference else 0
+
+
 def forget_walks(character: bpy.types.Object, first: int) -> None:
-    """Drop the rows of walks that begin at frame ``first`` or later."""
+    """Drop the rows of walks that begin at frame ``first`` or later.
+
+    ``InputError``: one of them is of the library that the character is overridden from.
+    """
     own: Any = character.dafnet
+    if any(row.first >= first for row in list(own.walks)[: _of_library(character)]):
+        raise InputError(
+            f"A walk that '{character.name}' has from its library begins at frame {first} or "
+            "later, and an override cannot replace it; make the character local."
+        )
     for k in reversed(range(len(own.walks))):
         if own.walks[k].first >= first:
             own.walks.remove(k)

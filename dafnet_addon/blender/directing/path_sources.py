@@ -23,7 +23,7 @@ from ..scene.dependencies import Dependencies
 from ..scene.lookup import find_object
 from ..scene.playback import play_steps
 from .curve_lines import line_of
-from .made_walks import intact_walks, note_walk
+from .made_walks import intact_walks, note_walk, walks_kept_on_failure
 from .root_keys import (
     first_key,
     key_route,
@@ -126,15 +126,14 @@ def _key_walk(
     )
     root, first = keyable_root(settings), start.first
     armature = find_object(settings, settings.armature, "character")
-    intact = intact_walks(armature)
-    with unchanged_on_failure(root):
+    intact, last = intact_walks(armature), first + len(walked.path) - 1
+    with walks_kept_on_failure(context.scene, armature), unchanged_on_failure(root):
         kept = remove_keys_from(root, first)
         key_route(context, root, walked, first=first, scale=1.0 / start.unit, fps=start.fps)
         restore_between(root, kept)
+        note_walk(context.scene, armature, asked, first=first, last=last, intact=intact)
+        extended = extend_range(context.scene, armature, last)
 
-    last = first + len(walked.path) - 1
-    note_walk(context.scene, armature, asked, first=first, last=last, intact=intact)
-    extended = extend_range(context.scene, armature, last)
     told = (*passage_warnings(met, first), *warnings, *([doubt] if doubt else []))
     return Walk(first, last, extended, told)
 

@@ -1,6 +1,7 @@
 """A character's walk around the furniture to a seat or to a place to stand, as keys on its root."""
 
 from collections.abc import Generator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 import bpy
@@ -26,7 +27,7 @@ from ..character.walk_rows import PLACE, SEAT, Asked, Manner
 from ..scene.furniture import furniture_at
 from ..scene.lookup import find_collection, find_object, find_scene, object_named
 from ..scene.marked_seats import mark, marked_on, require_markable
-from .made_walks import intact_walks, note_walk
+from .made_walks import intact_walks, note_walk, walks_kept_on_failure
 from .root_keys import (
     key_route,
     keyable_root,
@@ -287,32 +288,34 @@ def _walk(
     character = find_object(settings, settings.armature, "character")
     own = find_collection(settings.furniture) if settings.furniture is not None else None
     route, warnings = found.route, found.warnings
-    intact = intact_walks(character)
-    with unchanged_on_failure(root):
+    intact, last = intact_walks(character), start.first + len(route.path) - 1
+    piece = scene.objects[names[0]] if names else None
+    top = top_of(piece) if piece is not None and found.pulled is not None else None
+    with ExitStack() as undo:
+        undo.enter_context(walks_kept_on_failure(scene, character))
+        for each in filter(None, (root, top)):
+            undo.enter_context(unchanged_on_failure(each))
         kept = remove_keys_from(root, start.first) if begins is not None else {}
         key_route(context, root, route, first=start.first, scale=1.0 / start.unit, fps=start.fps)
         restore_between(root, kept)
+        note_walk(scene, character, asked, first=start.first, last=last, intact=intact)
 
-    if mark_seat and found.seat is not None:
-        # Before the move, after which Blender does not know yet where parts of the piece are.
-        carrier = scene.objects[names[0]]
-        offset = Vector((0.0, 0.0, 0.0))
-        if found.pulled is not None:
-            offset.xy = (found.pulled / start.unit).tolist()
-        sat_on = mark_of(found.seat, start.floor).resized(start.size)
-        frame = Matrix.Translation(offset) @ carrier.matrix_world
-        mark(carrier, sat_on, metres_per_unit(scene), frame)
-    if found.pulled is not None:
-        top = top_of(next(each for each in scene.objects if each.name == names[0]))
-        move(top, found.pulled / start.unit, _free_to_move(start, found) if asked.by_keys else None)
-        out = 100.0 * start.size * float(np.linalg.norm(found.pulled))
-        warnings = (f"Pulled '{top.name}' out by {out:.0f} cm.", *warnings)
-    if made is not None:
-        scene.collection.children.link(own)
-    character.dafnet.furniture = own
-    last = start.first + len(route.path) - 1
-    note_walk(scene, character, asked, first=start.first, last=last, intact=intact)
-    extended = extend_range(scene, character, last)
+        # Once a piece is moved, Blender does not know yet where its parts are.
+        frame = piece.matrix_world.copy() if piece is not None else Matrix()
+        if top is not None and found.pulled is not None:
+            offset = found.pulled / start.unit
+            move(top, offset, _free_to_move(start, found) if asked.by_keys else None)
+            frame = Matrix.Translation(Vector((*offset.tolist(), 0.0))) @ frame
+            out = 100.0 * start.size * float(np.linalg.norm(found.pulled))
+            warnings = (f"Pulled '{top.name}' out by {out:.0f} cm.", *warnings)
+        if made is not None:
+            scene.collection.children.link(own)
+        if mark_seat and piece is not None and found.seat is not None:
+            sat_on = mark_of(found.seat, start.floor).resized(start.size)
+            mark(piece, sat_on, metres_per_unit(scene), frame)
+        character.dafnet.furniture = own
+        extended = extend_range(scene, character, last)
+
     warnings = (*passage_warnings(found.met, start.first), *warnings)
     return Walk(start.first, last, extended, warnings)
 
