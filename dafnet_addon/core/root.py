@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .rotations import normalised, rotate, transpose, yaw_matrix
+from .series import MODEL_FPS
 from .skeleton import PELVIS, joint
 
 __all__ = [
@@ -34,7 +35,8 @@ POSITION_SIGMA = 3.0
 YAW_SIGMA = 6.0
 """The same of the one over its yaw."""
 
-_MAX_TURN = np.radians(15.0)  # in a frame
+_MAX_TURN = float(np.radians(15.0))
+"""Radians in one of these frames up to which a heading may turn."""
 AHEAD = (5, 10, 15, 20, 25, 30, 45, 60)
 """How far ahead the model is told of the root, in 30-fps frames: as far as it takes to see where
 one will have sat down. Weights that were trained on fewer are told of the first of them."""
@@ -101,9 +103,9 @@ def smoothed(
     return RootPath(gaussian(path.position, position_sigma), gaussian(path.yaw, yaw_sigma))
 
 
-def _held_yaw(forward: np.ndarray, certainty: np.ndarray) -> np.ndarray:
-    """Yaw of horizontal vectors; held where ``certainty`` is under 0.35, and limited to 15 degrees
-    a frame.
+def _held_yaw(forward: np.ndarray, certainty: np.ndarray, max_turn: float) -> np.ndarray:
+    """Yaw of horizontal vectors; held where ``certainty`` is under 0.35, and limited to
+    ``max_turn`` radians a frame.
     """
     yaw = yaw_of(forward)
     good = certainty > 0.35
@@ -112,17 +114,19 @@ def _held_yaw(forward: np.ndarray, certainty: np.ndarray) -> np.ndarray:
 
     last = np.maximum.accumulate(np.where(good, np.arange(len(yaw)), -1))
     yaw = np.unwrap(yaw[np.where(last < 0, np.argmax(good), last)])
-    turn = np.abs(np.diff(yaw)) > _MAX_TURN
+    turn = np.abs(np.diff(yaw)) > max_turn
     if turn.any():
         for t in range(1, len(yaw)):
-            yaw[t] = yaw[t - 1] + np.clip(yaw[t] - yaw[t - 1], -_MAX_TURN, _MAX_TURN)
+            yaw[t] = yaw[t - 1] + np.clip(yaw[t] - yaw[t - 1], -max_turn, max_turn)
 
     return yaw
 
 
-def raw_root_from_joints(joints: np.ndarray, floor: float = 0.0) -> RootPath:
-    """Root path of world joints (T, 22, 3), not smoothed: pelvis on the ground, heading from
-    shoulders and hips.
+def raw_root_from_joints(
+    joints: np.ndarray, floor: float = 0.0, fps: float = MODEL_FPS
+) -> RootPath:
+    """Root path of world joints (T, 22, 3), ``fps`` frames a second, not smoothed: pelvis on the
+    ground, heading from shoulders and hips.
 
     Paper, section 4.1; the heading is held where shoulders and hips give none, as in lying.
     """
@@ -137,14 +141,16 @@ def raw_root_from_joints(joints: np.ndarray, floor: float = 0.0) -> RootPath:
     forward = np.cross(across, [0.0, 0.0, 1.0])
     position = joints[:, PELVIS].copy()
     position[:, 2] = floor
-    return RootPath(
-        position.astype(float), _held_yaw(forward, np.linalg.norm(forward[:, :2], axis=-1))
-    )
+    certainty = np.linalg.norm(forward[:, :2], axis=-1)
+    yaw = _held_yaw(forward, certainty, _MAX_TURN * MODEL_FPS / fps)
+    return RootPath(position.astype(float), yaw)
 
 
-def root_from_joints(joints: np.ndarray, floor: float = 0.0) -> RootPath:
-    """R^τ of world joints (T, 22, 3): their raw root path, smoothed."""
-    return smoothed(raw_root_from_joints(joints, floor))
+def root_from_joints(joints: np.ndarray, floor: float = 0.0, fps: float = MODEL_FPS) -> RootPath:
+    """R^τ of world joints (T, 22, 3), ``fps`` frames a second: their raw root path, smoothed."""
+    rate = fps / MODEL_FPS
+    path = raw_root_from_joints(joints, floor, fps)
+    return smoothed(path, POSITION_SIGMA * rate, YAW_SIGMA * rate)
 
 
 def root_from_matrices(matrices: np.ndarray) -> tuple[RootPath, float]:

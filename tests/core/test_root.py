@@ -55,6 +55,27 @@ def test_velocity_is_right_forward_and_counter_clockwise_turn():
     )
 
 
+@pytest.mark.parametrize("fps", [24.0, 60.0, 120.0])
+def test_the_root_of_a_body_is_the_same_at_any_rate(fps: float) -> None:
+    """It sways and turns fast, which is smoothed and limited by time, not by frames."""
+
+    def root_at(rate: float) -> RootPath:
+        t = np.arange(0.0, 4.0, 1.0 / rate)
+        yaw = 0.3 * np.sin(9.0 * t) + np.clip(12.0 * (t - 1.5), 0.0, np.pi)
+        sway = np.stack([0.05 * np.sin(12.0 * t), 0.8 * t, 0.0 * t], axis=1)
+        body = to_world(RootPath(sway, yaw), np.repeat(np.array(REST)[None], len(t), axis=0))
+        return root_from_joints(body, fps=rate)
+
+    wanted, found = root_at(30.0), root_at(fps)
+    times = np.arange(len(found)) / fps
+    shown = times <= 3.9
+    for axis in range(2):
+        there = np.interp(times, np.arange(len(wanted)) / 30.0, wanted.position[:, axis])
+        assert np.abs(found.position[:, axis] - there)[shown].max() < 2e-3
+    yaw = np.interp(times, np.arange(len(wanted)) / 30.0, wanted.yaw)
+    assert np.abs(found.yaw - yaw)[shown].max() < 0.04
+
+
 def test_world_and_root_are_inverse_for_any_number_of_points():
     path = winding_path(20)
     for shape in ((20, 3), (20, 22, 3), (20, 2, 5, 3)):

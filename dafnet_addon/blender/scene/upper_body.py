@@ -202,7 +202,7 @@ def _joints_of_source(
         frames[:, :3, :3] = frames[:, :3, :3] @ FACING
         path, _ = root_from_matrices(frames)
     else:
-        path = root_from_joints(joints, floor=float(unit * bodies[0, 2, 3]))
+        path = root_from_joints(joints, floor=float(unit * bodies[0, 2, 3]), fps=fps)
 
     offsets = joints[:, 1:] - joints[:, list(PARENTS[1:])]
     part = PARTS[source.part]
