@@ -17,6 +17,7 @@ __all__ = [
     "playback_restorer",
     "action_curves",
     "animated_paths",
+    "playing_paths",
     "remove_curves",
     "shares_curves",
     "node_inputs",
@@ -116,14 +117,17 @@ def action_curves(owner: bpy.types.Object) -> list[bpy.types.FCurve]:
     data = owner.animation_data
     if data is None or data.action is None:
         return []
+    return _curves_of(data.action, data.action_slot if _SLOTS else None)
+
+
+def _curves_of(action: bpy.types.Action, slot: Any) -> list[bpy.types.FCurve]:
+    """The curves of an action's slot; where there are no slots, all."""
     if not _SLOTS:
-        return list(data.action.fcurves)
-    if data.action_slot is None:
+        return list(action.fcurves)
+    if slot is None:
         return []
 
-    bags = (
-        strip.channelbag(data.action_slot) for layer in data.action.layers for strip in layer.strips
-    )
+    bags = (strip.channelbag(slot) for layer in action.layers for strip in layer.strips)
     return [curve for bag in bags if bag for curve in bag.fcurves]
 
 
@@ -154,6 +158,26 @@ def animated_paths(owner: bpy.types.ID) -> set[str]:
     } - {None}
     paths = {curve.data_path for action in actions for curve in all_curves(action)}
     return paths | {driver.data_path for driver in data.drivers}
+
+
+def playing_paths(owner: bpy.types.ID) -> set[str]:
+    """The data paths of ``owner`` that its own keys, its NLA strips or its drivers move now: muted
+    strips and drivers do not.
+    """
+    data = owner.animation_data
+    if data is None:
+        return set()
+
+    curves = [*action_curves(owner), *(driver for driver in data.drivers if not driver.mute)]
+    strips = [strip for track in data.nla_tracks if not track.mute for strip in track.strips]
+    while strips:
+        strip = strips.pop()
+        if strip.mute:
+            continue
+        strips += strip.strips  # those that it holds together
+        if strip.action:
+            curves += _curves_of(strip.action, strip.action_slot if _SLOTS else None)
+    return {curve.data_path for curve in curves}
 
 
 def all_curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:

@@ -3,6 +3,7 @@ tucked chairs, tables, the user's own characters.
 """
 
 from types import ModuleType
+from typing import Any
 
 import bpy
 import numpy as np
@@ -11,6 +12,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.character.armature import c
 from bl_ext.user_default.dafnet.dafnet_addon.blender.character.settings import settings_of
 from bl_ext.user_default.dafnet.dafnet_addon.blender.directing import walking
 from bl_ext.user_default.dafnet.dafnet_addon.blender.scene.furniture import furniture_now
+from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 
 from kit.humanoids import mixamo
 from kit.stage import Stage
@@ -108,7 +110,7 @@ def test_a_tucked_chair_is_pulled_out_on_request_and_undone_in_one_step(stage) -
     place = stage.place(stage.scene.frame_end)
     assert abs(place[1] - 3.0 - out) < 0.06
     chair.lock_location[0] = True
-    with pytest.raises(RuntimeError, match="'Chair' is linked, locked, keyed or constrained"):
+    with pytest.raises(RuntimeError, match="'Chair' is linked, locked or constrained, or"):
         bpy.ops.dafnet.walk_to(goal="SEAT", pull_out="MOVED")
 
 
@@ -128,6 +130,39 @@ def test_a_tucked_chair_comes_out_by_keys_before_anybody_is_near(stage) -> None:
     assert 10 < len(moving) < 40 and moving[-1] < sits - 30
     for frame in moving:
         assert np.hypot(root[frame][0], root[frame][1] - at[frame]) > 0.9
+
+
+def _driven(chair: Any) -> None:
+    chair.driver_add("location", 1).driver.expression = "3.0"
+
+
+def _in_strips(chair: Any) -> None:
+    chair.keyframe_insert("location", frame=1)
+    data = chair.animation_data
+    data.nla_tracks.new().strips.new("Stands", 1, data.action)
+    data.action = None
+
+
+@pytest.mark.parametrize("moves", [_driven, _in_strips])
+@pytest.mark.parametrize("by_keys", [False, True])
+def test_a_chair_that_something_moves_is_not_pulled_out(stage, moves: Any, by_keys: bool) -> None:
+    """Unless that is muted."""
+    chair = _chair(stage, "Chair", 3.0)
+    stage.box("Table", (-0.7, 2.2, 0.70), (0.7, 2.95, 0.74))
+    moves(chair)
+    bpy.context.view_layer.update()
+    before = stage.state()
+    with pytest.raises(InputError, match=r"'Chair' is linked, .* NLA strips or drivers"):
+        walking.walk(bpy.context, stage.ann, chair, pull_out=True, by_keys=by_keys)
+    assert stage.state() == before
+
+    data = chair.animation_data
+    for each in (*data.drivers, *data.nla_tracks):
+        each.mute = True
+    walking.walk(bpy.context, stage.ann, chair, pull_out=True, by_keys=by_keys)
+    last = stage.scene.frame_end
+    stage.scene.frame_set(last)
+    assert 0.2 < chair.matrix_world.translation.y - 3.0 < 0.5
 
 
 @pytest.mark.parametrize("by_keys", [False, True])

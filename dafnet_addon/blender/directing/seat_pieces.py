@@ -10,7 +10,7 @@ from mathutils import Matrix, Vector
 
 from ...core.errors import InputError
 from ..character.armature import bodies, is_character, metres_per_unit
-from ..compat import action_curves, remove_curves
+from ..compat import action_curves, playing_paths, remove_curves
 
 __all__ = ["add_furniture", "collection_of", "movable", "move", "moved_back", "piece_of", "top_of"]
 
@@ -97,16 +97,15 @@ def add_furniture(
 
 def movable(top: bpy.types.Object) -> None:
     """Raises InputError where a piece of furniture cannot be moved."""
-    animated = any(curve.data_path == "location" for curve in action_curves(top))
     if (
         top.library
-        or animated
+        or "location" in playing_paths(top)
         or any(top.lock_location)
         or any(not c.mute for c in top.constraints)
     ):
         raise InputError(
-            f"'{top.name}' is linked, locked, keyed or constrained, so it cannot be pulled out; "
-            "move it yourself, or choose another seat."
+            f"'{top.name}' is linked, locked or constrained, or moved by keys, NLA strips or "
+            "drivers, so it cannot be pulled out; move it yourself, or choose another seat."
         )
 
 
