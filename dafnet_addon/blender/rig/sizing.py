@@ -10,6 +10,7 @@ from ...core.errors import InputError
 from ...core.skeleton import ANKLES, JOINTS, KNEES, PARENTS, STATURE
 from ...core.units import PERSON, likely_unit, require_human_height
 from ..character.armature import character_scale, metres_per_unit
+from ..compat import playing_paths
 from .maps import RigMap, require_usable, with_bone_names_of
 from .reading import rest_matrices, rigid_parts
 
@@ -55,11 +56,10 @@ def size_as_rig(
     wanted = leg_ratio(rig, rig_map)
     require_rig_of_a_person(context.scene, rig, rig_map)
     factor = wanted / character_scale(character)
-    data = character.animation_data
-    curves = list(data.drivers) if data else []
-    if any(character.lock_scale) or any(curve.data_path == "scale" for curve in curves):
+    if any(character.lock_scale) or "scale" in playing_paths(character):
         raise InputError(
-            f"The scale of '{character.name}' is locked or driven; unlock it, and try again."
+            f"The scale of '{character.name}' is locked, keyed or driven; unlock it, or remove its "
+            "keys, NLA strips and drivers, and try again."
         )
 
     character.scale = [each * factor for each in character.scale]

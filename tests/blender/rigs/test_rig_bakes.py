@@ -306,7 +306,9 @@ def test_a_bake_that_is_off_is_warned_about(stage: RigStage) -> None:
 
 
 def test_the_character_is_made_as_large_as_the_rig(stage: RigStage) -> None:
-    """Whatever their objects' scales; then nothing is scaled any more. A locked scale is left."""
+    """Whatever their objects' scales; then nothing is scaled any more. A scale that is locked or
+    keyed is left.
+    """
     rig = stage.build("mixamo", legs=0.8)
     rig.scale = rig.scale * 1.1
     bpy.context.view_layer.update()
@@ -321,9 +323,17 @@ def test_the_character_is_made_as_large_as_the_rig(stage: RigStage) -> None:
     before = tuple(stage.ann.scale)
     rig.scale = rig.scale * 1.2
     bpy.context.view_layer.update()
-    with pytest.raises(RuntimeError, match="locked or driven"):
+    with pytest.raises(RuntimeError, match="locked, keyed or driven"):
         bpy.ops.dafnet.size_as_rig()
     assert tuple(stage.ann.scale) == before
+
+    stage.ann.lock_scale = (False, False, False)
+    stage.ann.keyframe_insert("scale", frame=1)
+    with pytest.raises(RuntimeError, match="locked, keyed or driven"):
+        bpy.ops.dafnet.size_as_rig()
+    assert tuple(stage.ann.scale) == before
+    stage.play("walk")
+    assert bpy.ops.dafnet.size_as_rig() == {"FINISHED"}, "a take leaves the scale alone"
 
 
 def _with_eyes(rig: Any, names: tuple[str, str]) -> None:
