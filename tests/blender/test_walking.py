@@ -273,6 +273,18 @@ def pushed(room: Room) -> None:
     bpy.context.view_layer.update()
 
 
+def disabled(room: Room) -> None:
+    room.root.hide_viewport = True
+
+
+def in_an_excluded_collection(room: Room) -> None:
+    kept = room.collection("Kept", room.scene.collection)
+    for each in room.root.users_collection:
+        each.objects.unlink(room.root)
+    kept.objects.link(room.root)
+    bpy.context.view_layer.layer_collection.children["Kept"].exclude = True
+
+
 def animation(owner) -> tuple:
     """All that is keyed of an object, and where it is."""
     data = owner.animation_data
@@ -327,6 +339,8 @@ def all_curves(action) -> list:
         (with_delta_scale, "delta"),
         (with_keyed_delta, "delta"),
         (driven, "drivers"),
+        (disabled, "'Ann Root' or its collection is disabled in viewports"),
+        (in_an_excluded_collection, "'Ann Root' or its collection is disabled in viewports"),
         (pushed, "Something other than its keys moves the root 'Ball'"),
     ],
 )
@@ -364,6 +378,10 @@ def test_a_root_that_cannot_be_keyed_is_said_and_left_alone(
     )
 
 
+def hidden(room: Room) -> None:
+    room.root.hide_set(True)
+
+
 def with_locked_transforms(room: Room) -> None:
     room.root.lock_location = room.root.lock_rotation = (True, True, True)
 
@@ -398,6 +416,7 @@ def with_muted_extras(room: Room) -> None:
 @pytest.mark.parametrize(
     "way",
     [
+        hidden,
         with_locked_transforms,
         with_an_old_parent_inverse,
         where_only_needed_keys_are_wanted,

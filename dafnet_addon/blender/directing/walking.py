@@ -25,7 +25,7 @@ from ..character.settings import Settings, settings_of
 from ..character.standing import standing
 from ..character.walk_rows import PLACE, SEAT, Asked, Manner
 from ..scene.furniture import furniture_at
-from ..scene.lookup import find_collection, find_object, find_scene, object_named
+from ..scene.lookup import find_collection, find_object, find_scene, object_named, require_enabled
 from ..scene.marked_seats import mark, marked_on, require_markable
 from .made_walks import intact_walks, note_walk, walks_kept_on_failure
 from .root_keys import (
@@ -133,6 +133,7 @@ def start_of(
     def look() -> None:
         armature = find_object(settings, settings.armature, "character")
         root = keyable_root(settings)
+        require_enabled(context.evaluated_depsgraph_get(), [root])
         size = character_scale(armature, metres_per_unit(scene))
         seen.append((size, np.array([*root.location, root.rotation_euler[2]], float)))
 

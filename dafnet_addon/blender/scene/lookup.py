@@ -15,6 +15,7 @@ __all__ = [
     "find_scene",
     "names_in_use",
     "object_named",
+    "require_enabled",
 ]
 
 
@@ -69,6 +70,19 @@ def find_collection(name: str) -> bpy.types.Collection:
             "panel."
         )
     return found
+
+
+def require_enabled(depsgraph: bpy.types.Depsgraph, needed: list[bpy.types.Object]) -> None:
+    """``InputError`` where one is disabled in viewports: Blender moves those hidden with H, not
+    these.
+    """
+    alive = {each.original for each in depsgraph.ids}
+    for each in needed:
+        if each not in alive:
+            raise InputError(
+                f"'{each.name}' or its collection is disabled in viewports; enable it, or hide it "
+                "with H."
+            )
 
 
 def names_in_use(settings: Settings) -> set[str]:

@@ -29,7 +29,7 @@ from ..pipeline.baker import has_bone_overrides, require_bakeable
 from ..rig.reading import pose_matrices
 from .dependencies import Dependencies, Simulation
 from .furniture import Furniture, array, furniture_of
-from .lookup import find_object, find_scene
+from .lookup import find_object, find_scene, require_enabled
 from .playback import play_steps
 from .upper_body import PARTS, Source, rigid_matrices, source_of, upper_body_of_take
 
@@ -134,7 +134,7 @@ def read_scene(context: bpy.types.Context, settings: Settings) -> Generator[floa
 
     def look(frame: int, depsgraph: bpy.types.Depsgraph, shaped: set[bpy.types.Object]) -> None:
         if frame == frames[0]:
-            _require_enabled(depsgraph, [armature, *led, *sources])
+            require_enabled(depsgraph, [armature, *led, *sources])
         if furniture and frame == frames[0]:
             furniture.begin(depsgraph)
         elif furniture:
@@ -366,19 +366,6 @@ def _may_push(
     simulation: Simulation, dependencies: Dependencies, armature: bpy.types.Object
 ) -> bool:
     return any(dependencies.follows(each, armature) for each in simulation.colliders)
-
-
-def _require_enabled(depsgraph: bpy.types.Depsgraph, needed: list[bpy.types.Object]) -> None:
-    """``InputError`` where one is disabled in viewports: Blender moves those hidden with H, not
-    these.
-    """
-    alive = {each.original for each in depsgraph.ids}
-    for each in needed:
-        if each not in alive:
-            raise InputError(
-                f"'{each.name}' or its collection is disabled in viewports; enable it, or hide it "
-                "with H."
-            )
 
 
 def _warnings(
