@@ -5,12 +5,17 @@ property by property, and forgets the others when the file is opened again.
 from itertools import count
 from typing import Any
 
-__all__ = ["LOCALLY", "ROWS_LOCALLY", "add_named"]
+import bpy
+from bpy.app.handlers import persistent
+
+__all__ = ["LOCALLY", "ROWS_LOCALLY", "add_named", "register", "unregister"]
 
 LOCALLY = {"LIBRARY_OVERRIDABLE"}
 """The value of a property."""
 ROWS_LOCALLY = {*LOCALLY, "USE_INSERTION"}
 """The rows that are added to a collection."""
+_GROUPS = ("dafnet", "dafnet_rig")
+"""The groups of settings that objects have."""
 
 
 def add_named(rows: Any) -> Any:
@@ -21,3 +26,25 @@ def add_named(rows: Any) -> Any:
     row = rows.add()
     row.name = name
     return row
+
+
+@persistent
+def _give_groups(*_given: Any) -> None:
+    """Let what is overridden have the groups that its overrides have, which it gets as they are
+    looked at: Blender 5.2 compares no settings with a group that was never made, and forgets them.
+    """
+    for each in bpy.data.objects:
+        override = each.override_library
+        if override and override.reference:
+            for name in _GROUPS:
+                getattr(override.reference, name)
+
+
+def register() -> None:
+    """Look after overrides whenever a file is saved."""
+    bpy.app.handlers.save_pre.append(_give_groups)
+
+
+def unregister() -> None:
+    """Undo ``register``."""
+    bpy.app.handlers.save_pre.remove(_give_groups)

@@ -101,7 +101,8 @@ def test_the_map_of_an_overridden_rig_is_kept_by_the_file(
     own.rows["left_wrist"].bone = "mixamorig:LeftForeArm"
     own.limbs, own.root_motion = "IK", "HIPS"
 
-    own = opened_again(tmp_path / "shot.blend").dafnet_rig
+    opened_again(tmp_path / "shot.blend")
+    own = opened_again(tmp_path / "later.blend").dafnet_rig
     assert [row.name for row in own.rows] == list(JOINTS)
     bones = {row.name: row.bone for row in own.rows}
     assert bones["left_wrist"] == "mixamorig:LeftForeArm"

@@ -17,6 +17,7 @@ from bpy.props import (
 )
 
 from ...core.solids import SOFTEST
+from .. import overridable
 from ..overridable import LOCALLY, ROWS_LOCALLY
 from ..rig import properties as rig_properties
 from .settings import AS_IT_IS, COMES_AND_GOES, HELD, MAX_TAKES, STANDING
@@ -687,10 +688,12 @@ def register() -> None:
     )
     bpy.types.Action.dafnet = PointerProperty(type=TakeSettings, name="DAFNet")
     rig_properties.register()
+    overridable.register()
 
 
 def unregister() -> None:
     """Undo ``register``."""
+    overridable.unregister()
     rig_properties.unregister()
     del bpy.types.Action.dafnet
     del bpy.types.Object.dafnet
