@@ -15,6 +15,8 @@ from ..dafnet_addon.blender.character.task_rows import TaskRow, add_row, tasks_o
 from ..dafnet_addon.blender.directing.plan_keys import plan_edited
 from ..dafnet_addon.blender.directing.tasks import Assignment, Directed, direct
 from ..dafnet_addon.blender.overlay import display
+from ..dafnet_addon.blender.overridable import rows_of_library
+from ..dafnet_addon.core.errors import InputError
 from .base import DafnetOperator, asked_to_replace, idle
 from .long import LongOperator
 
@@ -31,6 +33,15 @@ class _ListOperator(DafnetOperator):
     def poll(cls, context: bpy.types.Context) -> bool:
         """A character is active."""
         return character_of(context) is not None
+
+
+def _require_own(character: bpy.types.Object, index: int) -> None:
+    """``InputError`` where a task is one of the library that the character is overridden from."""
+    if index < rows_of_library(character, "tasks"):
+        raise InputError(
+            f"This task is of the library that '{character.name}' comes from, and may only be "
+            "changed here; make the character local to remove or move it."
+        )
 
 
 class DAFNET_OT_add_task(_ListOperator, bpy.types.Operator):
@@ -58,6 +69,7 @@ class DAFNET_OT_remove_task(_ListOperator, bpy.types.Operator):
         """Remove it; the next one is chosen."""
         character: Any = character_of(context)
         own = character.dafnet
+        _require_own(character, own.active_task)
         own.tasks.remove(own.active_task)
         own.active_task = max(0, min(own.active_task, len(own.tasks) - 1))
 
@@ -80,6 +92,7 @@ class DAFNET_OT_move_task(_ListOperator, bpy.types.Operator):
         own = character.dafnet
         to = own.active_task + (-1 if self.direction == "UP" else 1)
         if 0 <= to < len(own.tasks):
+            _require_own(character, min(to, own.active_task))
             own.tasks.move(own.active_task, to)
             own.active_task = to
 

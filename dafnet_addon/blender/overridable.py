@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-__all__ = ["LOCALLY", "ROWS_LOCALLY", "add_named", "register", "unregister"]
+__all__ = ["LOCALLY", "ROWS_LOCALLY", "add_named", "register", "rows_of_library", "unregister"]
 
 LOCALLY = {"LIBRARY_OVERRIDABLE"}
 """The value of a property."""
@@ -26,6 +26,14 @@ def add_named(rows: Any) -> Any:
     row = rows.add()
     row.name = name
     return row
+
+
+def rows_of_library(owner: bpy.types.Object, kind: str) -> int:
+    """How many of an object's rows (``dafnet.walks``, ``takes``, ``tasks``), the first ones, come
+    from the library that it is overridden from: they may be changed, but not removed.
+    """
+    override = owner.override_library
+    return len(getattr(override.reference.dafnet, kind)) if override and override.reference else 0
 
 
 @persistent

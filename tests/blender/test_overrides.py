@@ -202,3 +202,15 @@ def test_tasks_of_an_overridden_character_are_kept_by_the_file(
     own = opened_again(tmp_path / "shot.blend").dafnet
     rows = [(row.verb, row.seconds) for row in own.tasks]
     assert rows == [("WALK_TO", 1.0), ("WAIT", 2.0), ("WAIT", 3.0), ("WAIT", 4.0)]
+
+    # Those of the library are neither removed nor changed places with; one's own are.
+    own.active_task = 0
+    for refused in (bpy.ops.dafnet.remove_task, lambda: bpy.ops.dafnet.move_task(direction="DOWN")):
+        with pytest.raises(RuntimeError, match=r"of the library that 'Ann' comes from"):
+            refused()
+    own.active_task = 1
+    with pytest.raises(RuntimeError, match="make the character local"):
+        bpy.ops.dafnet.move_task(direction="UP")
+    assert [(row.verb, row.seconds) for row in own.tasks] == rows
+    assert bpy.ops.dafnet.remove_task() == {"FINISHED"}
+    assert [row.seconds for row in own.tasks] == [1.0, 3.0, 4.0]

@@ -10,7 +10,7 @@ import bpy
 from ...core.errors import InputError
 from ..character.standing import note_standing
 from ..character.walk_rows import Asked, WalkRow, asked_in, manner_of, set_manner
-from ..overridable import add_named
+from ..overridable import add_named, rows_of_library
 from ..scene.lookup import object_named
 from .root_keys import MOVES, keys_within
 
@@ -81,7 +81,7 @@ def walks_kept_on_failure(scene: bpy.types.Scene, character: bpy.types.Object) -
     try:
         yield
     except BaseException:
-        for k in reversed(range(_of_library(character), len(own.walks))):
+        for k in reversed(range(rows_of_library(character, "walks"), len(own.walks))):
             own.walks.remove(k)
         for k, (asked, first, last, digest) in enumerate(rows):
             if k == len(own.walks):
@@ -97,21 +97,13 @@ def walks_kept_on_failure(scene: bpy.types.Scene, character: bpy.types.Object) -
         raise
 
 
-def _of_library(character: bpy.types.Object) -> int:
-    """How many of the rows, the first ones, come from the library of an overridden character: they
-    may be changed, but not removed.
-    """
-    override = character.override_library
-    return len(override.reference.dafnet.walks) if override and override.reference else 0
-
-
 def forget_walks(character: bpy.types.Object, first: int) -> None:
     """Drop the rows of walks that begin at frame ``first`` or later.
 
     ``InputError``: one of them is of the library that the character is overridden from.
     """
     own: Any = character.dafnet
-    if any(row.first >= first for row in list(own.walks)[: _of_library(character)]):
+    if any(row.first >= first for row in list(own.walks)[: rows_of_library(character, "walks")]):
         raise InputError(
             f"A walk that '{character.name}' has from its library begins at frame {first} or "
             "later, and an override cannot replace it; make the character local."
