@@ -77,11 +77,13 @@ def seen_while_sitting_down(
             Scene(tuple(in_frames_of(s, stretch) for s in scene.solids if id(s) in chosen))
             for chosen in ({id(s) for s in scene.solids} - drawn, seat & drawn)
         )
-        out = out.copy() if out is occupied else out
-        out[stretch] = occupancy(shown, meanwhile)
+        seen = occupancy(shown, meanwhile)
         if own.solids:
             kept = np.where(_ahead(meanwhile, there), 0.0, occupancy(own, meanwhile))
-            out[stretch] = np.maximum(out[stretch], kept)
+            seen = np.maximum(seen, kept)
+        # Who goes from seat to seat is still before one when he comes to the next.
+        out = out.copy() if out is occupied else out
+        out[stretch] = np.minimum(out[stretch], seen)
 
     return out
 

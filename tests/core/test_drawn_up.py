@@ -108,6 +108,23 @@ def test_what_moves_meanwhile_is_seen_where_it_is():
     assert (seen >= of_cart - 1e-6).all()
 
 
+def test_who_goes_from_seat_to_seat_sees_the_table_of_neither():
+    def place(x: float) -> tuple[Box, ...]:
+        table = _box((x - 0.6, 0.35, 0.70), (x + 0.6, 1.15, 0.74), "Table")
+        return _box((x - 0.22, -0.22, 0.0), (x + 0.22, 0.22, 0.45), "Chair"), table
+
+    across = np.concatenate([np.zeros(40), np.linspace(0.0, 1.6, 62)[1:-1], np.full(60, 1.6)])
+    path = RootPath(across[:, None] * np.eye(3)[0], np.zeros(len(across)))
+    scene = Scene((*place(0.0), *place(1.6)))
+    seats = seats_along(scene, path, 30.0)
+    assert len(seats) == 2
+    everything = occupancy(scene, path)
+    both = seen_while_sitting_down(scene, path, seats, everything)
+    apart = [seen_while_sitting_down(scene, path, [seat], everything) for seat in seats]
+    assert np.array_equal(both, np.minimum(*apart))
+    assert both[70].sum() < 0.9 * min(each[70].sum() for each in apart)
+
+
 def test_a_solid_in_some_of_its_frames():
     center = np.arange(30.0).reshape(10, 3)
     moving = Box(center, np.ones(3), name="Cart")
