@@ -9,6 +9,7 @@ from .errors import InputError
 from .meeting import require_same_root
 from .resampling import covering_frames
 from .root import RootPath, to_root, to_world
+from .series import MODEL_FPS
 from .take import Controls, Take
 
 __all__ = ["Kept", "kept_of"]
@@ -70,5 +71,12 @@ def kept_of(
     if until is None:
         return Kept(poses)
     stop = min(covering_frames(until + 1, controls.fps) - 1, longest)
+    if stop - first < 1:
+        enough = int(np.ceil(2.0 * controls.fps / MODEL_FPS)) - 1
+        raise InputError(
+            f"The part that is made anew, from frame {frame} to before {until}, lies between two "
+            f"frames of the model, which makes {MODEL_FPS:g} a second; give it {enough} frames at "
+            "least."
+        )
     require_same_root(old, new, stop)
     return Kept(poses, (first, stop))

@@ -8,6 +8,7 @@ import pytest
 
 from dafnet_addon import Box, Controls, InputError, Scene, Take, generate, load_weights
 from dafnet_addon.core.cleanup import CleanUp
+from dafnet_addon.core.kept_motion import kept_of
 from dafnet_addon.core.paths import Stop, route
 from dafnet_addon.core.storage import packed, unpacked
 
@@ -71,6 +72,17 @@ def test_a_middle_part_is_made_anew_and_meets_both_ends(take, controls, weights,
 def test_a_middle_part_that_is_none_is_refused(take, controls, weights, first, stop, words) -> None:
     with pytest.raises(InputError, match=words):
         generate(SEAT, controls, weights, resume=take, resume_frame=first, resume_until=stop)
+
+
+@pytest.mark.parametrize(("fps", "enough"), [(60, 3), (120, 7)])
+def test_a_middle_part_between_two_frames_of_the_model_is_refused(weights, fps, enough) -> None:
+    fast = Controls(fps=fps, root=np.tile(np.eye(4), (40, 1, 1)))
+    take = generate(Scene(), fast, weights)
+    with pytest.raises(InputError, match=f"between two frames of the model.*{enough} frames"):
+        generate(Scene(), fast, weights, resume=take, resume_frame=10, resume_until=11)
+    for frame in range(10, 14):
+        middle = kept_of(take, frame, frame + enough, fast, take.path).middle
+        assert middle is not None and middle[0] < middle[1]
 
 
 def test_a_root_that_does_not_come_back_is_refused(take, controls, weights) -> None:
