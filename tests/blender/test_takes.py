@@ -226,27 +226,32 @@ def test_from_here_on_keeps_what_comes_before(shot: Shot) -> None:
         bpy.ops.dafnet.generate(task="ONWARD")
 
 
-def test_from_here_on_counts_seconds_where_the_rate_has_changed(shot: Shot) -> None:
+@pytest.mark.parametrize("task", ["LEGS", "ONWARD", "BETWEEN"])
+def test_a_take_that_plays_at_another_rate_now_is_not_gone_by(shot: Shot, task: str) -> None:
     bpy.ops.dafnet.generate()
-    first = shot.listed()[0]
-    before = stored_take(first)[0]
-    shot.ann.dafnet.seed, shot.ann.dafnet.temperature = 3, 1.5
-    shot.scene.render.fps *= 2
-    at = shot.ann.dafnet.frame_end if not shot.ann.dafnet.use_scene_range else shot.scene.frame_end
-    shot.scene.frame_set(at - 10)
-    bpy.ops.dafnet.generate(task="ONWARD")
-    after = stored_take(shot.listed()[1])[0]
-    assert after.fps == 2 * before.fps
-    kept = (at - 10 - first.dafnet.frame_start) // 2
-    assert np.abs(after.poses[:70] - before.poses[:70]).max() < 1e-5
+    seen = shot.played()
+    scene = shot.scene
+    scene.render.fps *= 2
+    assert np.array_equal(shot.played(), seen), "keys stay at their frames, so it is twice as fast"
+    scene.use_preview_range = True
+    scene.frame_preview_start, scene.frame_preview_end = 30, 40
+    scene.frame_set(30)
+    before = shot.state()
+    with pytest.raises(RuntimeError, match=r"'Ann take' was made at 30 .* the scene has 60 now"):
+        bpy.ops.dafnet.generate(task=task)
+    assert shot.state() == before
+    scene.render.fps //= 2
+    assert bpy.ops.dafnet.generate(task=task) == {"FINISHED"}
 
-    def place(take: Any) -> np.ndarray:
-        return take.path.position[:kept, None] + take.poses[70 : 70 + kept].reshape(kept, 22, 3)
 
-    assert kept > 10 and np.abs(place(after)[..., 2] - place(before)[..., 2]).max() < 1e-4, (
-        "the same poses for as long"
-    )
-    assert np.abs(after.poses[-2:] - before.poses[-2:]).max() > 0.01
+def test_from_the_first_frame_on_nothing_is_kept_and_that_is_said(shot: Shot) -> None:
+    bpy.ops.dafnet.generate()
+    shot.scene.frame_set(11)
+    with pytest.raises(RuntimeError, match=r"begins at frame 11, so nothing.*press Generate"):
+        bpy.ops.dafnet.generate(task="ONWARD")
+    shot.scene.frame_set(10)
+    with pytest.raises(RuntimeError, match="Frame 10 is not inside the take"):
+        bpy.ops.dafnet.generate(task="ONWARD")
 
 
 def test_the_preview_range_is_made_anew_between_two_ends_that_stay(shot: Shot) -> None:
@@ -275,7 +280,7 @@ def test_the_preview_range_is_made_anew_between_two_ends_that_stay(shot: Shot) -
     assert np.abs(np.diff(now, 2, axis=0)).max() < 1.5 * fastest, "and nothing pops"
 
     scene.frame_preview_start = 11
-    with pytest.raises(RuntimeError, match="Frame 11 is not inside the take"):
+    with pytest.raises(RuntimeError, match="begins at frame 11, so nothing of it would be kept"):
         bpy.ops.dafnet.generate(task="BETWEEN")
     scene.frame_preview_start, scene.frame_preview_end = 51, 130
     with pytest.raises(RuntimeError, match="Frame 131 is not inside the take"):

@@ -138,6 +138,9 @@ def run(
     started = perf_counter()
     used = names_in_use(settings)
     kept = _kept_take(settings)
+    begins_as = None
+    if settings.begins_as is not None:
+        _, begins_as = _chosen_take(settings, find_action(settings.begins_as))
     note = unit_note(find_scene(settings), _character(settings))
 
     try:
@@ -151,9 +154,8 @@ def run(
 
     draws = draws_of(settings)
     controls = read.controls
-    if settings.begins_as is not None:
-        _, told = stored_take(find_action(settings.begins_as))
-        controls = replace(controls, before=told.before, before_root=told.before_root)
+    if begins_as is not None:
+        controls = replace(controls, before=begins_as.before, before_root=begins_as.before_root)
     takes = yield from within(
         takes_steps(
             read.scene,
@@ -232,26 +234,43 @@ def _kept_take(settings: Settings) -> _Kept | None:
     if settings.kept is None:
         return None
 
-    action = find_action(settings.kept)
-    take, _ = stored_take(action)
-    if action.dafnet.frame_start != settings.frame_start:
+    action, start = find_action(settings.kept), settings.frame_start
+    take, _ = _chosen_take(settings, action)
+    if action.dafnet.frame_start != start:
         raise InputError(
             f"The take '{action.name}' begins at another frame than the range; let the range "
             "start there."
         )
-
-    render = find_scene(settings).render
-    rate = render.fps_base / render.fps
+    if settings.kept_until == start:
+        raise InputError(
+            f"The take '{action.name}' begins at frame {start}, so nothing of it would be kept "
+            "before that; press Generate to make all of it anew, or go to a later frame."
+        )
     for frame in (settings.kept_until, settings.kept_from):
-        if frame is not None and not (
-            0.0 < (frame - settings.frame_start) * rate < len(take) / take.fps
-        ):
+        if frame is not None and not start < frame < start + len(take):
             raise InputError(
                 f"Frame {frame} is not inside the take '{action.name}'; go to a frame in it."
             )
 
-    again = None if settings.kept_from is None else settings.kept_from - settings.frame_start
-    return _Kept(take, settings.kept_until - settings.frame_start, again)
+    again = None if settings.kept_from is None else settings.kept_from - start
+    return _Kept(take, settings.kept_until - start, again)
+
+
+def _chosen_take(settings: Settings, action: bpy.types.Action) -> tuple[Take, Controls]:
+    """The take of an action that another one is to go by, and its controls. ``InputError`` where
+    the scene has another rate now: its keys stay at their frames, so that it plays at another
+    speed than it was made for.
+    """
+    take, controls = stored_take(action)
+    render = find_scene(settings).render
+    fps = render.fps / render.fps_base
+    if not np.isclose(take.fps, fps, rtol=1e-5):
+        raise InputError(
+            f"The take '{action.name}' was made at {take.fps:g} frames a second and the scene has "
+            f"{fps:g} now, so it plays at another speed; set the rate back, or press Generate for "
+            "a new one."
+        )
+    return take, controls
 
 
 def bake_steps(
