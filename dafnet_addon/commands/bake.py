@@ -197,15 +197,15 @@ def _run(options: argparse.Namespace, progress: Progress) -> Result:
         "takes": [
             {
                 "action": action.name,
-                "seed": draw.seed,
-                "temperature": draw.temperature,
+                "seed": take.draw.seed,
+                "temperature": take.draw.temperature,
                 "frames": len(take),
                 "log_likelihood": round(take.log_likelihood, 3),
                 "metrics": take.metrics,
                 "raw_metrics": take.raw_metrics,
                 "verdict": [asdict(finding) for finding in take.verdict],
             }
-            for action, draw, take in zip(result.actions, result.draws, result.takes, strict=True)
+            for action, take in zip(result.actions, result.takes, strict=True)
         ],
         "warnings": list(result.warnings),
         "seconds": {stage: round(spent, 4) for stage, spent in result.seconds.items()},

@@ -12,7 +12,6 @@ import numpy as np
 from .beginning import PREROLL
 from .cleanup import CleanUp
 from .conditions import Shot
-from .draws import Asked
 from .finishing import finished_steps
 from .kept_motion import Kept
 from .meeting import led_to, met, nearest
@@ -23,7 +22,7 @@ from .sampler import Run, Sampler, Samples
 from .series import MODEL_FPS
 from .skeleton import model_order
 from .solids import Scene
-from .take import Take
+from .take import Asked, Take
 from .verdict import STANDS
 from .wanted import Wanted, wanted_steps
 from .weights import Weights
@@ -167,7 +166,14 @@ def _finished(
         action = resample_positions(made.actions[PREROLL:, b], source, target)
         density = float(made.log_likelihood[PREROLL:, b].mean())
         job = finished_steps(
-            made.poses[:, b], made.unchanged[:, b], action, shot, controls, clean_up, density
+            made.poses[:, b],
+            made.unchanged[:, b],
+            action,
+            shot,
+            controls,
+            clean_up,
+            density,
+            asked.draws[b],
         )
         take = yield from within(job, b / count, (b + 1) / count)
         takes.append(replace(take, seconds=seconds | take.seconds))

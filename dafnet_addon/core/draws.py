@@ -4,9 +4,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from .checks import MAX_SEED, number, whole
-from .take import Controls
 
-__all__ = ["Asked", "Draw"]
+__all__ = ["Draw"]
 
 _HOTTEST = 10.0
 _STRIDE = 7919  # from the seed of one try to the next one's
@@ -49,16 +48,3 @@ class Draw:
 
         lower = None if self.lower_seed is None else from_there(self.lower_seed)
         return replace(self, seed=from_there(self.seed), lower_seed=lower)
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What is asked of one person: his ``controls``, and what each of his takes is drawn with."""
-
-    controls: Controls
-    draws: tuple[Draw, ...]
-
-    def tried(self, times: int) -> "Asked":
-        """The same with so many draws for each of his."""
-        draws = tuple(draw.other(k) for draw in self.draws for k in range(times))
-        return replace(self, draws=draws)

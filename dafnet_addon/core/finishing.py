@@ -12,6 +12,7 @@ import numpy as np
 from .beginning import PREROLL
 from .cleanup import CleanUp, cleaned, reach_targets
 from .conditions import Change, Shot, targets_of, turns_of
+from .draws import Draw
 from .kinematics import Bent, Turn, come_over, global_from_local, local_from_global, turned
 from .leaning import lean_findings, lean_of, with_lean
 from .looking import counting, head_turn, with_chest_turned
@@ -108,6 +109,7 @@ def finished_steps(
     controls: Controls,
     clean_up: CleanUp,
     log_likelihood: float,
+    draw: Draw,
 ) -> Generator[float, None, Take]:
     """The take of the model's poses (PREROLL + N, 66), with ``action`` (T, K) at the controls'
     rate; yields progress.
@@ -201,6 +203,7 @@ def finished_steps(
         unchanged=unchanged,
         touches=touches(joints, controls.fps, floor, reach, targets),
         log_likelihood=log_likelihood,
+        draw=draw,
         raw_metrics=raw,
         metrics=metrics,
         verdict=verdict(

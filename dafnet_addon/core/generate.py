@@ -11,7 +11,7 @@ from .beginning import PREROLL
 from .cleanup import CleanUp
 from .conditions import Shot, shot_steps
 from .drawing import seated, together
-from .draws import Asked, Draw
+from .draws import Draw
 from .errors import InputError
 from .finishing import finished_steps
 from .kept_motion import Kept, kept_of
@@ -23,7 +23,7 @@ from .root import RootPath, to_root, to_world
 from .sampler import Sampler
 from .series import MODEL_FPS
 from .solids import Scene
-from .take import Controls, Take
+from .take import Asked, Controls, Take
 from .weights import Weights
 
 __all__ = [
@@ -165,6 +165,7 @@ def clean_again_steps(
                 controls,
                 clean_up,
                 take.log_likelihood,
+                take.draw,
             ),
             0.5,
             1.0,
@@ -178,12 +179,14 @@ def played_take_steps(
     before: Sequence[LiveFrame],
     played: Sequence[LiveFrame],
     clean_up: CleanUp,
+    draw: Draw,
 ) -> Generator[float, None, Take]:
     """The take of what was played live (``live.LiveBody``), 30 frames a second, with the clean-up
     that needs a look ahead; nothing is sampled.
 
     ``controls``: what it was led by, of one mode (``live.controls_of``); ``before``: the frames
-    before the first that was ``played``, at least ``PREROLL`` of them. Raises InputError for what
+    before the first that was ``played``, at least ``PREROLL`` of them; ``draw``: what it was drawn
+    with. Raises InputError for what
     cannot be used.
     """
     shot = yield from within(shot_steps(scene, controls), 0.0, 0.5)
@@ -205,7 +208,7 @@ def played_take_steps(
     source, target = frame_times(count, MODEL_FPS), frame_times(len(controls), controls.fps)
     action = resample_positions(np.array([each.action for each in kept]), source, target)
     density = float(np.mean([each.log_likelihood for each in kept]))
-    job = finished_steps(poses, np.zeros((0, 66)), action, shot, controls, clean_up, density)
+    job = finished_steps(poses, np.zeros((0, 66)), action, shot, controls, clean_up, density, draw)
     return (yield from within(job, 0.5, 1.0))
 
 

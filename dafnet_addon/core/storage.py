@@ -19,6 +19,7 @@ import numpy as np
 
 from .beginning import PREROLL
 from .checks import FARTHEST, MAX_FRAMES, inside, number, shaped, whole
+from .draws import Draw
 from .errors import InputError
 from .network import MAX_ACTIONS
 from .resampling import covering_frames
@@ -102,7 +103,7 @@ def _sayable(value: Any) -> Any:
     """A number, figures by name, or what else a take says, with None for what JSON has no word
     for.
     """
-    if isinstance(value, Finding):
+    if isinstance(value, Finding | Draw):
         return asdict(value)
     if isinstance(value, tuple):
         return [_sayable(each) for each in value]
@@ -250,12 +251,24 @@ def _take(said: dict[str, Any], arrays: dict[str, np.ndarray], fps: float) -> Ta
         log_likelihood=math.nan
         if likelihood is None
         else number(likelihood, "'take.log_likelihood'", -_MAX_FIGURE, _MAX_FIGURE),
+        draw=_draw(said.get("take.draw", {})),
         raw_metrics=figures("take.raw_metrics"),
         metrics=figures("take.metrics"),
         seconds=seconds,
         warnings=tuple(printable(each, 1000) for each in warnings),
         verdict=_verdict(said.get("take.verdict", [])),
     )
+
+
+def _draw(said: Any) -> Draw:
+    """What a take was drawn with; those that were packed before it was noted do not say it."""
+    known = {each.name for each in fields(Draw)}
+    if not isinstance(said, dict) or not said.keys() <= known:
+        raise InputError("'take.draw' is something other than seeds and temperatures")
+    try:
+        return Draw(**{**said, "held": said.get("held") is True})
+    except InputError as error:
+        raise InputError(f"'take.draw' cannot be used: {error}") from error
 
 
 def _verdict(said: Any) -> tuple[Finding, ...]:

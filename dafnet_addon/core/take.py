@@ -1,21 +1,22 @@
-"""What goes into a generation besides the scene (``Controls``) and what comes out of it
+"""What goes into a generation besides the scene (``Controls``, ``Asked``) and what comes out of it
 (``Take``).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
 from .checks import FARTHEST, MAX_FRAMES, inside, number, rotations, shaped
+from .draws import Draw
 from .errors import InputError
 from .resampling import covering_frames
 from .root import RootPath
 from .skeleton import JOINTS, LOWER, TARGETS, UPPER
 from .text import printable
 
-__all__ = ["LEANS", "MODES", "Controls", "Finding", "Take"]
+__all__ = ["LEANS", "MODES", "Asked", "Controls", "Finding", "Take", "warnings_of"]
 
 MODES = ("FREE", "EE", "FULL")
 LEANS = (-20.0, 35.0)
@@ -206,6 +207,19 @@ def _checked_mode(mode: object, frames: int) -> str | tuple[str, ...]:
 
 
 @dataclass(frozen=True)
+class Asked:
+    """What is asked of one person: his ``controls``, and what each of his takes is drawn with."""
+
+    controls: Controls
+    draws: tuple[Draw, ...]
+
+    def tried(self, times: int) -> "Asked":
+        """The same with so many draws for each of his."""
+        draws = tuple(draw.other(k) for draw in self.draws for k in range(times))
+        return replace(self, draws=draws)
+
+
+@dataclass(frozen=True)
 class Finding:
     """One thing that an eye sees of a take: ``word`` in short, ``text`` as a sentence, which says
     what to do where it is not ``good``.
@@ -230,10 +244,11 @@ class Take:
     another, if there had been none: what resuming and cleaning again need. ``touches`` (T, 4): how
     far hands and feet hold on to something (``touching.touches``), what another body's have to keep
     to. ``verdict``: what an eye would say of it, the worst first. ``log_likelihood``: of a
-    standardised pose after those before it, mean over the frames, nats. ``raw_metrics``,
-    ``metrics``: ``metrics.motion_metrics`` of the model's own motion and of this one after the
-    clean-up, at these frames and canonical size. ``seconds``: time spent by stage. ``warnings``:
-    sentences for the user.
+    standardised pose after those before it, mean over the frames, nats. ``draw``: what it was drawn
+    with, which may not be what was asked for: who stays standing before a seat is drawn anew.
+    ``raw_metrics``, ``metrics``: ``metrics.motion_metrics`` of the model's own motion and of this
+    one after the clean-up, at these frames and canonical size. ``seconds``: time spent by stage.
+    ``warnings``: sentences for the user.
     """
 
     fps: float
@@ -247,6 +262,7 @@ class Take:
     unchanged: np.ndarray = field(default_factory=lambda: np.zeros((0, 66)))
     touches: np.ndarray = field(default_factory=lambda: np.zeros((0, 4)))
     log_likelihood: float = float("nan")
+    draw: Draw = field(default_factory=Draw)
     raw_metrics: dict[str, float | None] = field(default_factory=dict)
     metrics: dict[str, float | None] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
@@ -255,3 +271,14 @@ class Take:
 
     def __len__(self) -> int:
         return len(self.joints)
+
+
+def warnings_of(takes: Sequence[Take]) -> dict[str, list[int]]:
+    """The sentences that takes have for the user, and the numbers of those that have each, from
+    0.
+    """
+    found: dict[str, list[int]] = {}
+    for k, take in enumerate(takes):
+        for sentence in dict.fromkeys(take.warnings):
+            found.setdefault(sentence, []).append(k)
+    return found

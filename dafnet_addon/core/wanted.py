@@ -7,10 +7,10 @@ import numpy as np
 
 from .beginning import PREROLL
 from .conditions import Change, Shot, rolled, shot_steps
-from .draws import Asked
 from .sampler import Conditions, Run, Sampler, Unchanged
 from .skeleton import UPPER
 from .solids import Scene
+from .take import Asked
 from .weights import Weights
 
 __all__ = ["Wanted", "wanted_steps"]

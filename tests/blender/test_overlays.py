@@ -19,7 +19,6 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay import (
 )
 from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.cache import cache
 from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.drawing import compose
-from bl_ext.user_default.dafnet.dafnet_addon.core.draws import Draw
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end
 from bl_ext.user_default.dafnet.dafnet_addon.core.root import RootPath
@@ -83,8 +82,7 @@ class Shot(Stage):
         )
         controls = Controls(30.0, path.matrices(), **given)
         action = bpy.data.actions.new("Ann take")
-        draw = Draw(0, 0, 0.0, 0.0)
-        add_take(self.ann, action, take, controls, draw, start)
+        add_take(self.ann, action, take, controls, start)
         if play:
             self.ann.animation_data_create().action = action
         self.update()

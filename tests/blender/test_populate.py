@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from bl_ext.user_default.dafnet.dafnet_addon.blender.populating.populate import SCENE, populate
+from bl_ext.user_default.dafnet.dafnet_addon.core import drawing
+from bl_ext.user_default.dafnet.dafnet_addon.core.draws import Draw
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.manifest import MANIFEST, read_manifest
 
@@ -87,6 +89,22 @@ def test_ground_truth_lies_beside_the_scene(blender: Any, tmp_path: Path) -> Non
     for person in made.people:
         assert len(person["actions"]) == len(set(person["seeds"])) == 2
     assert len(made.content) == len(set(made.content.values())) == 4
+
+
+def test_who_is_drawn_anew_is_listed_as_he_was_drawn(
+    blender: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = populate(cafe(takes=2, temperature=1.0), tmp_path / "as asked").people[0]["seeds"]
+    monkeypatch.setattr(drawing, "_stands", lambda take: take.draw.seed == asked[1])
+    made = populate(cafe(takes=2, temperature=1.0), tmp_path / "out")
+    (person,) = made.people
+    other = Draw(asked[1]).other(1).seed
+    assert person["seeds"] == [asked[0], other]
+    blender.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / SCENE))
+    listed = [blender.data.actions[name].dafnet.seed for name in person["actions"]]
+    assert listed == person["seeds"]
+    (said,) = made.warnings
+    assert said.startswith(f"{person['name']}, take 2: With seed {asked[1]} the character stays")
 
 
 @pytest.mark.slow

@@ -165,16 +165,13 @@ def test_a_failure_at_any_write_leaves_the_file_as_it_was(
 ) -> None:
     armature = create_character(blender.context, "Ann")
     prepared(blender, armature)
-    controls, draws = (
-        Controls(30.0, np.tile(np.eye(4), (3, 1, 1))),
-        [Draw(seed) for seed in range(2)],
-    )
-    scene, weights = Scene(), load_weights()
-    made = run_to_end(takes_steps(scene, controls, weights, draws))
+    controls = Controls(30.0, np.tile(np.eye(4), (3, 1, 1)))
+    draws = [Draw(seed) for seed in range(2)]
+    made = run_to_end(takes_steps(Scene(), controls, load_weights(), draws))
     settings = job.settings_of(armature, blender.context.scene)
 
     def bake() -> None:
-        for _ in job.bake_steps(settings, made, controls, draws):
+        for _ in job.bake_steps(settings, made, controls):
             blender.context.view_layer.update()
 
     before = everything(blender, armature)

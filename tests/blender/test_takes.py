@@ -21,6 +21,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.character.takes import (
 from bl_ext.user_default.dafnet.dafnet_addon.blender.compat import action_curves
 from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.contents import drawings
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import job
+from bl_ext.user_default.dafnet.dafnet_addon.core import drawing
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import UPPER
 
@@ -198,6 +199,34 @@ def test_legs_vary_under_the_same_upper_body(shot: Shot) -> None:
     assert apart[[4, 5, 7, 8]].mean() > apart[[9, 12, 15]].mean() > 0
     bpy.ops.dafnet.generate(task="LEGS")
     assert shot.listed()[2].dafnet.lower_seed == 6
+
+
+def test_a_take_that_was_drawn_anew_is_listed_as_it_was_drawn(
+    shot: Shot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = shot.ann.dafnet
+    monkeypatch.setattr(drawing, "_stands", lambda take: take.draw.seed == 3)
+    own.seed, own.temperature, own.take_count = 2, 1.0, 2
+    made = job.run(bpy.context, shot.settings())
+    seeds = [2, 3 + 7919]
+    assert [action.dafnet.seed for action in shot.listed()] == seeds
+    assert [take.draw.seed for take in made.takes] == seeds
+    (said,) = [each for each in made.warnings if "stays standing" in each]
+    assert said == (
+        f"'{made.actions[1].name}': With seed 3 the character stays standing before a seat, so it "
+        "was drawn with 7922."
+    )
+
+    own.active_take = 1
+    bpy.ops.dafnet.generate(task="LEGS")
+    legs = shot.listed()[2]
+    assert (legs.dafnet.seed, legs.dafnet.lower_seed) == (7922, 7923)
+    apart = np.abs(shot.motion(legs) - shot.motion(made.actions[1])).mean(axis=(0, 2))
+    assert apart[[4, 5, 7, 8]].mean() > 2.0 * apart[[9, 12, 15]].mean(), "the same upper body"
+
+    own.active_take = 1
+    bpy.ops.dafnet.clean_again()
+    assert shot.listed()[3].dafnet.seed == 7922
 
 
 def test_takes_remember_whether_their_noise_was_held(shot: Shot) -> None:

@@ -5,10 +5,11 @@ import pytest
 
 from dafnet_addon import Box, CleanUp, Controls, Scene, load_weights
 from dafnet_addon.core import generate
-from dafnet_addon.core.draws import Asked, Draw
+from dafnet_addon.core.draws import Draw
 from dafnet_addon.core.generate import crowd_steps, takes_steps
 from dafnet_addon.core.paths import Stop, route
 from dafnet_addon.core.progress import run_to_end
+from dafnet_addon.core.take import Asked
 
 CLEAN = CleanUp(feet=1.0, reach=1.0, seat=1.0)
 ROUNDED = 5e-5

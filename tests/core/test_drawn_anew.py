@@ -1,16 +1,18 @@
 """Who stays standing before his seat, by the noise that he is drawn with, is drawn anew."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from dafnet_addon import Box, Controls, Scene, Take, load_weights
 from dafnet_addon.core import drawing, generate
-from dafnet_addon.core.draws import Asked, Draw
+from dafnet_addon.core.draws import Draw
 from dafnet_addon.core.generate import crowd_steps, takes_steps
 from dafnet_addon.core.paths import Stop, route
 from dafnet_addon.core.progress import run_to_end
+from dafnet_addon.core.take import Asked, warnings_of
 from dafnet_addon.core.verdict import STANDS
 
 HOT = 4.0
@@ -56,7 +58,8 @@ def test_who_stood_sits_and_is_told_of_it(once, made):
     stood = [_stands(take) for take in once]
     assert any(stood)
     assert sum(map(_stands, made)) < sum(stood)
-    for before, take, was_standing in zip(once, made, stood, strict=True):
+    for draw, before, take, was_standing in zip(DRAWS, once, made, stood, strict=True):
+        assert before.draw == draw and take.draw.seed == (_other_seed(take) or draw.seed)
         if not was_standing:
             assert np.array_equal(take.joints, before.joints) and _other_seed(take) is None
         elif not _stands(take):
@@ -65,7 +68,8 @@ def test_who_stood_sits_and_is_told_of_it(once, made):
 
 def test_the_seed_that_is_named_gives_that_take(weights, made):
     take = next(take for take in made if _other_seed(take) is not None)
-    (again,) = _takes(weights, (Draw(_other_seed(take), temperature=HOT),))
+    assert take.draw == Draw(_other_seed(take), temperature=HOT)
+    (again,) = _takes(weights, (take.draw,))
     assert np.allclose(again.joints, take.joints, atol=1e-4)
 
 
@@ -75,6 +79,11 @@ def test_in_a_crowd_as_alone(weights, made):
     for take, alone in zip([*found[0], *found[1]], made, strict=True):
         assert np.allclose(take.joints, alone.joints, atol=1e-3)
         assert _other_seed(take) == _other_seed(alone)
+
+
+def test_what_takes_have_to_say_is_said_once(made):
+    first, second = (replace(made[0], warnings=said) for said in (("A", "B", "A"), ("B", "C")))
+    assert warnings_of([first, second]) == {"A": [0], "B": [0, 1], "C": [1]}
 
 
 def test_without_noise_nothing_is_drawn_anew(weights, monkeypatch):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dafnet_addon import Box, CleanUp, Controls, Scene, load_weights
+from dafnet_addon.core.draws import Draw
 from dafnet_addon.core.errors import InputError
 from dafnet_addon.core.following import CRUISE, LAG, PointFollower, RootFollower, Seat, Way
 from dafnet_addon.core.generate import played_take_steps
@@ -234,7 +235,10 @@ def test_what_was_played_is_a_take_of_any_rate(fps: float) -> None:
         live, 1.0, (1.0, 1.0), hand_right=np.array([1.3, 1.4, 1.3])
     )
     controls = controls_of(played, fps, 1.0)
-    take = run_to_end(played_take_steps(CHAIR, controls, before, played, CleanUp(1.0, 1.0)))
+    take = run_to_end(
+        played_take_steps(CHAIR, controls, before, played, CleanUp(1.0, 1.0), Draw(4))
+    )
+    assert take.draw == Draw(4)
     assert len(take) == len(controls) == int((len(played) - 1) * fps / 30 + 1e-6) + 1
     assert controls.mode == "EE" and len(take.poses) == 70 + len(take.path)
     seen = np.array([frame.joints for frame in played])
@@ -242,7 +246,7 @@ def test_what_was_played_is_a_take_of_any_rate(fps: float) -> None:
     apart = np.linalg.norm(take.joints - seen[at], axis=-1)
     assert np.median(apart) < 0.02 and apart.max() < 0.25
     with pytest.raises(InputError, match="other frames"):
-        run_to_end(played_take_steps(CHAIR, controls, before[:5], played, CleanUp()))
+        run_to_end(played_take_steps(CHAIR, controls, before[:5], played, CleanUp(), Draw()))
     with pytest.raises(InputError, match="record for longer"):
         controls_of(played[:1], fps, 1.0)
 

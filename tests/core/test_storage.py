@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from dafnet_addon import Box, CleanUp, Controls, InputError, Scene, Take, generate, load_weights
+from dafnet_addon.core.draws import Draw
 from dafnet_addon.core.skeleton import UPPER
 from dafnet_addon.core.storage import packed, unpacked
 
@@ -39,7 +40,8 @@ def made() -> tuple[Take, Controls]:
         scale=0.9,
     )
     scene = Scene([Box([0.0, 1.0, 0.2], [0.2, 0.2, 0.2])])
-    return generate(scene, controls, load_weights(), clean_up=CleanUp(feet=1.0)), controls
+    take = generate(scene, controls, load_weights(), seed=7, clean_up=CleanUp(feet=1.0))
+    return replace(take, draw=Draw(7, 8, 0.5, 0.25, held=True)), controls
 
 
 def _members(data: bytes) -> dict[str, bytes]:
@@ -91,6 +93,11 @@ def test_what_was_packed_before_there_were_versions_is_read(made: tuple[Take, Co
     assert len(unpacked(_file(_words(version=None)(_members(packed(*made)))))[0]) == FRAMES
 
 
+def test_what_was_packed_before_the_draw_was_noted_is_read(made: tuple[Take, Controls]) -> None:
+    older = _file(_words(take__draw=None)(_members(packed(*made))))
+    assert unpacked(older)[0].draw == Draw()
+
+
 def test_figures_that_are_no_numbers_are_kept_as_unknown(made: tuple[Take, Controls]) -> None:
     odd = replace(
         made[0], log_likelihood=float("nan"), metrics={"jerk": float("inf"), "skate_cm": None}
@@ -109,6 +116,9 @@ DAMAGED: dict[str, tuple[Any, str]] = {
     "no warnings": (_words(take__warnings=None), "'take.warnings'"),
     "warnings of numbers": (_words(take__warnings=[1]), "'take.warnings'"),
     "figures of words": (_words(take__metrics={"jerk": "high"}), "'take.metrics'"),
+    "a draw of words": (_words(take__draw="any"), "'take.draw'"),
+    "a draw of more": (_words(take__draw={"seed": 1, "luck": 2}), "'take.draw'"),
+    "a seed below zero": (_words(take__draw={"seed": -1}), "'take.draw'"),
     "an unknown mode": (_words(controls__mode="HALF"), "mode 'HALF'"),
     "a blend of words": (_words(controls__blend="long"), "blend"),
     "no JSON": (

@@ -9,7 +9,6 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.character.takes import add_
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, detection, maps
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig.sizing import size_as_rig
-from bl_ext.user_default.dafnet.dafnet_addon.core.draws import Draw
 from bl_ext.user_default.dafnet.dafnet_addon.core.generate import generate
 from bl_ext.user_default.dafnet.dafnet_addon.core.paths import Route, Stop, route
 from bl_ext.user_default.dafnet.dafnet_addon.core.solids import Box, Scene
@@ -115,7 +114,7 @@ class RigStage(Stage):
         self.take = self.takes[kind]
         action = bake(self.take, self.ann, 1, kind)
         controls = Controls(self.take.fps, self.take.root, scale=self.take.scale)
-        add_take(self.ann, action, self.take, controls, Draw(), 1)
+        add_take(self.ann, action, self.take, controls, 1)
 
     def size_as(self, rig: Any) -> None:
         """Make her as large as the rig, and her takes anew."""

@@ -52,12 +52,11 @@ def add_take(
     action: bpy.types.Action,
     take: Take,
     controls: Controls,
-    draw: Draw,
     frame_start: int,
 ) -> None:
     """Pack into ``action`` what it was made from, and list it as the armature's active take."""
     action[PACKED] = packed(take, controls)
-    facts = action.dafnet
+    facts, draw = action.dafnet, take.draw
     facts.frame_start = frame_start
     facts.seed, facts.temperature = draw.seed, draw.temperature
     facts.lower_seed = draw.seed if draw.lower_seed is None else draw.lower_seed

@@ -48,13 +48,13 @@ def _keep(session: LiveSession, clip: Clip) -> Generator[float, None, Result]:
     settings, scene, armature = session.settings, session.scene, session.armature
     fps = scene.render.fps / scene.render.fps_base
     controls = controls_of(clip.played, fps, session.scale)
-    job = played_take_steps(
-        session.furniture.scene, controls, clip.before, clip.played, clean_up_of(settings)
-    )
-    take = yield from within(job, 0.0, 0.8)
     own = armature.dafnet
     draw = Draw(settings.seed, temperature=own.temperature, held=settings.noise == HELD)
-    actions = yield from within(bake_steps(settings, [take], controls, [draw]), 0.8, 1.0)
+    job = played_take_steps(
+        session.furniture.scene, controls, clip.before, clip.played, clean_up_of(settings), draw
+    )
+    take = yield from within(job, 0.0, 0.8)
+    actions = yield from within(bake_steps(settings, [take], controls), 0.8, 1.0)
     start = settings.frame_start
     warnings = tuple(_key_what_led(session, controls, start))
     extend_range(scene, armature, start + len(take) - 1)
@@ -62,7 +62,6 @@ def _keep(session: LiveSession, clip: Clip) -> Generator[float, None, Result]:
     return Result(
         actions=tuple(actions),
         takes=(take,),
-        draws=(draw,),
         warnings=take.warnings + warnings,
         seconds=take.seconds,
     )

@@ -4,7 +4,7 @@ A job knows objects by name only and looks them up at each stage, since they may
 undone while it runs.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -19,7 +19,7 @@ from ...core.draws import Draw
 from ...core.errors import InputError
 from ...core.generate import clean_again_steps, takes_steps
 from ...core.progress import run_to_end, stepwise, within
-from ...core.take import Controls, Take
+from ...core.take import Controls, Take, warnings_of
 from ..character.armature import metres_per_unit
 from ..character.settings import CLEAN_UP, HELD, Settings, settings_of
 from ..character.takes import add_take, draw_of, play_take, stored_take
@@ -60,14 +60,13 @@ _FURTHER_TAKES = 1.0
 class Result:
     """Baked takes of one shot.
 
-    ``actions``: new, the first one played by the armature; ``takes``, ``draws``: of each.
+    ``actions``: new, the first one played by the armature; ``takes``: of each.
     ``warnings``: sentences for the user. ``seconds`` by stage: ``reading``, those of
     ``Take.seconds`` (``conditions``, ``sampling``, …) and ``baking``.
     """
 
     actions: tuple[bpy.types.Action, ...]
     takes: tuple[Take, ...]
-    draws: tuple[Draw, ...]
     warnings: tuple[str, ...]
     seconds: dict[str, float]
 
@@ -152,7 +151,6 @@ def run(
 
     seconds = {"reading": perf_counter() - started}
 
-    draws = draws_of(settings)
     controls = read.controls
     if begins_as is not None:
         controls = replace(controls, before=begins_as.before, before_root=begins_as.before_root)
@@ -161,7 +159,7 @@ def run(
             read.scene,
             controls,
             weights,
-            draws,
+            draws_of(settings),
             resume=None if kept is None else kept.take,
             resume_frame=0 if kept is None else kept.until,
             resume_until=None if kept is None else kept.again,
@@ -177,7 +175,7 @@ def run(
     if gone := used - names_in_use(settings):
         raise InputError(f"'{min(gone)}' is no longer in the scene; generate again.")
 
-    actions = yield from within(bake_steps(settings, takes, controls, draws), _GENERATED, 1.0)
+    actions = yield from within(bake_steps(settings, takes, controls), _GENERATED, 1.0)
     seconds |= takes[0].seconds | {"fitting": sum(take.seconds["fitting"] for take in takes)}
     seconds["baking"] = perf_counter() - started
     yield 1.0
@@ -185,8 +183,7 @@ def run(
     return Result(
         actions=tuple(actions),
         takes=tuple(takes),
-        draws=tuple(draws),
-        warnings=(*([note] if note else []), *read.warnings, *takes[0].warnings),
+        warnings=(*([note] if note else []), *read.warnings, *_warnings(actions, takes)),
         seconds=seconds,
     )
 
@@ -274,7 +271,7 @@ def _chosen_take(settings: Settings, action: bpy.types.Action) -> tuple[Take, Co
 
 
 def bake_steps(
-    settings: Settings, takes: list[Take], controls: Controls, draws: list[Draw]
+    settings: Settings, takes: list[Take], controls: Controls
 ) -> Generator[float, None, list[bpy.types.Action]]:
     """An action for each take, listed on the armature; the first one plays. All are made or none:
     whatever stops it, nothing has changed.
@@ -282,16 +279,14 @@ def bake_steps(
     names: list[str] = []
     with ExitStack() as undo:
         undo.callback(_remove_bake, settings, names, state_restorer(_character(settings)))
-        for take, draw in zip(takes, draws, strict=True):
+        for take in takes:
             armature = _character(settings)
 
             with undone_on_failure(armature):
                 unit = metres_per_unit(find_scene(settings))
                 start = settings.frame_start
                 action = bake(take, armature, start, name=f"{armature.name} take", unit=unit)
-                add_take(
-                    armature, action, take=take, controls=controls, draw=draw, frame_start=start
-                )
+                add_take(armature, action, take=take, controls=controls, frame_start=start)
                 names.append(action.name_full)
 
             note_change()
@@ -303,6 +298,13 @@ def bake_steps(
         undo.pop_all()
 
     return actions
+
+
+def _warnings(actions: Sequence[bpy.types.Action], takes: Sequence[Take]) -> Iterator[str]:
+    """What takes have to say, each sentence once; what not all have, with the names of those."""
+    for sentence, which in warnings_of(takes).items():
+        about = ", ".join(f"'{actions[k].name}'" for k in which)
+        yield sentence if len(which) == len(takes) else f"{about}: {sentence}"
 
 
 def _character(settings: Settings) -> bpy.types.Object:
@@ -329,6 +331,8 @@ def clean_up_again(
     ``InputError`` as for ``steps``, and where the action holds no take; nothing is changed then.
     """
     take, controls = stored_take(action)
+    # In takes that were packed before it was noted, only the action knows it.
+    take = replace(take, draw=draw_of(action))
     start = action.dafnet.frame_start
     settings = settings_of(
         armature,
@@ -340,12 +344,10 @@ def clean_up_again(
     )
     read = read_scene(context, settings)
     again = run_to_end(clean_again_steps(read.scene, controls, take, clean_up_of(settings)))
-    draw = draw_of(action)
-    actions = run_to_end(bake_steps(settings, [again], controls, [draw]))
+    actions = run_to_end(bake_steps(settings, [again], controls))
     return Result(
         actions=tuple(actions),
         takes=(again,),
-        draws=(draw,),
         warnings=again.warnings,
         seconds=again.seconds,
     )

@@ -7,7 +7,6 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.draws import Draw
 from ...core.errors import InputError
 from ...core.skeleton import STATURE
 from ...core.take import Controls, Take
@@ -127,7 +126,6 @@ def play(
     player: Player,
     *,
     takes: Sequence[Take],
-    draws: Sequence[Draw],
     controls: Controls,
     first: int,
 ) -> tuple[bpy.types.Object, list[bpy.types.Action]]:
@@ -137,11 +135,11 @@ def play(
     armature = player.armature
     assert armature is not None
     if is_character(armature):
-        return armature, _own(context, armature, takes, draws, controls, first)
+        return armature, _own(context, armature, takes, controls, first)
 
     double = create_character(context, f"{player.who.name} Double", player.who.height)
     actions: list[bpy.types.Action] = []
-    for action in _own(context, double, takes, draws, controls, first):
+    for action in _own(context, double, takes, controls, first):
         play_take(double, action)
         frames = range(first, first + len(takes[0]))
         name = f"{player.who.name} take {len(actions) + 1}"
@@ -158,19 +156,19 @@ def _own(
     context: bpy.types.Context,
     armature: bpy.types.Object,
     takes: Sequence[Take],
-    draws: Sequence[Draw],
     controls: Controls,
     first: int,
 ) -> list[bpy.types.Action]:
     """Actions of a character of ours."""
     unit = metres_per_unit(context.scene)
     actions = []
-    for k, (take, draw) in enumerate(zip(takes, draws, strict=True), 1):
+    for k, take in enumerate(takes, 1):
         action = bake(take, armature, first, f"{armature.name} take {k}", unit)
-        add_take(armature, action, take=take, controls=controls, draw=draw, frame_start=first)
+        add_take(armature, action, take=take, controls=controls, frame_start=first)
         actions.append(action)
     play_take(armature, actions[0])
-    armature.dafnet.seed, armature.dafnet.temperature = draws[0].seed, draws[0].temperature
+    drawn = takes[0].draw
+    armature.dafnet.seed, armature.dafnet.temperature = drawn.seed, drawn.temperature
     return actions
 
 

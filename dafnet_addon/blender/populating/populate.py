@@ -14,7 +14,7 @@ from ... import load_weights
 from ...core.cleanup import CleanUp
 from ...core.conditions import STAYS
 from ...core.distance import prepared
-from ...core.draws import Asked, Draw
+from ...core.draws import Draw
 from ...core.files import require_replaceable, whole_folder
 from ...core.generate import crowd_steps
 from ...core.manifest import MANIFEST, Manifest, content_hash, words_hash
@@ -23,7 +23,7 @@ from ...core.root import root_from_matrices
 from ...core.skeleton import STATURE
 from ...core.solids import Scene
 from ...core.tables import read_tables
-from ...core.take import Controls, Take
+from ...core.take import Asked, Controls, Take, warnings_of
 from ...director.crowds import Crowd, over_shot, plan_crowd
 from ...director.plans import Plan
 from ...director.room import Room
@@ -131,7 +131,6 @@ def populate(
             context,
             player,
             takes=made,
-            draws=part.draws,
             controls=part.controls,
             first=scene.frame_start,
         )
@@ -266,10 +265,14 @@ def _warnings(parts: Sequence[_Part], takes: Sequence[Sequence[Take]]) -> list[s
     """
     found: dict[str, list[str]] = {}
     for part, made in zip(parts, takes, strict=True):
-        planned = part.plan.warnings if part.plan is not None else ()
-        for sentence in (*planned, *made[0].warnings):
+        who = part.player.who.name
+        for sentence in part.plan.warnings if part.plan is not None else ():
+            found.setdefault(sentence, []).append(who)
+        for sentence, which in warnings_of(made).items():
             if part.plan is None or sentence != STAYS:
-                found.setdefault(sentence, []).append(part.player.who.name)
+                all_of_them = len(which) == len(made)
+                names = [who] if all_of_them else [f"{who}, take {k + 1}" for k in which]
+                found.setdefault(sentence, []).extend(names)
     return [f"{names[0]}{_more(names)}: {sentence}" for sentence, names in found.items()]
 
 
@@ -287,7 +290,7 @@ def _said_of(part: _Part, played: Played, scene: bpy.types.Scene) -> dict[str, A
         "height": round(part.controls.scale * STATURE, 3),
         "begins": who.begins,
         "actions": [action.name for action in played.actions],
-        "seeds": list(who.take_seeds),
+        "seeds": [take.draw.seed for take in played.takes],
         "metrics": [
             {
                 name: None if value is None else round(value, 5)

@@ -13,7 +13,6 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline.baker import bake
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig import baker, detection
 from bl_ext.user_default.dafnet.dafnet_addon.blender.rig.eyes import eyes_of
 from bl_ext.user_default.dafnet.dafnet_addon.core.cleanup import CleanUp
-from bl_ext.user_default.dafnet.dafnet_addon.core.draws import Draw
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
 from bl_ext.user_default.dafnet.dafnet_addon.core.generate import generate
 from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end
@@ -371,7 +370,7 @@ def test_eyes_look_at_what_the_head_does_not_turn_to_far_enough(
         controls = Controls(fps=30, root=still, look_at=np.tile(place, (60, 1)))
         take = generate(Scene(()), controls, load_weights(), clean_up=CleanUp(feet=1.0))
         action = bake(take, stage.ann, 1, "looks")
-        add_take(stage.ann, action, take, controls, Draw(), 1)
+        add_take(stage.ann, action, take, controls, 1)
         rig = stage.build("mixamo")
         ahead = np.linalg.inv(np.array(rig.matrix_world)[:3, :3]) @ [0.0, -1.0, 0.0]
         _with_eyes(rig, names)
