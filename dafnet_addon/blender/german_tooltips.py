@@ -55,17 +55,11 @@ TOOLTIPS = {
         "Aufsetzen und Abrollen zählen mit"
     ),
     "Joints that touch furniture, per frame": "Gelenke, die Möbel berühren, je Frame",
-    "Mean distance of the head and hands from their targets": (
-        "Mittlerer Abstand von Kopf und Händen von ihren Zielen"
-    ),
     "How jerky the motion is, in m/s³": "Wie ruckhaft die Bewegung ist, in m/s³",
     "What an eye sees of it, the worst first": ("Was ein Auge davon sieht, das Schlimmste zuerst"),
     "Sliding feet per frame before the clean-up": ("Rutschende Füße je Frame vor dem Bereinigen"),
     "Joints that touch furniture, per frame, before the clean-up": (
         "Gelenke, die Möbel berühren, je Frame, vor dem Bereinigen"
-    ),
-    "Mean distance from the targets before the clean-up": (
-        "Mittlerer Abstand von den Zielen vor dem Bereinigen"
     ),
     "How jerky the motion was before the clean-up": (
         "Wie ruckhaft die Bewegung vor dem Bereinigen war"

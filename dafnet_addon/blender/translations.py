@@ -106,7 +106,6 @@ _GERMAN = {
     "Mark the Seat for glTF": "Sitz für glTF merken",
     "Slide, cm": "Rutschen, cm",
     "Touching, s": "Berührt, s",
-    "Miss": "Abstand vom Ziel",
     "Mode": "Modus",
     "Move": "Bewegen",
     "Move Task": "Aufgabe verschieben",

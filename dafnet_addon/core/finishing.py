@@ -207,7 +207,14 @@ def finished_steps(
         raw_metrics=raw,
         metrics=metrics,
         verdict=verdict(
-            joints, controls.fps, shot.own_path, shot.own_scene, support, targets, found
+            joints,
+            controls.fps,
+            shot.own_path,
+            shot.own_scene,
+            support,
+            targets,
+            found,
+            controls.scale,
         ),
         seconds={"fitting": perf_counter() - started},
         warnings=shot.warnings,

@@ -57,24 +57,29 @@ def verdict(
     support: Support,
     targets: Mapping[str, np.ndarray] = MappingProxyType({}),
     also: Iterable[Finding] = (),
+    scale: float = 1.0,
 ) -> tuple[Finding, ...]:
     """What there is to say of a take: seats first, then what it goes through, then its feet.
 
     ``path`` (T): its root's; ``support``: of ``softness.support_under``, where the root is;
     ``targets``: of ``conditions.targets_of``, to which feet are moved; ``also``: what was found
-    before.
+    before; ``scale``: the character's, in whose centimetres it is said.
     """
     found = [
         *also,
-        *_seats(joints, fps, path, scene, support),
-        *_inside(joints, fps, path, scene),
-        *_feet(joints, fps, path, targets),
+        *_seats(joints, fps, path, scene, support, scale),
+        *_inside(joints, fps, path, scene, scale),
+        *_feet(joints, fps, path, targets, scale),
     ]
     return tuple(sorted(found, key=lambda each: each.good))
 
 
+def _cm(length: float, scale: float) -> str:
+    return f"{100.0 * scale * length:.0f} cm"
+
+
 def _seats(
-    joints: np.ndarray, fps: float, path: RootPath, scene: Scene, support: Support
+    joints: np.ndarray, fps: float, path: RootPath, scene: Scene, support: Support, scale: float
 ) -> Iterator[Finding]:
     if not np.isfinite(support.top).any():
         return
@@ -87,7 +92,7 @@ def _seats(
 
         name = scene.solids[support.solid[middle]].name or _UNNAMED
         over = float(np.median(joints[here, PELVIS, 2] - support.carried[here]))
-        amount, when = f"{100 * abs(over):.0f} cm", f"at {middle / fps:.1f} s"
+        amount, when = _cm(abs(over), scale), f"at {middle / fps:.1f} s"
         if episode.pelvis_height > _STANDS and over > 2 * _OFF_SEAT:
             yield Finding(
                 STANDS,
@@ -108,7 +113,9 @@ def _seats(
             )
 
 
-def _inside(joints: np.ndarray, fps: float, path: RootPath, scene: Scene) -> Iterator[Finding]:
+def _inside(
+    joints: np.ndarray, fps: float, path: RootPath, scene: Scene, scale: float
+) -> Iterator[Finding]:
     points, floor = body_points(joints, _PER_BONE), path.position[:, 2]
     at_least = max(1, round(_BRIEF * fps))
     for solid in scene.solids:
@@ -126,7 +133,7 @@ def _inside(joints: np.ndarray, fps: float, path: RootPath, scene: Scene) -> Ite
             frame, point = np.unravel_index(np.argmax(part), part.shape)
             yield Finding(
                 f"in {name}",
-                f"The {_part_of(int(point))} is {100 * part.max():.0f} cm inside '{name}' at "
+                f"The {_part_of(int(point))} is {_cm(part.max(), scale)} inside '{name}' at "
                 f"{(start + frame) / fps:.1f} s; {what_to_do}",
                 good=False,
             )
@@ -192,7 +199,11 @@ def _slid(places: np.ndarray, fps: float) -> float:
 
 
 def _feet(
-    joints: np.ndarray, fps: float, path: RootPath, targets: Mapping[str, np.ndarray]
+    joints: np.ndarray,
+    fps: float,
+    path: RootPath,
+    targets: Mapping[str, np.ndarray],
+    scale: float,
 ) -> Iterator[Finding]:
     by_itself = ~led(targets, len(joints), fps)
     for foot, side in enumerate(("left", "right")):
@@ -205,8 +216,8 @@ def _feet(
         if slides and max(slides)[0] > _SLIDES:
             far, when = max(slides)
             yield Finding(
-                f"slides {100 * far:.0f} cm",
-                f"The {side} foot slides {100 * far:.0f} cm while it stands, at {when / fps:.1f} "
+                f"slides {_cm(far, scale)}",
+                f"The {side} foot slides {_cm(far, scale)} while it stands, at {when / fps:.1f} "
                 "s; raise Plant Feet, or lower the temperature",
                 good=False,
             )

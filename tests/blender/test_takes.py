@@ -23,7 +23,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.contents import dra
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import job
 from bl_ext.user_default.dafnet.dafnet_addon.core import drawing
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
-from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import UPPER
+from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import END_EFFECTORS, UPPER
 
 from kit.stage import Stage
 
@@ -64,10 +64,27 @@ def test_several_takes_in_one_go_are_listed_and_the_first_plays(shot: Shot) -> N
     )
     assert takes[0].dafnet.log_likelihood > takes[1].dafnet.log_likelihood
     assert (
-        takes[0].dafnet.sliding <= takes[0].dafnet.raw_sliding and takes[0].dafnet.miss == -1.0
+        takes[0].dafnet.sliding <= takes[0].dafnet.raw_sliding and takes[0].dafnet.miss_cm == -1.0
     ), "there are no targets"
     assert np.abs(shot.played() - shot.motion(takes[0])).max() < 2e-3
     assert np.abs(shot.motion(takes[1]) - shot.motion(takes[2])).max() > 0.02
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.01])
+def test_figures_are_centimetres_of_the_character_and_its_scene(
+    blender: ModuleType, unit: float
+) -> None:
+    child = Stage(height=1.2, fps=30, frames=(1, 40), unit=unit, furnished=False)
+    child.own.mode, child.own.reach_targets = "EE", 0.0
+    targets = {"head": (0.1, 0.1, 1.0), "hand_left": (-0.4, 0.3, 0.9), "hand_right": (0.3, 0.4, 1)}
+    for name, place in targets.items():
+        getattr(child.own, name).location = np.array(place) / unit
+    bpy.context.view_layer.update()
+    bpy.ops.dafnet.generate()
+    (action,) = takes_of(child.ann)
+    ends = [END_EFFECTORS[name] for name in targets]
+    off = np.linalg.norm(stored_take(action)[0].joints[:, ends] - [*targets.values()], axis=-1)
+    assert action.dafnet.miss_cm == pytest.approx(100.0 * off.mean(), rel=0.02)
 
 
 def test_takes_are_played_judged_and_renamed_and_none_is_lost(shot: Shot) -> None:

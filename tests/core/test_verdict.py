@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from dafnet_addon import Box, CleanUp, Controls, Scene, Take, generate, load_weights
 from dafnet_addon.core.paths import Stop, route
@@ -23,9 +24,9 @@ def _take() -> Take:
     return generate(STOOL, CONTROLS, load_weights(), clean_up=CleanUp(feet=1.0, seat=1.0))
 
 
-def _said(joints: np.ndarray, scene: Scene = STOOL) -> list[Finding]:
+def _said(joints: np.ndarray, scene: Scene = STOOL, scale: float = 1.0) -> list[Finding]:
     path, _ = root_from_matrices(CONTROLS.root)
-    return list(verdict(joints, 30.0, path, scene, support_under(scene, path)))
+    return list(verdict(joints, 30.0, path, scene, support_under(scene, path), scale=scale))
 
 
 def test_who_sits_well_is_told_so_and_the_file_keeps_it() -> None:
@@ -43,6 +44,25 @@ def test_hovering_sinking_and_standing_are_told_apart() -> None:
     for higher, word in ((0.09, "hovers 9 cm"), (-0.08, "sinks 8 cm"), (0.4, "stands")):
         found = [each for each in _said(joints + np.array([0.0, 0.0, higher])) if not each.good]
         assert word in {each.word for each in found}, (higher, found)
+
+
+def test_a_child_is_told_its_own_centimetres() -> None:
+    higher = _take().joints + np.array([0.0, 0.0, 0.09])
+    (said,) = [each for each in _said(higher, scale=0.7) if not each.good]
+    assert said.word == "hovers 6 cm" and said.text.startswith("Hovers 6 cm over 'Stool'")
+
+    def inside(scale: float) -> int:
+        """Centimetres that somebody of a scale is said to be in a wall across the way."""
+        root = CONTROLS.root.copy()
+        root[:, :3, 3] *= scale
+        center, half_size = scale * np.array([0.0, 0.8, 0.8]), scale * np.array([1.0, 0.2, 0.8])
+        scene, controls = Scene((Box(center, half_size),)), Controls(30.0, root, scale=scale)
+        said = " ".join(each.text for each in generate(scene, controls, load_weights()).verdict)
+        found = re.search(r"is (\d+) cm inside", said)
+        assert found is not None
+        return int(found.group(1))
+
+    assert inside(0.7) == pytest.approx(0.7 * inside(1.0), abs=1.0)
 
 
 def test_what_is_gone_through_is_named_with_the_part_of_the_body() -> None:

@@ -142,12 +142,6 @@ class TakeSettings(bpy.types.PropertyGroup):
     collisions: FloatProperty(
         name="Collisions", options=set(), description="Joints that touch furniture, per frame"
     )
-    miss: FloatProperty(
-        name="Miss",
-        options=set(),
-        subtype="DISTANCE",
-        description="Mean distance of the head and hands from their targets",
-    )
     jerk: FloatProperty(
         name="Jerk", options=set(), description="How jerky the motion is, in m/s\u00b3"
     )
@@ -163,12 +157,6 @@ class TakeSettings(bpy.types.PropertyGroup):
         name="Collisions before",
         options=set(),
         description="Joints that touch furniture, per frame, before the clean-up",
-    )
-    raw_miss: FloatProperty(
-        name="Miss before",
-        options=set(),
-        subtype="DISTANCE",
-        description="Mean distance from the targets before the clean-up",
     )
     raw_jerk: FloatProperty(
         name="Jerk before",

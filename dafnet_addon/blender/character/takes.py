@@ -36,13 +36,14 @@ _STATURE = 1.7
 _METRICS = {
     "sliding": ("foot_sliding_per_frame", 1.0),
     "collisions": ("bad_collisions_per_frame", 1.0),
-    "miss": ("end_effector_error", _STATURE),
     "jerk": ("jerk", 1.0),
     "slide_cm": ("slide_max", 100.0),
     "touching": ("bad_collision_seconds", 1.0),
     "miss_cm": ("end_effector_error", 100.0 * _STATURE),
 }
 """The metrics of a take by the names of an action's settings, and by what each is multiplied."""
+_LENGTHS = {"jerk", "slide_cm", "miss_cm"}
+"""Those that grow with the character: a take's metrics are those of the canonical body."""
 _unpacked: dict[int, tuple[int, tuple[Take, Controls]]] = {}
 """The take unpacked last, by its action's pointer, with a hash of what was unpacked."""
 
@@ -68,7 +69,8 @@ def add_take(
     for prefix, metrics in (("", take.metrics), ("raw_", take.raw_metrics)):
         for name, (metric, factor) in _METRICS.items():
             value = metrics.get(metric)
-            setattr(facts, prefix + name, -1.0 if value is None else value * factor)
+            size = take.scale if name in _LENGTHS else 1.0
+            setattr(facts, prefix + name, -1.0 if value is None else value * factor * size)
 
     facts.verdict.clear()
     for finding in take.verdict:
