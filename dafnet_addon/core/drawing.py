@@ -13,7 +13,7 @@ from .beginning import PREROLL
 from .cleanup import CleanUp
 from .conditions import Shot
 from .finishing import finished_steps
-from .kept_motion import Kept
+from .kept_motion import Kept, kept_before
 from .meeting import led_to, met, nearest
 from .progress import within
 from .resampling import frame_times, resample_positions
@@ -47,13 +47,13 @@ def together(
     sampler: Sampler,
     *,
     clean_up: CleanUp,
-    kept: Callable[[Shot], Kept | None] = lambda shot: None,
+    kept: Callable[[Shot], Kept | None] = kept_before,
     tries: int = 1,
     shown: Callable[[RootPath, int, np.ndarray], None] | None = None,
 ) -> Drawing:
     """The takes of people who go through the network side by side. ``kept``, ``tries``, ``shown``:
     of one who is alone: what stays of a motion, how often a part in its middle is tried, and what
-    is shown each frame.
+    is shown each frame. Who begins with motion that is known has to be alone.
     """
     started, count = perf_counter(), len(people)
     wanted: list[Wanted] = []

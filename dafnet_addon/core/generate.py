@@ -14,7 +14,7 @@ from .drawing import seated, together
 from .draws import Draw
 from .errors import InputError
 from .finishing import finished_steps
-from .kept_motion import Kept, kept_of
+from .kept_motion import Kept, kept_before, kept_of
 from .live import LiveFrame
 from .meeting import TRIES
 from .progress import stepwise, within
@@ -69,7 +69,7 @@ def takes_steps(
 
     def kept(shot: Shot) -> Kept | None:
         if resume is None or resume_frame == 0:
-            return None if shot.before is None else Kept(shot.before)
+            return kept_before(shot)
         return kept_of(resume, resume_frame, resume_until, controls, shot.path)
 
     def shown(path: RootPath, frame: int, pose: np.ndarray) -> None:
@@ -104,7 +104,7 @@ def crowd_steps(
     yields progress in [0, 1].
 
     Each is as ``takes_steps`` makes him alone, but for rounding, whatever lengths and sizes the
-    others have. Raises as ``takes_steps`` does.
+    others have; who begins with motion that is known is made alone. Raises as ``takes_steps`` does.
     """
     draw = partial(
         together,
@@ -122,7 +122,11 @@ def crowd_steps(
 
 
 def _at_once(people: Sequence[Asked]) -> int:
-    """How many of the first people are made side by side, so that memory suffices."""
+    """How many of the first people are made side by side: so many as memory suffices for, of whom
+    none begins with motion that is known, or one who does.
+    """
+    begins = [each.controls.before is not None for each in people]
+    people = people[: max(1, begins.index(True))] if any(begins) else people
     frames = [covering_frames(len(each.controls), each.controls.fps) + PREROLL for each in people]
     longest = np.maximum.accumulate(frames)
     return max(1, int((longest * np.arange(1, len(frames) + 1) <= _FRAMES_AT_ONCE).sum()))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .beginning import PREROLL
+from .conditions import Shot
 from .errors import InputError
 from .meeting import require_same_root
 from .resampling import covering_frames
@@ -12,7 +13,7 @@ from .root import RootPath, to_root, to_world
 from .series import MODEL_FPS
 from .take import Controls, Take
 
-__all__ = ["Kept", "kept_of"]
+__all__ = ["Kept", "kept_before", "kept_of"]
 
 _HAIR = 1e-3  # of a length: what comes back from single precision is the same
 
@@ -33,6 +34,11 @@ class Kept:
         if self.middle is not None:
             poses[PREROLL + self.middle[0] : PREROLL + self.middle[1]] = np.nan
         return poses
+
+
+def kept_before(shot: Shot) -> Kept | None:
+    """What a shot begins with, where that is given."""
+    return None if shot.before is None else Kept(shot.before)
 
 
 def kept_of(

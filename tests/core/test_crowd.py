@@ -1,5 +1,7 @@
 """Several people through the network side by side: each as he would be alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -69,6 +71,25 @@ def test_a_crowd_that_memory_does_not_hold_is_made_in_groups(
     for (one,), (other,) in zip(whole, parts, strict=True):
         assert np.abs(one.joints - other.joints).max() < ROUNDED
     assert run_to_end(crowd_steps(scene, [], weights)) == []
+
+
+def test_who_begins_with_motion_that_is_known_does_so_in_a_crowd() -> None:
+    scene, weights = Scene(), load_weights()
+    (first,) = run_to_end(takes_steps(scene, walker(60), weights, [Draw(1)]))
+    walks = walker(60)
+    goes_on = replace(
+        walks, root=walks.root[40:], before=first.joints[:41], before_root=walks.root[:41]
+    )
+    asked = [
+        Asked(each, (Draw(k, temperature=1.0), Draw(9)))
+        for k, each in enumerate([walker(30), goes_on, walker(25), walker(20)])
+    ]
+    found = run_to_end(crowd_steps(scene, asked, weights))
+    for one, made in zip(asked, found, strict=True):
+        alone = run_to_end(takes_steps(scene, one.controls, weights, one.draws))
+        for each, other in zip(alone, made, strict=True):
+            assert np.abs(each.joints - other.joints).max() < ROUNDED
+    assert np.abs(found[1][0].joints[0] - first.joints[40]).max() < 0.03, "in mid-stride"
 
 
 def test_progress_grows_to_its_end() -> None:
