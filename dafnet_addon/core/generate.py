@@ -10,7 +10,7 @@ import numpy as np
 from .beginning import PREROLL
 from .cleanup import CleanUp
 from .conditions import Shot, shot_steps
-from .drawing import seated, together
+from .drawing import together
 from .draws import Draw
 from .errors import InputError
 from .finishing import finished_steps
@@ -78,17 +78,17 @@ def takes_steps(
             watch(frame - PREROLL, to_world(at, pose.reshape(1, 22, 3))[0] * controls.scale)
 
     yield 0.0
-    people, sampler = [Asked(controls, tuple(draws))], Sampler(weights, device)
-    draw = partial(
-        together, scene=scene, weights=weights, sampler=sampler, clean_up=clean_up, kept=kept
-    )
-    job = draw(
-        people,
+    job = together(
+        [Asked(controls, tuple(draws))],
+        scene,
+        weights,
+        Sampler(weights, device),
+        clean_up=clean_up,
+        kept=kept,
         tries=TRIES if resume_until is not None else 1,
+        anew=resume is None or resume_frame == 0,
         shown=shown if watch is not None else None,
     )
-    if resume is None or resume_frame == 0:
-        job = seated(job, people, draw)
     return (yield from job)[0]
 
 
@@ -106,18 +106,13 @@ def crowd_steps(
     Each is as ``takes_steps`` makes him alone, but for rounding, whatever lengths and sizes the
     others have; who begins with motion that is known is made alone. Raises as ``takes_steps`` does.
     """
-    draw = partial(
-        together,
-        scene=scene,
-        weights=weights,
-        sampler=Sampler(weights, device),
-        clean_up=clean_up,
-    )
+    sampler = Sampler(weights, device)
     found: list[list[Take]] = []
     while len(found) < len(people):
         group = people[len(found) : len(found) + _at_once(people[len(found) :])]
         done = len(found) / len(people), (len(found) + len(group)) / len(people)
-        found += yield from within(seated(draw(group), group, draw), *done)
+        job = together(group, scene, weights, sampler, clean_up=clean_up)
+        found += yield from within(job, *done)
     return found
 
 

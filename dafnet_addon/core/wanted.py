@@ -1,12 +1,13 @@
 """What is to be sampled of a shot, as the weights may be told of it."""
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .beginning import PREROLL
 from .conditions import Change, Shot, rolled, shot_steps
+from .draws import Draw
 from .sampler import Conditions, Run, Sampler, Unchanged
 from .skeleton import UPPER
 from .solids import Scene
@@ -61,6 +62,10 @@ class Wanted:
             self, conditions=replace(self.conditions, observation=observation), changes=changes
         )
 
+    def drawn(self, draws: Sequence[Draw], sampler: Sampler) -> "Wanted":
+        """The same for other takes, one for each of ``draws``."""
+        return replace(self, z=_noise(sampler, len(self.conditions), draws))
+
     def run(self) -> Run:
         """As the sampler takes it."""
         unchanged = [
@@ -77,14 +82,6 @@ def wanted_steps(
     if not weights.heeds_legs and shot.request.share[:, _LEGS].any():
         shot = replace(shot, warnings=(*shot.warnings, _LEGS_UNHEARD))
 
-    frames = len(shot.conditions)
-    z = np.concatenate(
-        [
-            sampler.noise(frames, d.seed, d.lower_seed, d.temperature, d.lower_temperature, d.held)
-            for d in asked.draws
-        ],
-        axis=1,
-    )
     share = rolled(_told(shot.request.share, weights)) * shot.conditions.given
     return Wanted(
         shot=shot,
@@ -93,7 +90,18 @@ def wanted_steps(
             replace(each, share=_told(each.share, weights)) for each in shot.request.changes
         ),
         share=share,
-        z=z,
+        z=_noise(sampler, len(shot.conditions), asked.draws),
+    )
+
+
+def _noise(sampler: Sampler, frames: int, draws: Sequence[Draw]) -> np.ndarray:
+    """That of takes (frames, B, 66), one for each of ``draws``."""
+    return np.concatenate(
+        [
+            sampler.noise(frames, d.seed, d.lower_seed, d.temperature, d.lower_temperature, d.held)
+            for d in draws
+        ],
+        axis=1,
     )
 
 

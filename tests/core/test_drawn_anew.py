@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dafnet_addon import Box, Controls, Scene, Take, load_weights
-from dafnet_addon.core import drawing, generate
+from dafnet_addon.core import drawing
 from dafnet_addon.core.draws import Draw
 from dafnet_addon.core.generate import crowd_steps, takes_steps
 from dafnet_addon.core.paths import Stop, route
@@ -87,18 +87,25 @@ def test_what_takes_have_to_say_is_said_once(made):
 
 
 def test_without_noise_nothing_is_drawn_anew(weights, monkeypatch):
-    drawn, together = [], drawing.together
+    called: list[str] = []
 
-    def counted(*given, **more):
-        drawn.append(1)
-        return together(*given, **more)
+    def counted(name: str) -> None:
+        as_it_is = getattr(drawing, name)
 
-    monkeypatch.setattr(generate, "together", counted)
+        def noted(*given, **more):
+            called.append(name)
+            return as_it_is(*given, **more)
+
+        monkeypatch.setattr(drawing, name, noted)
+
+    counted("_drawn")
+    counted("wanted_steps")
     monkeypatch.setattr(drawing, "_stands", lambda take: True)
     for temperature, times in ((0.0, 1), (1.0, 1 + drawing._AGAIN)):
-        drawn.clear()
+        called.clear()
         _takes(weights, (Draw(temperature=temperature),))
-        assert len(drawn) == times
+        assert called.count("_drawn") == times
+        assert called.count("wanted_steps") == 1, "what is known of the scene stays"
 
 
 def test_progress_never_goes_back(weights):
