@@ -329,7 +329,10 @@ def test_the_preview_range_is_made_anew_between_two_ends_that_stay(shot: Shot) -
     with pytest.raises(RuntimeError, match="begins at frame 11, so nothing of it would be kept"):
         bpy.ops.dafnet.generate(task="BETWEEN")
     scene.frame_preview_start, scene.frame_preview_end = 51, 130
-    with pytest.raises(RuntimeError, match="Frame 131 is not inside the take"):
+    with pytest.raises(RuntimeError, match=r"ends at frame 130, so nothing.*From Here On"):
+        bpy.ops.dafnet.generate(task="BETWEEN")
+    scene.frame_preview_end = 131
+    with pytest.raises(RuntimeError, match="Frame 132 is not inside the take"):
         bpy.ops.dafnet.generate(task="BETWEEN")
     scene.frame_preview_end = 100
     shot.walk((115, 2.0))

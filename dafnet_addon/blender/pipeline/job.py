@@ -243,8 +243,14 @@ def _kept_take(settings: Settings) -> _Kept | None:
             f"The take '{action.name}' begins at frame {start}, so nothing of it would be kept "
             "before that; press Generate to make all of it anew, or go to a later frame."
         )
+    stop = start + len(take)
+    if settings.kept_from == stop and settings.kept_until < stop:
+        raise InputError(
+            f"The take '{action.name}' ends at frame {stop - 1}, so nothing of it would be kept "
+            "after that; go to where it is to be made anew, and press From Here On."
+        )
     for frame in (settings.kept_until, settings.kept_from):
-        if frame is not None and not start < frame < start + len(take):
+        if frame is not None and not start < frame < stop:
             raise InputError(
                 f"Frame {frame} is not inside the take '{action.name}'; go to a frame in it."
             )
