@@ -2,6 +2,7 @@
 ``blender.character.takes``, ``blender.pipeline.job`` and ``blender.delivery``.
 """
 
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from ..dafnet_addon.blender.pipeline import job
 from ..dafnet_addon.core.errors import InputError
 from ..dafnet_addon.core.progress import run_to_end
 from .base import DafnetOperator, idle
+from .long import LongOperator
 
 __all__ = [
     "DAFNET_OT_clean_again",
@@ -141,18 +143,20 @@ class DAFNET_OT_keep_accepted(_OfTakes, bpy.types.Operator):
                 drop_take(character, index)
 
 
-class DAFNET_OT_clean_again(_OfTakes, bpy.types.Operator):
+class DAFNET_OT_clean_again(_OfTakes, LongOperator, bpy.types.Operator):
     """Clean up the chosen take with the present settings, as a new take; nothing is generated"""
 
     bl_idname = "dafnet.clean_again"
     bl_label = "Clean Up Again"
     bl_options = {"REGISTER", "UNDO"}
 
-    def run(self, context: bpy.types.Context) -> None:
+    def steps(self, context: bpy.types.Context) -> Generator[float, None, job.Result]:
         """Clean it."""
         character = _character(context)
-        take = _chosen(character)
-        result = job.clean_up_again(context, character, take)
+        return job.clean_up_again.steps(context, character, _chosen(character))
+
+    def report_result(self, result: job.Result) -> None:
+        """Say which take it is now."""
         self.report({"INFO"}, f"'{result.action.name}'")
 
 

@@ -23,6 +23,7 @@ from bl_ext.user_default.dafnet.dafnet_addon.blender.overlay.contents import dra
 from bl_ext.user_default.dafnet.dafnet_addon.blender.pipeline import job
 from bl_ext.user_default.dafnet.dafnet_addon.core import drawing
 from bl_ext.user_default.dafnet.dafnet_addon.core.errors import InputError
+from bl_ext.user_default.dafnet.dafnet_addon.core.progress import run_to_end
 from bl_ext.user_default.dafnet.dafnet_addon.core.skeleton import END_EFFECTORS, UPPER
 
 from kit.stage import Stage
@@ -386,6 +387,41 @@ def test_cleaned_again_makes_a_new_take_and_leaves_the_old(shot: Shot) -> None:
     bpy.ops.dafnet.play_take(index=0)
     after = {name: np.array([p.co for p in c.keyframe_points]) for name, c in _curves(shot).items()}
     assert all(np.array_equal(before[name], after[name]) for name in before)
+
+
+def test_cleaning_again_may_be_stopped_and_sees_what_is_deleted(shot: Shot) -> None:
+    bpy.ops.dafnet.generate()
+    (raw,) = shot.listed()
+    shot.scene.frame_set(30)
+    before, shares = shot.state(), []
+    while True:
+        steps = job.clean_up_again.steps(bpy.context, shot.ann, raw)
+        try:
+            for _ in range(len(shares) + 1):
+                share = next(steps)
+        except StopIteration as done:
+            assert shot.listed() == [raw, done.value.action]
+            break
+        shares.append(share)
+        assert shot.state() == before
+        steps.close()
+        assert shot.state() == before and shot.listed() == [raw]
+    assert len(shares) > 4 and shares == sorted(shares) and shares[-1] <= 1.0
+
+    bpy.ops.dafnet.play_take(index=0)
+    steps = job.clean_up_again.steps(bpy.context, shot.ann, raw)
+    next(steps)
+    bpy.data.actions.remove(raw)
+    assert run_to_end(steps).action in shot.listed(), "all of it that is needed was read at first"
+
+    (clean, _) = shot.listed()
+    steps = job.clean_up_again.steps(bpy.context, shot.ann, clean)
+    next(steps)
+    actions = len(bpy.data.actions)
+    bpy.data.objects.remove(shot.ann)
+    with pytest.raises(InputError, match=r"clean up again|'Ann' is not in the scene"):
+        run_to_end(steps)
+    assert len(bpy.data.actions) == actions
 
 
 def test_takes_are_there_when_the_file_is_opened_again(shot: Shot, tmp_path: Path) -> None:

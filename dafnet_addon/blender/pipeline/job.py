@@ -18,7 +18,7 @@ from ...core.cleanup import CleanUp
 from ...core.draws import Draw
 from ...core.errors import InputError
 from ...core.generate import clean_again_steps, takes_steps
-from ...core.progress import run_to_end, stepwise, within
+from ...core.progress import stepwise, within
 from ...core.take import Controls, Take, warnings_of
 from ..character.armature import metres_per_unit
 from ..character.settings import CLEAN_UP, HELD, Settings, settings_of
@@ -50,6 +50,8 @@ __all__ = [
 
 _READ = 0.1
 """Progress once the scene is read."""
+_READ_AGAIN = 0.3
+"""The same where a take is only cleaned up again."""
 _GENERATED = 0.95
 """Progress once the takes are generated."""
 _FURTHER_TAKES = 1.0
@@ -327,14 +329,16 @@ def _remove_bake(
         bpy.data.actions.remove(action)
 
 
+@stepwise
 def clean_up_again(
     context: bpy.types.Context, armature: bpy.types.Object, action: bpy.types.Action
-) -> Result:
+) -> Generator[float, None, Result]:
     """Clean up the take of ``action`` with the character's present settings, as a new action and
     without sampling again.
 
-    Targets, root and mode count as they were when it was generated, furniture as it is now.
-    ``InputError`` as for ``steps``, and where the action holds no take; nothing is changed then.
+    Targets, root and mode count as they were when it was generated, furniture as it is now. A job
+    as ``run`` is one. ``InputError`` as there, and where the action holds no take; nothing is
+    changed then.
     """
     take, controls = stored_take(action)
     # In takes that were packed before it was noted, only the action knows it.
@@ -348,9 +352,16 @@ def clean_up_again(
         mode="FREE",
         begins_as=action.name_full,
     )
-    read = read_scene(context, settings)
-    again = run_to_end(clean_again_steps(read.scene, controls, take, clean_up_of(settings)))
-    actions = run_to_end(bake_steps(settings, [again], controls))
+    try:
+        read = yield from within(read_scene.steps(context, settings), 0.0, _READ_AGAIN)
+    except ReferenceError as error:
+        raise InputError(
+            "Something was deleted while the scene was read; clean up again."
+        ) from error
+
+    cleaned = clean_again_steps(read.scene, controls, take, clean_up_of(settings))
+    again = yield from within(cleaned, _READ_AGAIN, _GENERATED)
+    actions = yield from within(bake_steps(settings, [again], controls), _GENERATED, 1.0)
     return Result(
         actions=tuple(actions),
         takes=(again,),
