@@ -15,6 +15,7 @@ from ..dafnet_addon.blender.delivery.assets import mark_as_asset
 from ..dafnet_addon.blender.delivery.export import ENDINGS, export_steps
 from ..dafnet_addon.blender.delivery.nla import put_into_nla
 from ..dafnet_addon.blender.delivery.people import distinct_names, with_chosen_take
+from ..dafnet_addon.blender.overridable import rows_of_library
 from ..dafnet_addon.blender.pipeline import job
 from ..dafnet_addon.core.errors import InputError
 from ..dafnet_addon.core.progress import run_to_end
@@ -133,12 +134,12 @@ class DAFNET_OT_keep_accepted(_OfTakes, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def run(self, context: bpy.types.Context) -> None:
-        """Drop the others."""
+        """Drop the others; those of an override's library stay."""
         character = _character(context)
         if not any(action.dafnet.accepted for action in takes_of(character)):
             raise InputError("No take is accepted; mark those to keep first.")
         rows = character.dafnet.takes
-        for index in range(len(rows) - 1, -1, -1):
+        for index in reversed(range(rows_of_library(character, "takes"), len(rows))):
             if rows[index].action is None or not rows[index].action.dafnet.accepted:
                 drop_take(character, index)
 

@@ -128,6 +128,32 @@ def test_a_library_override_gets_takes_of_its_own_that_the_file_keeps(
     np.testing.assert_allclose(heads, result.take.joints[-1], atol=1e-4)
 
 
+def test_takes_of_the_library_stay_and_those_of_the_file_come_and_go(
+    blender: ModuleType, tmp_path: Path
+) -> None:
+    stage = Stage(frames=(1, 6), furnished=False)
+    stage.walk((1, 0.0), (6, 0.2))
+    job.run(bpy.context, stage.settings())
+    ann = overridden("Ann", tmp_path / "library.blend")
+    scene = bpy.context.scene
+    scene.frame_end = 6
+    job.run(bpy.context, settings_of(ann, scene, take_count=3))
+    assert len(ann.dafnet.takes) == 4
+
+    ann = opened_again(tmp_path / "shot.blend")
+    takes = [row.action.name_full for row in ann.dafnet.takes]
+    assert len(set(takes)) == 4 and ann.dafnet.takes[0].action.library
+    ann.dafnet.active_take = 0
+    with pytest.raises(RuntimeError, match="of the library that 'Ann' comes from"):
+        bpy.ops.dafnet.reject_take()
+    ann.dafnet.active_take = 2
+    assert bpy.ops.dafnet.reject_take() == {"FINISHED"}
+    assert [row.action.name_full for row in ann.dafnet.takes] == [*takes[:2], takes[3]]
+    ann.dafnet.takes[2].action.dafnet.accepted = True
+    assert bpy.ops.dafnet.keep_accepted() == {"FINISHED"}
+    assert [row.action.name_full for row in ann.dafnet.takes] == [takes[0], takes[3]]
+
+
 def through(*points: Any) -> None:
     """Send the only character through these."""
     for each in bpy.context.scene.objects:

@@ -105,6 +105,9 @@ def test_who_cannot_be_keyed_leaves_the_others_as_they_were(stage: Stage) -> Non
     with pytest.raises(InputError, match="parent"):
         direct(bpy.context, people)
     assert stage.state() == before and not keys_of(stage.ann) and not stage.own.planned
+    bob.dafnet.root.hide_viewport = True
+    with pytest.raises(InputError, match="'Bob Root' or its collection is disabled in viewports"):
+        direct(bpy.context, people)
 
 
 def test_keys_are_few_enough_to_edit(stage: Stage) -> None:

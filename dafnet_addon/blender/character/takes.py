@@ -13,6 +13,7 @@ from ...core.errors import InputError
 from ...core.storage import packed, unpacked
 from ...core.take import Controls, Take
 from ..compat import assign_action
+from ..overridable import add_named, rows_of_library
 from .nla_modes import require_no_tweak_mode
 
 __all__ = [
@@ -78,7 +79,7 @@ def add_take(
         row.word, row.text, row.good = finding.word, finding.text, finding.good
 
     own = armature.dafnet
-    own.takes.add().action = action
+    add_named(own.takes).action = action
     own.active_take = len(own.takes) - 1
 
 
@@ -151,11 +152,17 @@ def drop_take(armature: bpy.types.Object, index: int) -> None:
     """Remove a row from the list; if its take was playing, another one plays instead. Blender
     deletes the action with the file, unless something uses it.
 
-    ``InputError``: the armature edits a strip in tweak mode; nothing is changed then.
+    ``InputError``: the armature edits a strip in tweak mode, or the take is of the library that it
+    is overridden from; nothing is changed then.
     """
     require_no_tweak_mode(armature)
     own = armature.dafnet
     action = own.takes[index].action
+    if index < rows_of_library(armature, "takes"):
+        raise InputError(
+            f"This take is of the library that '{armature.name}' comes from; make the character "
+            "local to remove it."
+        )
     own.takes.remove(index)
     own.active_take = max(0, min(own.active_take, len(own.takes) - 1))
     if action is None or action in takes_of(armature):

@@ -23,7 +23,7 @@ from ..character.settings import Settings, settings_of
 from ..character.standing import roots_brought_along
 from ..character.targets import add_root, lacks_root
 from ..populating.surroundings import room_of
-from ..scene.lookup import find_object
+from ..scene.lookup import find_object, require_enabled
 from ..scene.playback import frame_kept, play_steps
 from .plan_keys import plan_keyed
 from .root_keys import keyable_root
@@ -113,8 +113,8 @@ def _direct(
     scene = context.scene
     unit, fps = metres_per_unit(scene), scene.render.fps / scene.render.fps_base
     settings = [settings_of(assigned.armature, scene, mode="FREE") for assigned in people]
-    for each in settings:
-        keyable_root(each)
+    roots = [keyable_root(each) for each in settings]
+    require_enabled(context.evaluated_depsgraph_get(), roots)
 
     first = min(each.frame_start for each in settings)
     others = yield from within(_others(context, people, first), 0.0, _READ)
