@@ -13,10 +13,18 @@ from .beginning import PREROLL
 from .cleanup import CleanUp, cleaned, reach_targets
 from .conditions import Change, Shot, targets_of, turns_of
 from .draws import Draw
-from .kinematics import Bent, Turn, come_over, global_from_local, local_from_global, turned
+from .kinematics import (
+    Bent,
+    Turn,
+    bent,
+    come_over,
+    global_from_local,
+    local_from_global,
+    on_joints,
+    turned,
+)
 from .leaning import lean_findings, lean_of, with_lean
 from .looking import counting, head_turn, with_chest_turned
-from .meeting import bent, on_joints
 from .metrics import motion_metrics
 from .occupancy import distance
 from .progress import stepwise, within

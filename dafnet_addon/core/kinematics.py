@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .rotations import (
+    continuous_signs,
     frame_from,
     matrix_from_quaternion,
     normalised,
@@ -37,15 +38,17 @@ from .skeleton import (
 __all__ = [
     "Bent",
     "Turn",
+    "bent",
+    "come_over",
+    "fit",
     "forward_kinematics",
     "global_from_local",
     "local_from_global",
+    "on_bones",
+    "on_joints",
+    "turned",
     "two_bone",
     "with_wrists_at",
-    "fit",
-    "on_bones",
-    "turned",
-    "come_over",
 ]
 
 # Tables of the limbs, in the order of LIMBS.
@@ -376,6 +379,18 @@ class Bent(NamedTuple):
 
     local: np.ndarray
     pelvis: np.ndarray
+
+
+def bent(joints: np.ndarray, fps: float = MODEL_FPS) -> Bent:
+    """The motion of the body whose bones fit joints (T, 22, 3) best."""
+    pelvis, frames = fit(joints, fps=fps)
+    return Bent(continuous_signs(quaternion_from_matrix(local_from_global(frames))), pelvis)
+
+
+def on_joints(motion: Bent) -> np.ndarray:
+    """The joints (T, 22, 3) of a motion."""
+    frames = global_from_local(matrix_from_quaternion(motion.local))
+    return forward_kinematics(frames, motion.pelvis)
 
 
 def come_over(motion: Bent, changes: Sequence[tuple[int, np.ndarray, Bent]]) -> Bent:

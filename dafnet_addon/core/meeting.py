@@ -11,21 +11,13 @@ import numpy as np
 
 from .beginning import PREROLL
 from .errors import InputError
-from .kinematics import (
-    Bent,
-    come_over,
-    fit,
-    forward_kinematics,
-    global_from_local,
-    local_from_global,
-)
+from .kinematics import Bent, bent, come_over, on_joints
 from .progress import within
 from .root import RootPath, to_root, to_world
-from .rotations import continuous_signs, matrix_from_quaternion, quaternion_from_matrix
 from .sampler import Conditions, Sampler
-from .series import MODEL_FPS, smoothstep
+from .series import smoothstep
 
-__all__ = ["TRIES", "bent", "led_to", "met", "nearest", "on_joints", "require_same_root"]
+__all__ = ["TRIES", "led_to", "met", "nearest", "require_same_root"]
 
 TRIES = 6
 """How many times a part is made, of which the one that comes nearest is taken."""
@@ -35,18 +27,6 @@ _CONTEXT = 30  # frames before those that tell how straight limbs are twisted
 _STRANGEST = 3.5  # of the kept motion's noise, whose numbers are standard normal
 _ROOT_OFF = 0.05  # metres that the root may be off where the take is kept
 _ROOT_TURNED = np.radians(5.0)
-
-
-def bent(joints: np.ndarray, fps: float = MODEL_FPS) -> Bent:
-    """The motion of the body whose bones fit joints (T, 22, 3) best."""
-    pelvis, frames = fit(joints, fps=fps)
-    return Bent(continuous_signs(quaternion_from_matrix(local_from_global(frames))), pelvis)
-
-
-def on_joints(motion: Bent) -> np.ndarray:
-    """The joints (T, 22, 3) of a motion."""
-    frames = global_from_local(matrix_from_quaternion(motion.local))
-    return forward_kinematics(frames, motion.pelvis)
 
 
 def require_same_root(old: RootPath, new: RootPath, start: int) -> None:

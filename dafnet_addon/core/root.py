@@ -22,7 +22,6 @@ __all__ = [
     "root_from_matrices",
     "smoothed",
     "velocities",
-    "integrate",
     "to_root",
     "to_world",
     "yaw_of",
@@ -201,16 +200,6 @@ def ahead(path: RootPath) -> np.ndarray:
         out[:, k, 2] = yaw[later] - path.yaw
 
     return out.reshape(len(path), -1)
-
-
-def integrate(velocity: np.ndarray, position: np.ndarray, yaw: float) -> RootPath:
-    """The path that starts at ``position`` (3,), ``yaw`` and moves by ``velocity`` (T, 3); inverse
-    of ``velocities``.
-    """
-    angles = yaw + np.cumsum(velocity[:, 2])
-    before = np.concatenate([[yaw], angles[:-1]])
-    local = np.concatenate([velocity[:, :2], np.zeros((len(velocity), 1))], axis=1)
-    return RootPath(position + np.cumsum(rotate(yaw_matrix(before), local), axis=0), angles)
 
 
 def to_root(path: RootPath, points: np.ndarray) -> np.ndarray:

@@ -25,13 +25,13 @@ import numpy as np
 from ..core.checks import FARTHEST, MAX_SEED, array, inside, number, whole
 from ..core.errors import InputError
 from ..core.skeleton import STATURE
-from ..core.tables import read_tables, require_known
+from ..core.tables import require_known
 from ..core.text import printable
 from ..core.wishes import Wishes
 from .task_lists import tasks_from
 from .tasks import Task
 
-__all__ = ["MAX_PEOPLE", "MAX_TAKES", "People", "Shot", "Somebody", "drawn", "read_shot", "shot_of"]
+__all__ = ["MAX_PEOPLE", "MAX_TAKES", "People", "Shot", "Somebody", "drawn", "shot_of"]
 
 MAX_PEOPLE = 1000
 MAX_TAKES = 64
@@ -115,11 +115,6 @@ class Somebody:
     character: str | None
     cast: str | None
     take_seeds: tuple[int, ...]
-
-
-def read_shot(file: Path) -> Shot:
-    """The shot of a TOML or JSON file. Raises InputError where it cannot be read or used."""
-    return shot_of(read_tables(file, "shots"), file.parent)
 
 
 _WISHED = tuple(each.name for each in fields(Wishes) if each.name != "rig")

@@ -5,7 +5,6 @@ import pytest
 
 from dafnet_addon.core.root import (
     RootPath,
-    integrate,
     root_from_joints,
     root_from_matrices,
     smoothed,
@@ -41,9 +40,14 @@ def winding_path(frames: int = 200) -> RootPath:
 
 def test_integrating_velocities_gives_the_path_back():
     path = winding_path()
-    again = integrate(velocities(path), path.position[0], path.yaw[0])
-    np.testing.assert_allclose(again.position, path.position, atol=1e-12)
-    np.testing.assert_allclose(again.yaw, path.yaw, atol=1e-12)
+    steps = velocities(path)
+    yaw = path.yaw[0] + np.cumsum(steps[:, 2])
+    before = np.concatenate([path.yaw[:1], yaw[:-1]])
+    x, y = steps[:, 0], steps[:, 1]
+    across = [np.cos(before) * x - np.sin(before) * y, np.sin(before) * x + np.cos(before) * y]
+    place = path.position[0, :2] + np.cumsum(np.stack(across, axis=1), axis=0)
+    np.testing.assert_allclose(place, path.position[:, :2], atol=1e-12)
+    np.testing.assert_allclose(yaw, path.yaw, atol=1e-12)
 
 
 def test_velocity_is_right_forward_and_counter_clockwise_turn():

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from dafnet_addon import InputError
-from dafnet_addon.director.shots import Shot, drawn, read_shot, shot_of
+from dafnet_addon.core.tables import read_tables
+from dafnet_addon.director.shots import Shot, drawn, shot_of
 from dafnet_addon.director.tasks import SitOn, StandUp
 
 SITS = {"sit_on": "Chair.*", "seconds": 4}
@@ -25,7 +26,7 @@ def test_a_file_says_what_tables_say(tmp_path: Path) -> None:
         'tasks = [{ sit_on = "Chair.*", seconds = 4 }, { stand_up = 1 }]\n',
         encoding="utf-8",
     )
-    found = read_shot(tmp_path / "a.toml")
+    found = shot_of(read_tables(tmp_path / "a.toml", "shots"), tmp_path)
     (group,) = found.people
     assert (found.room, found.seed, found.takes, found.cast) == ("cafe", 7, 2, ("hero.blend",))
     assert found.wishes.truth and found.wishes.render == ("frames", "depth")
@@ -33,7 +34,7 @@ def test_a_file_says_what_tables_say(tmp_path: Path) -> None:
     assert found.path("hero.blend") == tmp_path / "hero.blend"
 
     (tmp_path / "a.json").write_text(json.dumps(dict(found.words)), encoding="utf-8")
-    assert read_shot(tmp_path / "a.json") == found
+    assert shot_of(read_tables(tmp_path / "a.json", "shots"), tmp_path) == found
 
 
 def test_what_is_drawn_for_somebody_does_not_depend_on_those_after_him() -> None:
