@@ -115,6 +115,11 @@ class DAFNET_OT_generate(LongOperator, bpy.types.Operator):
                 frame_start=first,
             )
 
+        if not take.dafnet.whole:
+            raise InputError(
+                f"Part of '{take.name}' is of another take or was recorded, so its upper body is "
+                "not made by its seed alone; set the mode to FULL and copy the upper body from it."
+            )
         draw = draw_of(take)
         return job.settings_of(
             character,

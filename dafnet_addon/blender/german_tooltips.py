@@ -17,6 +17,9 @@ TOOLTIPS = {
     "Whether its noise was the same all along the take": (
         "Ob sein Rauschen den ganzen Take über dasselbe war"
     ),
+    "Its seed alone makes it again: no part is of another take or was recorded": (
+        "Sein Seed allein macht ihn wieder: Kein Teil ist aus einem anderen Take oder aufgenommen"
+    ),
     "The take's first frame": "Der erste Frame des Takes",
     "Keep this take": "Diesen Take behalten",
     "Show this take as a stick figure next to the one that plays": (

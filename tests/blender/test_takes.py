@@ -219,6 +219,25 @@ def test_legs_vary_under_the_same_upper_body(shot: Shot) -> None:
     assert shot.listed()[2].dafnet.lower_seed == 6
 
 
+def test_legs_are_not_varied_under_an_upper_body_that_no_seed_makes(shot: Shot) -> None:
+    """The seed of a take that was gone on with makes the part after the frame, not the one before,
+    and that stays so when it is cleaned up again.
+    """
+    bpy.ops.dafnet.generate()
+    bpy.context.scene.frame_set(bpy.context.scene.frame_start + 10)
+    bpy.ops.dafnet.generate(task="ONWARD")
+    assert bpy.ops.dafnet.clean_again() == {"FINISHED"}
+    for index, whole in enumerate((True, False, False)):
+        shot.ann.dafnet.active_take = index
+        assert shot.listed()[index].dafnet.whole == whole
+        if not whole:
+            with pytest.raises(RuntimeError, match=r"mode to FULL and copy the upper body"):
+                bpy.ops.dafnet.generate(task="LEGS")
+    assert len(shot.listed()) == 3
+    shot.ann.dafnet.active_take = 0
+    assert bpy.ops.dafnet.generate(task="LEGS") == {"FINISHED"}
+
+
 def test_a_take_that_was_drawn_anew_is_listed_as_it_was_drawn(
     shot: Shot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -78,6 +78,12 @@ class TakeSettings(bpy.types.PropertyGroup):
         options=set(),
         description="Whether its noise was the same all along the take",
     )
+    whole: BoolProperty(
+        name="Whole",
+        options=set(),
+        default=True,
+        description="Its seed alone makes it again: no part is of another take or was recorded",
+    )
     frame_start: IntProperty(name="Start", options=set(), description="The take's first frame")
     accepted: BoolProperty(name="Accepted", options=set(), description="Keep this take")
     ghost: BoolProperty(

@@ -55,8 +55,11 @@ def add_take(
     take: Take,
     controls: Controls,
     frame_start: int,
+    whole: bool = True,
 ) -> None:
-    """Pack into ``action`` what it was made from, and list it as the armature's active take."""
+    """Pack into ``action`` what it was made from, and list it as the armature's active take.
+    ``whole``: whether its draw alone makes it again.
+    """
     action[PACKED] = packed(take, controls)
     facts, draw = action.dafnet, take.draw
     facts.frame_start = frame_start
@@ -65,7 +68,7 @@ def add_take(
     facts.lower_temperature = (
         draw.temperature if draw.lower_temperature is None else draw.lower_temperature
     )
-    facts.held = draw.held
+    facts.held, facts.whole = draw.held, whole
     facts.log_likelihood = take.log_likelihood
     for prefix, metrics in (("", take.metrics), ("raw_", take.raw_metrics)):
         for name, (metric, factor) in _METRICS.items():

@@ -54,7 +54,7 @@ def _keep(session: LiveSession, clip: Clip) -> Generator[float, None, Result]:
         session.furniture.scene, controls, clip.before, clip.played, clean_up_of(settings), draw
     )
     take = yield from within(job, 0.0, 0.8)
-    actions = yield from within(bake_steps(settings, [take], controls), 0.8, 1.0)
+    actions = yield from within(bake_steps(settings, [take], controls, whole=False), 0.8, 1.0)
     start = settings.frame_start
     warnings = tuple(_key_what_led(session, controls, start))
     extend_range(scene, armature, start + len(take) - 1)

@@ -177,7 +177,8 @@ def run(
     if gone := used - names_in_use(settings):
         raise InputError(f"'{min(gone)}' is no longer in the scene; generate again.")
 
-    actions = yield from within(bake_steps(settings, takes, controls), _GENERATED, 1.0)
+    baked = bake_steps(settings, takes, controls, whole=kept is None)
+    actions = yield from within(baked, _GENERATED, 1.0)
     seconds |= takes[0].seconds | {"fitting": sum(take.seconds["fitting"] for take in takes)}
     seconds["baking"] = perf_counter() - started
     yield 1.0
@@ -279,10 +280,10 @@ def _chosen_take(settings: Settings, action: bpy.types.Action) -> tuple[Take, Co
 
 
 def bake_steps(
-    settings: Settings, takes: list[Take], controls: Controls
+    settings: Settings, takes: list[Take], controls: Controls, *, whole: bool
 ) -> Generator[float, None, list[bpy.types.Action]]:
     """An action for each take, listed on the armature; the first one plays. All are made or none:
-    whatever stops it, nothing has changed.
+    whatever stops it, nothing has changed. ``whole``: see ``add_take``.
     """
     names: list[str] = []
     with ExitStack() as undo:
@@ -294,7 +295,7 @@ def bake_steps(
                 unit = metres_per_unit(find_scene(settings))
                 start = settings.frame_start
                 action = bake(take, armature, start, name=f"{armature.name} take", unit=unit)
-                add_take(armature, action, take=take, controls=controls, frame_start=start)
+                add_take(armature, action, take, controls, frame_start=start, whole=whole)
                 names.append(action.name_full)
 
             note_change()
@@ -343,7 +344,7 @@ def clean_up_again(
     take, controls = stored_take(action)
     # In takes that were packed before it was noted, only the action knows it.
     take = replace(take, draw=draw_of(action))
-    start = action.dafnet.frame_start
+    start, whole = action.dafnet.frame_start, action.dafnet.whole
     settings = settings_of(
         armature,
         context.scene,
@@ -361,7 +362,8 @@ def clean_up_again(
 
     cleaned = clean_again_steps(read.scene, controls, take, clean_up_of(settings))
     again = yield from within(cleaned, _READ_AGAIN, _GENERATED)
-    actions = yield from within(bake_steps(settings, [again], controls), _GENERATED, 1.0)
+    baked = bake_steps(settings, [again], controls, whole=whole)
+    actions = yield from within(baked, _GENERATED, 1.0)
     return Result(
         actions=tuple(actions),
         takes=(again,),
