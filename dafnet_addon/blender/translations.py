@@ -68,6 +68,7 @@ _GERMAN = {
     "Head Follows": "Kopf folgt",
     "Head Influence": "Einfluss Kopf",
     "Held": "Gehalten",
+    "Whole": "Ganz",
     "Hips": "Hüfte",
     "How": "Wie",
     "Jerk": "Ruck",

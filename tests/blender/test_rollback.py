@@ -171,7 +171,7 @@ def test_a_failure_at_any_write_leaves_the_file_as_it_was(
     settings = job.settings_of(armature, blender.context.scene)
 
     def bake() -> None:
-        for _ in job.bake_steps(settings, made, controls):
+        for _ in job.bake_steps(settings, made, controls, whole=True):
             blender.context.view_layer.update()
 
     before = everything(blender, armature)
