@@ -3,6 +3,7 @@ run is only read; and a cooled copy of it.
 """
 
 import json
+import runpy
 import shutil
 import threading
 from dataclasses import replace
@@ -30,6 +31,7 @@ from dafnet_addon.training.parts import load_run  # noqa: E402
 from dafnet_addon.training.train import train_part  # noqa: E402
 from dafnet_addon.training.validation import held_out_losses, read_record, score, validate_steps  # noqa: E402
 from kit.networks import TINY  # noqa: E402
+from kit.places import ROOT  # noqa: E402
 
 pytestmark = pytest.mark.torch
 
@@ -282,6 +284,37 @@ def test_a_copy_is_cooled_and_the_run_is_not_disturbed(described: Path, tmp_path
     steps = load_run("upper", out).step
     candidates.cool(run, described, out, 1.0)
     assert load_run("upper", out).step == steps, "what is cooled stays so"
+
+
+def test_the_mean_of_two_runs_says_of_which(described: Path, tmp_path: Path):
+    early, late, file = tmp_path / "early", tmp_path / "late", tmp_path / "mean.safetensors"
+    _train(described, early, 4)
+    shutil.copytree(early, late)
+    _train(described, late, 8)
+    mean_weights = runpy.run_path(str(ROOT / "scripts" / "mean_of_runs.py"))["mean_weights"]
+    mean_weights([early, late], described, file)
+    for run in (early, late):
+        candidates.write_weights(run, described, run / "own.safetensors")
+    made, first, second = (
+        load_weights(each) for each in (file, early / "own.safetensors", late / "own.safetensors")
+    )
+    name = max((each for each in made.tensors if ".lower." in f".{each}"), key=len)
+    mean = 0.5 * (first.tensors[name] + second.tensors[name])
+    span = np.abs(mean).max() / 64.0  # of eight bits
+    np.testing.assert_allclose(made.tensors[name], mean, atol=span)
+    assert not np.allclose(first.tensors[name], second.tensors[name], atol=1e-6)
+    said = json.loads(made.metadata["training"])
+    assert [each["upper"]["steps"] for each in said["mean_of"]] == [4, 8]
+    assert said["lower"]["steps"] == 8
+
+    other = load_run("predictor", late)
+    with torch.no_grad():
+        next(other.network.parameters()).add_(1.0)
+    other.averaged = {}
+    other.save()
+    with pytest.raises(InputError, match="runs of one training"):
+        mean_weights([early, late], described, tmp_path / "none.safetensors")
+    assert not (tmp_path / "none.safetensors").exists()
 
 
 def test_a_run_that_cools_itself_is_cooled_from_before(described: Path, tmp_path: Path):
