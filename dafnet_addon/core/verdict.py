@@ -32,7 +32,7 @@ _SEATS = 0.22  # metres of a top over the floor, from where on one is to sit on 
 _DEEP = 0.05  # metres of a body's bones in something hard: its flesh is past it
 _CLOSE = 0.06  # metres from a bone's points, within which it may be across something thin
 _TOUCHES = 0.005  # metres of a bone in what it only touches
-_FINELY = 12  # points of a bone that is looked at closely
+_FINELY = 24  # points of a bone that is looked at closely: those of a trunk, a centimetre apart
 # Directions (14, 3) to move out of something: along the axes, and between them.
 _MOVES = np.array([w for w in product((0, 1, -1), repeat=3) if np.abs(w).sum() in (1, 3)], float)
 _MOVES /= np.linalg.norm(_MOVES, axis=1, keepdims=True)

@@ -145,7 +145,7 @@ def test_targets_that_end_with_the_mode_are_left_as_softly(weights):
             for blend in (0.0, 1 / 3)
         ]
         # A network may let go softly by itself; a blend makes it no harder.
-        assert jump[1] < 0.06 and jump[1] < jump[0] + 0.01
+        assert jump[1] < 0.06 and jump[1] < jump[0] + 0.015
 
 
 def _turned_by(take: Take, reference: Take) -> np.ndarray:

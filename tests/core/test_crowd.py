@@ -14,9 +14,10 @@ from dafnet_addon.core.progress import run_to_end
 from dafnet_addon.core.take import Asked
 
 CLEAN = CleanUp(feet=1.0, reach=1.0, seat=1.0)
-ROUNDED = 5e-5
-"""Metres by which single precision may tell somebody in a crowd from somebody alone; measured are
-two thousandths of a millimetre."""
+ROUNDED = 1e-4
+"""Metres, or probability of an action, by which single precision may tell somebody in a crowd from
+somebody alone.
+"""
 SEAT = Box(center=np.array([0.0, 0.0, 0.225]), half_size=np.array([0.22, 0.22, 0.225]))
 
 

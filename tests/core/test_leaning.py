@@ -98,7 +98,7 @@ def test_hands_and_the_head_stay_on_their_targets(plain: Take) -> None:
     upright, take = (_made(mode="EE", lean=lean, **wrists) for lean in (0.0, 15.0))
     for name, at in places.items():
         assert np.linalg.norm(take.joints[:, at] - wrists[name], axis=-1)[sits].max() < 0.01
-    assert np.abs(_back(take) - _back(upright) - 15.0)[sits].max() < 5.0
+    assert np.abs(_back(take) - _back(upright) - 15.0)[sits].max() < 7.0
     assert take.metrics["jerk"] < 1.1 * upright.metrics["jerk"]
 
     head = plain.joints[:, HEAD].copy()
