@@ -330,6 +330,27 @@ CLAIMS: tuple[tuple[Path, str, tuple[Value, ...]], ...] = (
     ),
     (
         CARD,
+        r"within 5 cm of that from (\d) of 3 sides, at temperature 1 in (\d+) of 15 trios",
+        tuple(
+            _at("evaluation", "seats", heat, "all_three_right", times=trios)
+            for heat, trios in (("t0", 3), ("t1", 15))
+        ),
+    ),
+    (
+        CARD,
+        r"of information, (\d) actions are the likeliest",
+        (_at("evaluation", "actions", "likeliest_in_2_percent"),),
+    ),
+    (
+        CARD,
+        r"edges of tables are met least: (\d+) % of (\d+) within 8 cm",
+        (
+            _at("real-tell", "by kind", "table", "free_t0", "sits_within_8cm", times=100.0),
+            _at("real-tell", "by kind", "table", "free_t0", "clips"),
+        ),
+    ),
+    (
+        CARD,
         r"probabilities: (\d\.\d+) nats .{0,140}with the activities (0\.\d+); "
         r"shuffled .{0,60}by (\d\.\d) nats, in (\d+) % of the clips",
         (
