@@ -19,11 +19,8 @@ ROOT = Path(__file__).absolute().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from dafnet_addon.core.errors import InputError  # noqa: E402 - found only now
-from dafnet_addon.training.candidates import provenance  # noqa: E402
-from dafnet_addon.training.export import export  # noqa: E402
-from dafnet_addon.training.noise import take_noise  # noqa: E402
+from dafnet_addon.training.candidates import provenance, write_networks  # noqa: E402
 from dafnet_addon.training.parts import trained_networks  # noqa: E402
-from dafnet_addon.training.steps import dataset_pool  # noqa: E402
 
 
 def mean_weights(runs: Sequence[Path], dataset: Path, file: Path) -> None:
@@ -32,7 +29,7 @@ def mean_weights(runs: Sequence[Path], dataset: Path, file: Path) -> None:
     one make.
     """
     made = [trained_networks(run) for run in runs]
-    flow, predictor, statistics = made[-1]
+    flow, _, _ = made[-1]
     states = [each.state_dict() for each, _, _ in made]
     shapes = [{name: values.shape for name, values in state.items()} for state in states]
     predictors = [each.state_dict() for _, each, _ in made if each is not None]
@@ -53,8 +50,7 @@ def mean_weights(runs: Sequence[Path], dataset: Path, file: Path) -> None:
     of = [json.loads(each["training"]) for each in said]
     steps = [{part: each[part] for part in each if part in ("upper", "lower")} for each in of]
     training = json.dumps({**of[-1], "mean_of": steps})
-    noise = take_noise(flow, predictor, dataset_pool(dataset, "cpu"), statistics)
-    export(file, flow, predictor, statistics, {**said[-1], "training": training}, noise)
+    write_networks(made[-1], dataset, file, {**said[-1], "training": training})
 
 
 def main() -> None:

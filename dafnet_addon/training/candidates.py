@@ -6,7 +6,7 @@ any time.
 
 import json
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -15,7 +15,10 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..model.config import ModelConfig
+from ..model.flow import BodyFlow
+from ..model.predictor import ActionPredictor
 from ..model.systems import system_named
+from .batches import Statistics
 from .checkpoints import Checkpoint, checkpoint_file
 from .export import export
 from .noise import take_noise
@@ -23,7 +26,7 @@ from .parts import load_run, saved_runs, trained_networks, uncooled_run
 from .steps import dataset_pool
 from .train import train
 
-__all__ = ["cool", "has_weights", "provenance", "snapshot", "write_weights"]
+__all__ = ["cool", "has_weights", "provenance", "snapshot", "write_networks", "write_weights"]
 
 
 @contextmanager
@@ -74,7 +77,20 @@ def write_weights(folder: Path, dataset: Path, file: Path, device: str = "cpu") 
     """Write the averaged weights of a run's latest checkpoints, with what ``provenance`` says
     of them. How far takes differ is measured on ``device``.
     """
-    flow, predictor, statistics = trained_networks(folder)
+    write_networks(trained_networks(folder), dataset, file, provenance(folder, dataset), device)
+
+
+def write_networks(
+    trained: tuple[BodyFlow, ActionPredictor | None, Statistics],
+    dataset: Path,
+    file: Path,
+    words: Mapping[str, str],
+    device: str = "cpu",
+) -> None:
+    """Write a flow, its predictor and statistics, with ``words`` about them (see ``export``). How
+    far takes differ is measured on ``device``.
+    """
+    flow, predictor, statistics = trained
     networks = [network for network in (flow, predictor) if network is not None]
 
     for network in networks:
@@ -83,7 +99,7 @@ def write_weights(folder: Path, dataset: Path, file: Path, device: str = "cpu") 
     for network in networks:
         network.cpu()
 
-    export(file, flow, predictor, statistics, provenance(folder, dataset), noise)
+    export(file, flow, predictor, statistics, words, noise)
 
 
 def provenance(folder: Path, dataset: Path) -> dict[str, str]:

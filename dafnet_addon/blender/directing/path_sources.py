@@ -8,7 +8,6 @@ from collections.abc import Callable, Generator, Sequence
 import bpy
 import numpy as np
 
-from ...core.errors import InputError
 from ...core.passage import SatOn, met_along
 from ...core.paths import AFTER_SEAT, GETS_UP, Route, Stop, facing, route
 from ...core.progress import stepwise, within
@@ -21,7 +20,7 @@ from ..character.walk_rows import CURVE, OBJECT, POINTS, Asked, Manner
 from ..compat import action_curves
 from ..scene.dependencies import Dependencies
 from ..scene.lookup import find_object
-from ..scene.playback import play_steps
+from ..scene.playback import nothing_deleted, play_steps
 from .curve_lines import line_of
 from .made_walks import intact_walks, note_walk, walks_kept_on_failure
 from .root_keys import (
@@ -226,10 +225,8 @@ def places_over_time(
         places[frame] = tuple(source.evaluated_get(depsgraph).matrix_world.translation)
 
     simulations = Dependencies(context.scene).simulations([source], shaped=False)
-    try:
+    with nothing_deleted("the scene was read", "try again"):
         yield from play_steps(context, frames, simulations, look)
-    except ReferenceError as error:
-        raise InputError("Something was deleted while the scene was read; try again.") from error
 
     return np.array([places[frame] for frame in frames], float)
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from ...core.conditions import foot_targets
 from ...core.distance import prepared, scaled
-from ...core.errors import InputError
 from ...core.metrics import BAD_COLLISION_JOINTS, bad_collisions
 from ...core.nearby import REACH_OF_A_BODY, solids_near
 from ...core.occupancy import distance
@@ -17,6 +16,7 @@ from ...core.sliding import SEEN, slides
 from ...core.solids import Scene
 from ..character.settings import settings_of
 from ..character.takes import frames_of, stored_take
+from ..scene.playback import nothing_deleted
 from ..scene.scene_reader import read_scene
 
 __all__ = ["FaultBars", "Faults", "fault_bars", "faults_of"]
@@ -65,13 +65,11 @@ def faults_of(
     """
     found: dict[int, Faults] = {}
     scenes: dict[tuple[int, int], Scene] = {}
-    try:
+    with nothing_deleted("takes were measured", "try again"):
         for k, action in enumerate(actions):
             one = _faults(context, armature, action, scenes)
             faults = yield from within(one, k / len(actions), (k + 1) / len(actions))
             found[action.session_uid] = faults
-    except ReferenceError as error:
-        raise InputError("Something was deleted while takes were measured; try again.") from error
     return found
 
 

@@ -25,6 +25,7 @@ from ..character.settings import CLEAN_UP, HELD, Settings, settings_of
 from ..character.takes import add_take, draw_of, play_take, stored_take
 from ..preferences import weights_path
 from ..scene.lookup import find_action, find_object, find_scene, names_in_use
+from ..scene.playback import nothing_deleted
 from ..scene.scene_reader import read_scene
 from ..scene.unit_note import unit_note
 from .baker import bake
@@ -144,12 +145,8 @@ def run(
         _, begins_as = _chosen_take(settings, find_action(settings.begins_as))
     note = unit_note(find_scene(settings), _character(settings))
 
-    try:
+    with nothing_deleted("the scene was read", "generate again"):
         read = yield from within(read_scene.steps(context, settings), 0.0, _READ)
-    except ReferenceError as error:
-        raise InputError(
-            "Something was deleted while the scene was read; generate again."
-        ) from error
 
     seconds = {"reading": perf_counter() - started}
 
@@ -353,12 +350,8 @@ def clean_up_again(
         mode="FREE",
         begins_as=action.name_full,
     )
-    try:
+    with nothing_deleted("the scene was read", "clean up again"):
         read = yield from within(read_scene.steps(context, settings), 0.0, _READ_AGAIN)
-    except ReferenceError as error:
-        raise InputError(
-            "Something was deleted while the scene was read; clean up again."
-        ) from error
 
     cleaned = clean_again_steps(read.scene, controls, take, clean_up_of(settings))
     again = yield from within(cleaned, _READ_AGAIN, _GENERATED)

@@ -23,7 +23,7 @@ from ..character.takes import played_take, stored_take
 from ..pipeline.baker import TRANSFORMS, has_drivers
 from ..pipeline.rollback import undone_on_failure
 from ..scene.dependencies import Dependencies
-from ..scene.playback import frame_kept, play_steps
+from ..scene.playback import frame_kept, nothing_deleted, play_steps
 from .controls import (
     Channels,
     Control,
@@ -113,12 +113,10 @@ def bake_onto_rig(
     size = character_scale(character, 1.0)
 
     _usable_map(context, character, rig, rig_map, root_motion)
-    try:
+    with nothing_deleted("the motion was read", "bake again"):
         recording = yield from within(_record(context, character, rig, frames), 0.0, _RECORDED)
         # Once more, since all may have changed while it was read.
         rig_map = _usable_map(context, character, rig, rig_map, root_motion)
-    except ReferenceError as error:
-        raise InputError("Something was deleted while the motion was read; bake again.") from error
 
     controls = controls_of(rig, rig_map, limbs, root_motion == "BONE")
 

@@ -11,11 +11,22 @@ from ...core.errors import InputError
 from ..pipeline.running import note_change
 from .dependencies import Simulation
 
-__all__ = ["frame_kept", "frames_to_play", "play_steps"]
+__all__ = ["frame_kept", "frames_to_play", "nothing_deleted", "play_steps"]
 
 _BATCH = 16
 """How many frames are set before the job yields, so that the user's input is looked at."""
 Look = Callable[[int, bpy.types.Depsgraph, set[bpy.types.Object]], None]
+
+
+@contextmanager
+def nothing_deleted(meanwhile: str, then: str) -> Iterator[None]:
+    """A block that looks at objects between the user's events: ``InputError`` where one of them was
+    deleted ``meanwhile``, with what to do ``then``.
+    """
+    try:
+        yield
+    except ReferenceError as error:
+        raise InputError(f"Something was deleted while {meanwhile}; {then}.") from error
 
 
 @contextmanager
